@@ -2,7 +2,7 @@
 //! password in a file of its own, and the states of all cameras.
 
 use std::{
-    collections::{BTreeMap, BTreeSet},
+    collections::BTreeMap,
     fs, io,
     io::Write,
     os::unix::fs::{DirBuilderExt, OpenOptionsExt},
@@ -87,8 +87,8 @@ pub struct Cameras {
     folder: PathBuf,
     /// Locked while the file is changed.
     changing: Mutex<()>,
-    /// The names of the cameras of the settings file and the command line.
-    configured: RwLock<BTreeSet<String>>,
+    /// The cameras of the settings file and the command line.
+    configured: RwLock<BTreeMap<String, CameraEntry>>,
     metrics: Arc<Metrics>,
 }
 
@@ -110,7 +110,9 @@ impl Cameras {
     pub fn states(&self, stored: &Stored) -> Vec<CameraState> {
         let configured = self.configured.read();
         let mut states = self.metrics.states();
-        states.retain(|state| stored.contains_key(&state.name) || configured.contains(&state.name));
+        states.retain(|state| {
+            stored.contains_key(&state.name) || configured.contains_key(&state.name)
+        });
         states
     }
 
@@ -119,12 +121,13 @@ impl Cameras {
     /// # Errors
     /// [`ConfigError`] if the file of the cameras cannot be used. Blocks.
     pub fn add_to(&self, cameras: &mut Vec<CameraEntry>) -> Result<(), ConfigError> {
-        let named = cameras.iter();
-        let configured: BTreeSet<_> = named
-            .filter_map(|camera| camera.name.clone().or_else(|| camera.calibration.clone()))
-            .collect();
+        let named = cameras.iter().filter_map(|camera| {
+            let name = camera.name.clone().or_else(|| camera.calibration.clone())?;
+            Some((name, camera.clone()))
+        });
+        let configured: BTreeMap<_, _> = named.collect();
         for (name, camera) in self.stored()? {
-            if !camera.paused && !configured.contains(&name) {
+            if !camera.paused && !configured.contains_key(&name) {
                 cameras.push(self.entry(&name, &camera));
             }
         }
@@ -148,21 +151,24 @@ impl Cameras {
         })
     }
 
-    /// Creates or replaces a camera, and returns true if it is new. Without a password, that of the
-    /// same user at the same host stays. Blocks.
+    /// Creates or replaces a camera, and returns true if it is new. Without a URL, the stored one
+    /// stays; without a password, that of the same user at the same host. Blocks.
     ///
     /// # Errors
     /// [`CameraError`].
     pub fn put(
         &self,
         name: &str,
-        camera: StoredCamera,
+        mut camera: StoredCamera,
         password: Option<&SecretString>,
     ) -> Result<bool, CameraError> {
-        self.check(name, &camera)?;
         let _changing = self.changing.lock();
         let mut stored = self.stored()?;
         let before = stored.get(name);
+        if let (true, Some(before)) = (camera.url.is_empty(), before) {
+            camera.url.clone_from(&before.url);
+        }
+        self.check(name, &camera)?;
         if before.is_none() && stored.len() >= MAX_CAMERAS {
             let problem = "256 cameras are stored: delete one first";
             return Err(ConfigError::problem("name", &problem).into());
@@ -188,7 +194,7 @@ impl Cameras {
         let _changing = self.changing.lock();
         let mut stored = self.stored()?;
         if stored.remove(name).is_none() {
-            if self.configured.read().contains(name) {
+            if self.configured.read().contains_key(name) {
                 return Err(CameraError::Configured(name.to_owned()));
             }
             return Ok(false);
@@ -213,12 +219,41 @@ impl Cameras {
         Ok(first_frame(&checked, TEST_TIMEOUT).await?)
     }
 
+    /// Returns the camera with this name, paused or not. Blocks: reads the file of its password.
+    ///
+    /// # Errors
+    /// [`ConfigError`].
+    pub fn get(&self, name: &str) -> Result<Option<lookdown_watch::Camera>, ConfigError> {
+        let configured = self.configured.read().get(name).cloned();
+        let entry = match configured {
+            Some(entry) => Some(entry),
+            None => {
+                let stored = self.stored()?;
+                stored.get(name).map(|camera| self.entry(name, camera))
+            }
+        };
+        entry.map(|entry| entry.check("")).transpose()
+    }
+
+    /// Returns the present frame of a camera.
+    ///
+    /// # Errors
+    /// [`CameraError`].
+    pub async fn frame(camera: &lookdown_watch::Camera) -> Result<Frame, CameraError> {
+        if let Location::Http(_) | Location::Rtsp(_) = camera.location {
+            return Ok(first_frame(camera, TEST_TIMEOUT).await?);
+        }
+        let problem = "it is not a URL, so its frames cannot be read twice: set results.pictures to \
+                       keep its latest image";
+        Err(ConfigError::problem("url", &problem).into())
+    }
+
     fn check(&self, name: &str, camera: &StoredCamera) -> Result<(), CameraError> {
         if !plain_name::is_plain(name) || name == TEST {
             let remedy = "is not a name of 1 to 64 of a-z, 0-9, '_' and '-', and not test";
             return Err(ConfigError::value("name", name, remedy).into());
         }
-        if self.configured.read().contains(name) {
+        if self.configured.read().contains_key(name) {
             return Err(CameraError::Configured(name.to_owned()));
         }
         checked(name, camera).map(drop)

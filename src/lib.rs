@@ -18,6 +18,7 @@ pub mod mqtt;
 pub mod poller;
 pub mod probe;
 pub mod results;
+mod room_calibration;
 mod rounding;
 pub mod settings;
 pub mod telemetry;

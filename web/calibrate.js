@@ -2,7 +2,7 @@
 
 import { drawCircle } from "./circle_handles.js";
 import { afterPause, element, find } from "./dom.js";
-import { assumedCircle, calibrationOf, circleOf } from "./lens.js";
+import { assumedCircle, calibrationOf, circleOf, withFound } from "./lens.js";
 import { isServing, loadCalibrations } from "./parameters.js";
 import { shown, showFailure, withProgress } from "./progress.js";
 import { Problem, ask, askJson } from "./server.js";
@@ -14,6 +14,10 @@ const FIELDS = ["cx", "cy", "radius", "fieldOfView"];
 /** The pause after the last change before the preview is updated. */
 const REST_MILLIS = 120;
 const PREVIEW_PIXELS = 320;
+/** The most cameras whose calibration is asked for. */
+const MAX_USERS = 60;
+/** The names that a calibration may have. */
+const PLAIN_NAME = /^[a-z0-9][a-z0-9_-]{0,63}$/;
 
 /** An imported file: `{name, content, needsSize}`; null while the circle is edited. */
 let imported = null;
@@ -22,6 +26,8 @@ let circle = null;
 let opened = null;
 let isVisible = false;
 let trying = null;
+/** The calibration whose users are shown. */
+let usersOf = null;
 
 const form = () => find("#calibration-form");
 const field = (name) => form().elements[name];
@@ -35,12 +41,34 @@ function begin() {
   const picture = find("#calibrate-picture");
   if (picture.src !== frame.url) {
     Object.assign(picture, { src: frame.url, width: frame.width, height: frame.height });
-    [circle, opened] = [null, null];
+    [circle, opened, imported] = [null, null, null];
+    if (frame.camera) shown(ofCamera)(frame);
   }
   const { width, height } = frame;
   if (!circle) setCircle(assumedCircle(report ?? { image: { width, height } }));
   if (isVisible) previewShown();
 }
+
+/** Begins with the calibration of the frame's camera, or with its name for a new one. */
+async function ofCamera({ camera }) {
+  const used = find("#calibration").value;
+  if (used) return open(used);
+  field("id").value = PLAIN_NAME.test(camera) ? camera : "";
+  drawn();
+}
+
+/** Says which cameras use the named calibration. */
+async function showUsers() {
+  const asked = id();
+  const rows = await askJson("results");
+  const latest = await Promise.all(rows.slice(0, MAX_USERS).map(({ camera }) => askJson(`results/${encodeURIComponent(camera)}/latest`)));
+  const using = latest.filter(({ calibration }) => calibration.id === asked && !calibration.assumed).map(({ camera }) => camera);
+  if (asked !== id()) return;
+  const others = using.length ? `Used by ${using.join(", ")}: saving applies to the next frame.` : "";
+  find("#calibration-users").textContent = others || (field("id").value ? `A camera named ${asked} uses it from its next frame on.` : "");
+}
+
+const usersSoon = afterPause(REST_MILLIS, shown(showUsers));
 
 function setCircle(next) {
   circle = next;
@@ -62,10 +90,16 @@ function drawn() {
   for (const name of FIELDS) find(`output[for=calibrate-${name}]`).textContent = Number(field(name).value).toFixed(1);
   const id = field("id").value;
   const loss = isServing(id) && imported?.name !== id ? ` The zones, lines and masks of ${id} are not kept.` : "";
-  find("#import-name").textContent = imported ? `${imported.name} is saved unchanged.${loss}` : "";
+  find("#import-name").textContent = imported?.isFound ? "Found in this frame: walls and doors must be straight and upright in the views." : imported ? `${imported.name} is saved unchanged.${loss}` : "";
+  find("#found-values").hidden = !imported?.isFound;
+  find("label[for=import-camera]").hidden = Boolean(imported?.isFound);
   find("#circle-fields").disabled = Boolean(imported);
   find("#import-fields").hidden = !imported;
   find("#save").textContent = isServing(id) ? `Replace ${id}` : "Save";
+  if (id !== usersOf) {
+    usersOf = id;
+    usersSoon();
+  }
 }
 
 function edited(next) {
@@ -163,6 +197,31 @@ async function importFile(file) {
   await preview();
 }
 
+/** Finds lens, center and level from the straight edges of the frame. Everything else in a calibration of this name stays. */
+async function findLens() {
+  const { frame } = shared;
+  const name = id();
+  const found = await withProgress(find("#find-progress"), "Finding the lens", () => askJson(`calibrations/${name}/fit`, { method: "POST", body: frame.blob }));
+  if (shared.frame !== frame) return;
+  const base = isServing(name) ? await read(name) : null;
+  if (base) opened = base;
+  const height = base?.file.mount?.height_m ?? circle.cameraHeight;
+  imported = { name, content: JSON.stringify(withFound(base?.file, found.calibration, height)), needsSize: false, isFound: true };
+  showFound(found);
+  drawn();
+  await preview();
+}
+
+function showFound({ calibration: { lens, sources }, field_of_view_deg: fieldOfView, tilt_deg: tilt, edges, explained }) {
+  const rows = [
+    ["Field of view", `${fieldOfView.toFixed(1)}°, radius ± ${sources.lens.uncertainty.toFixed(2)} %`],
+    ["Center", `${(lens.cx + 0.5).toFixed(1)}, ${(lens.cy + 0.5).toFixed(1)} ± ${sources.center.uncertainty.toFixed(1)} pixels`],
+    ["Tilt", `${tilt.toFixed(1)}° ± ${sources.world_up.uncertainty.toFixed(2)}°`],
+    ["Edges", `${Math.round(explained * 100)} % of ${edges} follow the room`],
+  ];
+  find("#found-values").replaceChildren(...rows.map(([title, text]) => element("div", {}, element("dt", {}, title), element("dd", {}, text))));
+}
+
 /** Loads a calibration of the server. */
 async function open(name) {
   opened = await read(name);
@@ -199,6 +258,7 @@ export function start() {
     event.preventDefault();
     shown(save)();
   });
+  find("#find-lens").addEventListener("click", shown(findLens));
   find("#import-file").addEventListener("change", (event) => {
     const [file] = event.target.files;
     event.target.value = "";

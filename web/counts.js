@@ -1,8 +1,9 @@
-/** Counts in the section Live, if the server has them: tracks, lines, zones, heat maps. */
+/** Counts in the section Cameras, if the server has them: tracks, lines, zones, heat maps. */
 
 import { countRows, drawCounts } from "./counts_drawing.js";
 import { element, find, shape } from "./dom.js";
-import { askJson, key } from "./server.js";
+import { options } from "./camera_states.js";
+import { key } from "./server.js";
 
 /** The interval between two updates of the tracks. */
 const TRACKS_MILLIS = 1000;
@@ -18,7 +19,7 @@ const cards = new Map();
 /** The drawings by camera: `{drawing, rows, heat, heatAt}`. */
 const counted = new Map();
 let polling = null;
-let path;
+const PATH = "counts";
 let bar;
 
 /** A response that is no answer of `lookdown count`. */
@@ -43,13 +44,8 @@ export function addCounts(card) {
 export const layersBelow = ({ camera }) => (counted.has(camera) ? "none" : "oriented,zones");
 
 async function poll(signal) {
-  try {
-    path ??= (await askJson("assets/options.json", { signal })).has_counts ? "/counts" : "";
-  } catch {
-    // The section reports that the server does not respond.
-    return;
-  }
-  if (!path) return;
+  const { has_counts: hasCounts } = await options();
+  if (!hasCounts) return;
   bar ??= controls();
   while (!signal.aborted) {
     try {
@@ -137,7 +133,7 @@ function remove(camera) {
 
 async function request(address, signal) {
   const headers = key.get() ? { "X-API-Key": key.get() } : {};
-  return fetch(`${path}${address}`, { headers, signal });
+  return fetch(`${PATH}${address}`, { headers, signal });
 }
 
 /** The JSON of an address below the path; null for the statuses `without`. */

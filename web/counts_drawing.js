@@ -7,6 +7,8 @@ import { points } from "./geometry.js";
 const COLOURS = 6;
 /** The share of the frame's width that 1 unit of a drawing has. */
 const UNIT = 1 / 320;
+/** Arrows in steps of 45°, clockwise from the right. */
+const ARROWS = ["→", "↘", "↓", "↙", "←", "↖", "↑", "↗"];
 
 /** Draws an answer over the frame of a camera. `heat` is the address of its heat map, empty for none. */
 export function drawCounts(drawing, { camera, width, height, heat }, { tracks, lines = [], zones = [] }) {
@@ -26,8 +28,8 @@ const hasOutline = ({ outline_px: outline }) => outline?.length > 1;
 /** A line with its name, and an arrow in its first direction. */
 function drawnLine({ line, outline_px: outline }, unit) {
   const [x, y] = outline[Math.floor(outline.length / 2)];
-  const [[x1, y1], [x2, y2]] = [outline[0], outline.at(-1)];
-  const degrees = (Math.atan2(x2 - x1, y1 - y2) * 180) / Math.PI;
+  const [x2, y2] = outline.at(-1);
+  const degrees = turnOf(outline);
   const arrow = `M0 ${-5 * unit}L${9 * unit} 0L0 ${5 * unit}Z`;
   return [
     shape("polyline", { class: "count-line", points: points(outline), "stroke-width": 2.5 * unit }),
@@ -35,6 +37,9 @@ function drawnLine({ line, outline_px: outline }, unit) {
     shape("text", { class: "count-name", x: x2, y: y2, "font-size": 11 * unit, "stroke-width": 3 * unit, "text-anchor": "middle" }, line),
   ];
 }
+
+/** The first direction across a line, degrees clockwise from the right. */
+const turnOf = ([[x1, y1], ...rest]) => (Math.atan2(rest.at(-1)[0] - x1, y1 - rest.at(-1)[1]) * 180) / Math.PI;
 
 function drawnTrack({ id, frame_px: [x, y], tail_px: tail }, unit) {
   return shape(
@@ -47,12 +52,19 @@ function drawnTrack({ id, frame_px: [x, y], tail_px: tail }, unit) {
 
 /** The rows of lines with their crossings, and of zones with their persons. */
 export function countRows({ lines = [], zones = [] }) {
-  const ofLine = ({ line, directions, crossings }) => {
+  const ofLine = ({ line, directions, crossings, outline_px: outline }) => {
     const [first, second] = directions;
-    return row("line", line, number(crossings[first]), ` → ${first}, `, number(crossings[second]), ` ← ${second}`);
+    const [there, back] = arrowsOf(outline);
+    return row("line", line, number(crossings[first]), ` ${there} ${first}, `, number(crossings[second]), ` ${back} ${second}`);
   };
   const ofZone = ({ zone, persons, entries }) => row("zone", zone, number(persons ?? "?"), " now, ", number(entries), " entered");
   return [...lines.map(ofLine), ...zones.map(ofZone)];
+}
+
+/** The arrows of both directions of a line, as they are drawn. */
+export function arrowsOf(outline) {
+  const eighth = outline?.length > 1 ? Math.round(turnOf(outline) / 45) : 0;
+  return [ARROWS[(eighth + 8) % 8], ARROWS[(eighth + 12) % 8]];
 }
 
 const row = (kind, name, ...counts) => element("li", { class: `of-${kind}` }, element("span", { class: "count-of" }, name), element("span", {}, ...counts));

@@ -26,7 +26,7 @@ async function show() {
 }
 
 function reason(report) {
-  if (!report) return "Pick a frame in Detect first: its persons are shown here from above.";
+  if (!report) return "Use the frame of a camera in Cameras, or pick one in Detect: its persons are shown here from above.";
   if (!report.persons.length) return "This frame has no persons.";
   return "The height of this camera above the floor is not known. Save a calibration with the height in Calibrate, and choose it in Detect.";
 }

@@ -7,8 +7,8 @@ import { change, shared } from "./shared.js";
 /** The longer side of the image for straightened views, pixels. */
 const MAX_SIDE = 1600;
 
-/** Reads an image and makes it the frame. */
-export async function show(blob, name) {
+/** Reads an image and makes it the frame; `camera` is its camera, if it is known. */
+export async function show(blob, name, camera = "") {
   let picture;
   try {
     picture = await createImageBitmap(blob);
@@ -28,6 +28,7 @@ export async function show(blob, name) {
   change("frame", {
     blob,
     name,
+    camera,
     url: URL.createObjectURL(blob),
     width: picture.width,
     height: picture.height,

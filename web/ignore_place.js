@@ -1,4 +1,4 @@
-/** One click on a false box in Live ignores its place: it is written into the calibration of the camera, with undo. */
+/** One click on a false box in Cameras ignores its place: it is written into the calibration of the camera, with undo. */
 
 import { element, find, shape } from "./dom.js";
 import { corners, foot, pointBelow, points } from "./geometry.js";

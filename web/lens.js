@@ -32,6 +32,14 @@ export function calibrationOf({ id, width, height, model, cx, cy, radius, fieldO
   };
 }
 
+/** The file `base` with a found lens and level; a known height stays. */
+export function withFound(base, { id, image, lens, mount, sources }, height) {
+  const { lens: _lens, center: _center, world_up: _level, ...kept } = base?.sources ?? {};
+  const file = { ...(base && scaledTo(base, image)), id, image, lens, mount: { ...base?.mount, ...mount }, sources: { ...kept, ...sources } };
+  if (height) file.mount.height_m = height;
+  return file;
+}
+
 /** The circle from which `calibrationOf` makes this file; null if there is none. */
 export function circleOf({ lens, mount, image }) {
   const curve = CURVES[lens.model];

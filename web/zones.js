@@ -71,7 +71,7 @@ async function show() {
 }
 
 function reason() {
-  if (!shared.frame) return "Pick a frame in Detect first: zones are drawn on it.";
+  if (!shared.frame) return "Use the frame of a camera in Cameras, or pick one in Detect: zones are drawn on it.";
   if (!shared.calibrations.length) return "Zones are stored in the calibration of the camera. Save one in Calibrate first.";
   return "Choose the calibration of this camera: its zones, lines, masks and areas are drawn here.";
 }

@@ -29,9 +29,11 @@ pub(super) fn of_clients() -> OpenApiRouter<ApiState> {
             calibrations::views::get_views,
             calibrations::views::try_views
         ))
+        .routes(routes!(calibrations::fit::fit))
         .routes(routes!(cameras::list))
         .routes(routes!(cameras::get, cameras::put, cameras::delete))
         .routes(routes!(cameras::test))
+        .routes(routes!(cameras::get_frame))
         .routes(routes!(results::list))
         .routes(routes!(results::delete::delete))
         .routes(routes!(results::followed::put))

@@ -111,3 +111,20 @@ fn cameras_of_the_settings_file_have_precedence() {
     let refused = cameras.put("hall", camera("rtsp://10.0.0.8/s2"), None);
     assert!(refused.unwrap_err().to_string().contains("settings file"));
 }
+
+#[test]
+fn a_camera_without_a_url_keeps_the_stored_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let cameras = cameras(folder.path());
+    let url = "rtsp://10.0.0.8/s2?token=1";
+    let password = SecretString::from("geheim");
+    cameras.put("hall", camera(url), Some(&password)).unwrap();
+    assert!(!cameras.put("hall", camera(""), None).unwrap());
+    assert_eq!(cameras.stored().unwrap()["hall"].url, url);
+    assert!(cameras.password("hall").exists());
+    let watched = cameras.get("hall").unwrap().unwrap();
+    assert!(watched.credentials.is_some());
+    let refused = cameras.put("gate", camera(""), None).unwrap_err();
+    assert!(refused.to_string().starts_with("url: it is"), "{refused}");
+    assert!(cameras.get("gate").unwrap().is_none());
+}

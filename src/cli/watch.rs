@@ -121,6 +121,11 @@ pub(super) fn cameras(
         let Some((stored, server)) = &run else {
             return entry.check();
         };
+        entry.cameras = entry
+            .cameras
+            .into_iter()
+            .map(|camera| camera.or(&entry.defaults))
+            .collect();
         stored.add_to(&mut entry.cameras)?;
         entry.server = ServerEntry::default();
         let mut options = entry.check()?;

@@ -327,3 +327,19 @@ async fn a_grid_maps_a_view_to_the_frame() {
         assert_eq!(answer.status, 422, "{grid}");
     }
 }
+
+#[tokio::test]
+async fn a_frame_without_edges_is_no_fit_and_says_why() {
+    let service = Service::start();
+    let request = Request::post("/calibrations/hall/fit").body(Body::from(frame()));
+    let answer = service.send(request.unwrap()).await;
+    assert_eq!(answer.status, 422);
+    let detail = answer.json()["detail"].to_string();
+    assert!(detail.contains("edges, too few for a fit"), "{detail}");
+    let request = Request::post("/calibrations/hall/fit?profile=fast").body(Body::from(frame()));
+    let answer = service.send(request.unwrap()).await;
+    assert_eq!(answer.status, 422);
+    assert_eq!(answer.json()["parameter"], "profile");
+    let request = Request::post("/calibrations/hall/fit").body(Body::from("no image"));
+    assert_eq!(service.send(request.unwrap()).await.status, 422);
+}

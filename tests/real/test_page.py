@@ -3,19 +3,23 @@
 `LOOKDOWN_PAGE_PICTURES=docs/images make real PARTS=page` updates the screenshots in docs/images.
 """
 
+import base64
 import contextlib
 import hashlib
+import http.server
 import json
 import os
 import shutil
 import signal
 import subprocess
 import tempfile
+import threading
 import unittest
 from collections.abc import Iterator
 from pathlib import Path
 
-from harness.processes import free_ports
+from harness.places import LOOKDOWN
+from harness.processes import free_ports, running
 from support.lookdown import lookdown
 from support.places import FIXTURES, ROOT, SAMPLES
 from test_count import Count
@@ -24,8 +28,28 @@ HERE = Path(__file__).resolve().parent / "page"
 KEY = "a key that only this test knows"
 PICTURED = "gate,office,canteen,lounge"
 """Cameras whose images are kept."""
+OFFICE = (SAMPLES / "office.jpg").read_bytes()
 WALKS = HERE.parent / "walks"
 ZONE = {"name": "middle", "floor_m": [[-2, -1], [2, -1], [2, 3], [-2, 3]]}
+
+
+class Camera(http.server.BaseHTTPRequestHandler):
+    """A camera with snapshots for the user `viewer`. The URL has a query that belongs to it."""
+
+    def do_GET(self) -> None:
+        login = base64.b64encode(f"viewer:{KEY}".encode()).decode()
+        is_allowed = self.headers.get("Authorization") == f"Basic {login}"
+        is_found = self.path == "/snapshot.jpg?token=1"
+        self.send_response(200 if is_allowed and is_found else 404 if is_allowed else 401)
+        self.send_header("WWW-Authenticate", 'Basic realm="camera"')
+        self.send_header("Content-Type", "image/jpeg")
+        body = OFFICE if is_allowed and is_found else b""
+        self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+
+    def log_message(self, *_) -> None:
+        """Logs nothing."""
 
 
 class Page(unittest.TestCase):
@@ -59,6 +83,7 @@ class Page(unittest.TestCase):
                 with (
                     lookdown({"ACCESS__KEYS_FILE": str(keys)}) as keyed,
                     self.counted(Path(folder)) as counted,
+                    self.with_a_camera(Path(folder)) as camera,
                 ):
                     self.run_node(
                         "all.test.js",
@@ -69,6 +94,7 @@ class Page(unittest.TestCase):
                             "LOOKDOWN_SAMPLES": str(SAMPLES),
                             "LOOKDOWN_FIXTURES": str(FIXTURES / "calibrations"),
                             **counted,
+                            **camera,
                         },
                     )
 
@@ -105,6 +131,32 @@ class Page(unittest.TestCase):
                 }
             finally:
                 count.stop(signal.SIGKILL)
+
+    @contextlib.contextmanager
+    def with_a_camera(self, folder: Path) -> Iterator[dict[str, str]]:
+        """A `lookdown run` without cameras, and a camera with a user. Yields variables of the tests."""
+        port, camera_port = free_ports(2)
+        (folder / "run").mkdir()
+        settings = {
+            "SERVER__LISTEN": f"127.0.0.1:{port}",
+            "CALIBRATIONS__PATH": folder / "run",
+            "STATE__PATH": folder / "run" / "state",
+            "COUNTS__PATH": folder / "run" / "counts.sqlite",
+            "DETECT__PROFILE": "fast",
+            "LOG__FILTER": "warn",
+        }
+        environment = {f"LOOKDOWN__{name}": str(value) for name, value in settings.items()}
+        with (
+            http.server.ThreadingHTTPServer(("127.0.0.1", camera_port), Camera) as camera,
+            running("lookdown", [str(LOOKDOWN), "run"], port, "/readyz", environment),
+        ):
+            threading.Thread(target=camera.serve_forever, daemon=True).start()
+            yield {
+                "LOOKDOWN_RUN_URL": f"http://127.0.0.1:{port}",
+                "LOOKDOWN_CAMERA_URL": f"http://127.0.0.1:{camera_port}",
+                "LOOKDOWN_CAMERA_PASSWORD": KEY,
+            }
+            camera.shutdown()
 
     def run_node(self, tests: str, settings: dict[str, str]) -> None:
         """Runs tests that are written in JavaScript."""

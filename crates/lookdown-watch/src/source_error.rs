@@ -8,17 +8,13 @@ use crate::FrameError;
 #[derive(Debug, thiserror::Error)]
 pub enum SourceError {
     /// Wrong credentials.
-    #[error(
-        "the camera refuses the user name {user:?} or its password: correct user and password_file, or the URL"
-    )]
+    #[error("the camera refuses the user name {user:?} or its password: correct them")]
     CredentialsRefused {
         /// The user name.
         user: String,
     },
     /// Credentials are missing.
-    #[error(
-        "the camera requires a user name and a password: give user and password_file, or add them to the URL"
-    )]
+    #[error("the camera requires a user name and a password: give them")]
     CredentialsMissing,
     /// The camera requires an unknown authentication scheme.
     #[error(

@@ -2,6 +2,7 @@
 
 mod address;
 mod conditions;
+pub(in crate::api) mod fit;
 mod row;
 mod upload;
 pub(in crate::api) mod views;

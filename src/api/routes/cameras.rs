@@ -11,6 +11,7 @@ use axum::{
     },
     response::{IntoResponse, Response},
 };
+use lookdown_watch::Frame;
 use secrecy::SecretString;
 use serde::{Deserialize, Serialize};
 use tokio::task::spawn_blocking;
@@ -24,6 +25,7 @@ use crate::{
             deadline::Deadline,
             problem::{Problem, ProblemKind},
         },
+        openapi::RawBytes,
         require_scope::{RequireAdmin, RequireRead},
     },
     cameras::{CameraError, Cameras, StoredCamera},
@@ -37,7 +39,9 @@ const MAX_BYTES: usize = 16 << 10;
 #[serde(deny_unknown_fields)]
 #[schema(example = json!({ "url": "rtsp://10.0.0.8:554/stream2", "user": "viewer", "password": "secret" }))]
 pub(in crate::api) struct NewCamera {
-    /// The URL of the source: `rtsp`, `rtsps`, `http` or `https`, without user and password.
+    /// The URL of the source: `rtsp`, `rtsps`, `http` or `https`, without user and password. Without
+    /// it, the stored URL stays.
+    #[serde(default)]
     url: String,
     /// The user name.
     user: Option<String>,
@@ -218,7 +222,7 @@ pub(in crate::api) async fn delete(
     post, path = "/cameras/test", tag = "cameras", operation_id = "test_camera",
     request_body(content = NewCamera, content_type = "application/json"),
     security((), ("bearer" = ["admin"]), ("api_key" = ["admin"])),
-    responses((status = OK, description = "The first frame.", body = String, content_type = "image/jpeg"))
+    responses((status = OK, description = "The first frame.", content((inline(RawBytes) = "image/jpeg"))))
 )]
 pub(in crate::api) async fn test(
     State(state): State<ApiState>,
@@ -228,11 +232,34 @@ pub(in crate::api) async fn test(
     cameras(&state)?;
     let (camera, password) = camera.separate();
     let frame = Cameras::test(&camera, password).await.map_err(refused)?;
+    Ok(answer(frame))
+}
+
+/// Get the present frame
+///
+/// Reads a frame of the camera within 15 seconds, with nothing concealed. Nothing is stored.
+#[utoipa::path(
+    get, path = "/cameras/{camera}/frame.jpg", tag = "cameras", operation_id = "get_camera_frame",
+    params(("camera" = String, Path, description = "The name of the camera.", example = "hall")),
+    security((), ("bearer" = ["admin"]), ("api_key" = ["admin"])),
+    responses((status = OK, description = "The frame.", content((inline(RawBytes) = "image/jpeg"))))
+)]
+pub(in crate::api) async fn get_frame(
+    State(state): State<ApiState>,
+    _admin: RequireAdmin,
+    Path(name): Path<String>,
+) -> Result<Response, Problem> {
+    let camera = change(&state, move |cameras| Ok(cameras.get(&name)?)).await?;
+    let camera = camera.ok_or_else(unknown)?;
+    Ok(answer(Cameras::frame(&camera).await.map_err(refused)?))
+}
+
+fn answer(frame: Frame) -> Response {
     let headers = [
         (CONTENT_TYPE, frame.format.media_type()),
         (CACHE_CONTROL, "no-store"),
     ];
-    Ok((headers, frame.image).into_response())
+    (headers, frame.image).into_response()
 }
 
 /// Returns the cameras of this process.
@@ -243,7 +270,7 @@ fn cameras(state: &ApiState) -> Result<Arc<Cameras>, Problem> {
     })
 }
 
-/// Changes the stored cameras without blocking the runtime.
+/// Uses the stored cameras without blocking the runtime.
 async fn change<T: Send + 'static>(
     state: &ApiState,
     change: impl FnOnce(&Cameras) -> Result<T, CameraError> + Send + 'static,

@@ -71,7 +71,13 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "geometry.js" from "web",
         "views.js" from "web",
         "straighten.js" from "web",
-        "live.js" from "web",
+        "cameras.js" from "web",
+        "cameras.css" from "web",
+        "camera_card.js" from "web",
+        "camera_day.js" from "web",
+        "camera_form.js" from "web",
+        "camera_states.js" from "web",
+        "use_frame.js" from "web",
         "counts.js" from "web",
         "counts_drawing.js" from "web",
         "counts.css" from "web",
@@ -118,7 +124,9 @@ impl Asset {
 struct PageOptions {
     /// True if this server answers `/counts`.
     has_counts: bool,
-    /// True if the request may change calibrations.
+    /// True if this server answers `/cameras`.
+    has_cameras: bool,
+    /// True if the request may change calibrations and cameras.
     can_change: bool,
 }
 
@@ -131,6 +139,7 @@ pub(in crate::api) fn router() -> Router<ApiState> {
     let options = async |State(state): State<ApiState>, headers: HeaderMap| {
         let options = PageOptions {
             has_counts: state.options.companions.has_counts(),
+            has_cameras: state.options.companions.cameras().is_some(),
             can_change: RequireAdmin::check(&state, &headers).is_ok(),
         };
         let no_store = [(CACHE_CONTROL, HeaderValue::from_static("no-store"))];

@@ -7,3 +7,4 @@ import "./calibrate.js";
 import "./zones.js";
 import "./looks.js";
 import "./counts.js";
+import "./cameras.js";

@@ -24,7 +24,7 @@ async function straightenedAfter(page, act) {
 
 const pixels = (page) => page.locator("#previews canvas").first().evaluate((canvas) => canvas.toDataURL());
 
-pageTest("the detected circle is drawn over the frame, and the views follow it", "", async (page) => {
+pageTest("the detected circle is drawn over the frame, and the views follow it", "#detect", async (page) => {
   await start(page);
   for (const name of ["Centre, from the left", "Centre, from the top", "Radius"]) {
     assert.ok(Math.abs(Number(await page.getByRole("slider", { name }).inputValue()) - 480) < 1.5, name);
@@ -48,7 +48,7 @@ pageTest("the detected circle is drawn over the frame, and the views follow it",
   assert.ok(Math.abs(Number(await page.locator("output[for=calibrate-cx]").textContent()) - 480.1) < 1.5);
 });
 
-pageTest("a saved lens with a height is used at once and shows the floor", "", async (page) => {
+pageTest("a saved lens with a height is used at once and shows the floor", "#detect", async (page) => {
   await start(page);
   await page.getByLabel("Height, metres").fill("2.9");
   await page.getByLabel("Name", { exact: true }).fill("lobby");
@@ -71,7 +71,7 @@ pageTest("a saved lens with a height is used at once and shows the floor", "", a
   assert.equal((await stored("lobby")).mount.height_m, 3.1);
 });
 
-pageTest("a file of another program is previewed and saved unchanged", "", async (page) => {
+pageTest("a file of another program is previewed and saved unchanged", "#detect", async (page) => {
   await start(page);
   const before = await pixels(page);
   await straightenedAfter(page, () => page.locator("#import-file").setInputFiles(`${FIXTURES}/adapter_ds.yml`));
@@ -86,7 +86,7 @@ pageTest("a file of another program is previewed and saved unchanged", "", async
   assert.equal(await pixels(page), before);
 });
 
-pageTest("a camera of a file with several is selected by name", "", async (page) => {
+pageTest("a camera of a file with several is selected by name", "#detect", async (page) => {
   await start(page);
   await page.locator("#import-file").setInputFiles(`${FIXTURES}/kalibr_camchain.yaml`);
   await page.getByRole("alert").getByText("cam0, cam1").waitFor();
@@ -95,7 +95,7 @@ pageTest("a camera of a file with several is selected by name", "", async (page)
   assert.equal(await page.getByRole("alert").count(), 0);
 }, { expected: /status of 422/ });
 
-pageTest("a file without a frame size is read with the size of this frame", "", async (page) => {
+pageTest("a file without a frame size is read with the size of this frame", "#detect", async (page) => {
   await start(page);
   await page.locator("#import-file").setInputFiles(`${FIXTURES}/py_ocamcalib.json`);
   const saying = page.getByRole("alert");
@@ -104,7 +104,7 @@ pageTest("a file without a frame size is read with the size of this frame", "", 
   assert.equal(await saying.count(), 0, (await saying.allTextContents()).join());
 }, { expected: /status of 422/ });
 
-pageTest("a calibration in use is opened and edited", "", async (page) => {
+pageTest("a calibration in use is opened and edited", "#detect", async (page) => {
   await start(page, "office");
   const answer = await straightenedAfter(page, () => page.locator("#open-calibration").selectOption("canteen"));
   assert.equal(answer.status(), 200);
@@ -115,7 +115,7 @@ pageTest("a calibration in use is opened and edited", "", async (page) => {
 
 pageTest(
   "an invalid calibration file is refused with the server's message",
-  "",
+  "#detect",
   async (page) => {
     await start(page);
     const file = { name: "notes.txt", mimeType: "text/plain", buffer: Buffer.from("hello") };

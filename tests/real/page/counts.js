@@ -1,4 +1,4 @@
-/** The section Live of a server that forwards to `lookdown count`. */
+/** The section Cameras of a server that forwards to `lookdown count`. */
 
 import assert from "node:assert/strict";
 import { readFile, readdir } from "node:fs/promises";
@@ -32,7 +32,7 @@ async function shownCrossings(card, truth) {
   const shown = {};
   for (const [line, directions] of Object.entries(truth)) {
     const text = await card.getByRole("listitem").filter({ hasText: line }).textContent();
-    const numbers = Object.keys(directions).map((direction) => [direction, Number(text.match(`(\\d+) [→←] ${direction}`)[1])]);
+    const numbers = Object.keys(directions).map((direction) => [direction, Number(text.match(`(\\d+) [→↘↓↙←↖↑↗] ${direction}`)[1])]);
     shown[line] = Object.fromEntries(numbers);
   }
   return shown;
@@ -56,7 +56,7 @@ test("a camera sends a frame to a server whose counts are gone", async () => {
 for (const [device, viewport, colorScheme] of [["wide", WIDE, "light"], ["phone", PHONE, "dark"]]) {
   pageTest(
     `tracks, lines, zones and the heat map are drawn over a camera on a ${device} screen`,
-    "#live",
+    "#cameras",
     async (page) => {
       const card = page.getByRole("article", { name: "Camera hall" });
       await card.locator(".track").first().waitFor();
@@ -82,7 +82,7 @@ for (const [device, viewport, colorScheme] of [["wide", WIDE, "light"], ["phone"
 
 pageTest(
   "counts that cannot be reached are one sentence, and the cards stay",
-  "#live",
+  "#cameras",
   async (page) => {
     await page.getByText("The counts cannot be read: the log of the server has the reason.").waitFor();
     await page.getByRole("article", { name: "Camera hall" }).locator(".plot").waitFor();
@@ -92,8 +92,8 @@ pageTest(
   { server: UNCOUNTED, expected: /status of 503/ },
 );
 
-pageTest("a page without a path of counts asks for none", "#live", async (page) => {
-  await page.getByRole("heading", { name: "Live", level: 1 }).waitFor();
+pageTest("a page without a path of counts asks for none", "#cameras", async (page) => {
+  await page.getByRole("heading", { name: "Cameras", level: 1 }).waitFor();
   await page.waitForTimeout(500);
   assert.equal(await page.locator("#counts-bar").count(), 0);
 }, { server: SERVER });

@@ -20,7 +20,7 @@ const hand = (page, kind, name, type, bytes) =>
     [kind, name, type, [...bytes]],
   );
 
-pageTest("a sample is picked with the keyboard, and its persons are found", "", async (page) => {
+pageTest("a sample is picked with the keyboard, and its persons are found", "#detect", async (page) => {
   await page.locator("#calibration option[value=office]").waitFor({ state: "attached" });
   await page.getByRole("button", { name: "office", exact: true }).focus();
   const report = await reportAfter(page, () => page.keyboard.press("Enter"));
@@ -36,7 +36,7 @@ pageTest("a sample is picked with the keyboard, and its persons are found", "", 
   assert.match(await page.locator("#picture").getAttribute("alt"), /office\.jpg/);
 });
 
-pageTest("the marks are at the positions of the report", "", async (page) => {
+pageTest("the marks are at the positions of the report", "#detect", async (page) => {
   const report = await reportAfter(page, () => detectSample(page, "office"));
   const [first] = report.persons;
   // Measured at the same moment, as later layout may move them.
@@ -50,7 +50,7 @@ pageTest("the marks are at the positions of the report", "", async (page) => {
   assert.ok(Math.abs(at(badge, "height", "y") - at(picture, "height", "y") - fromCentre(first.oriented_box.cy)) < 1);
 });
 
-pageTest("a frame is dropped, pasted or opened", "", async (page) => {
+pageTest("a frame is dropped, pasted or opened", "#detect", async (page) => {
   const bytes = await readFile(`${SAMPLES}/lounge.jpg`);
   for (const kind of ["drop", "paste"]) {
     const report = await reportAfter(page, () => hand(page, kind, "lounge.jpg", "image/jpeg", bytes));
@@ -61,7 +61,7 @@ pageTest("a frame is dropped, pasted or opened", "", async (page) => {
   await page.getByAltText("The frame canteen.jpg").waitFor();
 });
 
-pageTest("other files are refused with a message, and the next frame is accepted", "", async (page) => {
+pageTest("other files are refused with a message, and the next frame is accepted", "#detect", async (page) => {
   await hand(page, "drop", "notes.txt", "text/plain", Buffer.from("hello"));
   await page.getByRole("alert").getByText("The dropped item is not an image.").waitFor();
   await hand(page, "drop", "broken.jpg", "image/jpeg", Buffer.from("hello"));
@@ -70,7 +70,7 @@ pageTest("other files are refused with a message, and the next frame is accepted
   assert.equal(await page.getByRole("alert").count(), 0);
 });
 
-pageTest("every parameter runs a new detection at once", "", async (page) => {
+pageTest("every parameter runs a new detection at once", "#detect", async (page) => {
   const first = await reportAfter(page, () => detectSample(page, "office", "office"));
   const all = first.persons.length;
   const strict = await reportAfter(page, () => slide(page, "Score threshold", 0.95));
@@ -97,7 +97,7 @@ pageTest("every parameter runs a new detection at once", "", async (page) => {
   assert.deepEqual([reset.profile, reset.refinement.name, reset.refinement.score_threshold], ["balanced", "fusion", 0.3]);
 });
 
-pageTest("persons in the list and in the image are linked", "", async (page) => {
+pageTest("persons in the list and in the image are linked", "#detect", async (page) => {
   await detectSample(page, "office");
   await page.mouse.move(0, 0);
   // A mark may have been under the pointer, which the browser may notice late: each poll focuses anew.
@@ -113,7 +113,7 @@ pageTest("persons in the list and in the image are linked", "", async (page) => 
   await page.locator("#persons button[data-person='4'].chosen").waitFor();
 });
 
-pageTest("progress is shown and removed at the end", "", async (page) => {
+pageTest("progress is shown and removed at the end", "#detect", async (page) => {
   let release;
   const released = new Promise((resolve) => (release = resolve));
   await page.route("**/detect?*", async (route) => {
@@ -129,7 +129,7 @@ pageTest("progress is shown and removed at the end", "", async (page) => {
 
 pageTest(
   "refusals are shown with the server's message",
-  "",
+  "#detect",
   async (page) => {
     const detail = "all 8 places are taken: come again in 2 s";
     const problem = { status: 429, contentType: "application/problem+json", body: JSON.stringify({ detail }) };
@@ -140,7 +140,7 @@ pageTest(
   { expected: /status of 429/ },
 );
 
-pageTest("the report is saved as a file", "", async (page) => {
+pageTest("the report is saved as a file", "#detect", async (page) => {
   await detectSample(page, "office");
   const downloading = page.waitForEvent("download");
   await page.getByRole("button", { name: "Save the report" }).click();
@@ -148,7 +148,7 @@ pageTest("the report is saved as a file", "", async (page) => {
   assert.equal(report.persons.length, 6);
 });
 
-pageTest("the previous image leaves no marks", "", async (page) => {
+pageTest("the previous image leaves no marks", "#detect", async (page) => {
   await detectSample(page, "office");
   await page.route("**/detect?*", () => {});
   await page.getByRole("button", { name: "lounge", exact: true }).click();

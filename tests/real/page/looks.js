@@ -10,7 +10,7 @@ const SECTIONS = {
   Floor: ".dot-mark",
   Calibrate: "#previews canvas",
   Zones: "#zones-content",
-  Live: ".card .plot",
+  Cameras: ".card .plot",
 };
 
 /** The areas of the calibration `hall`, which is `office` otherwise. */
@@ -63,6 +63,6 @@ for (const [device, viewport] of [["wide", WIDE], ["phone", PHONE]]) {
         await keep(section.toLowerCase());
       }
     };
-    pageTest(`every section is well on a ${device} screen in ${colorScheme}`, "", look, { viewport, colorScheme });
+    pageTest(`every section is well on a ${device} screen in ${colorScheme}`, "#detect", look, { viewport, colorScheme });
   }
 }

@@ -1,4 +1,4 @@
-/** The sections Views, Floor and Live, and the key. */
+/** The sections Views, Floor and Cameras, and the key. */
 
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
@@ -8,22 +8,22 @@ const go = (page, name) => page.getByRole("navigation").getByRole("link", { name
 
 pageTest("an address selects its section, and a section without a frame shows a hint", "#views", async (page) => {
   await page.getByRole("heading", { name: "Views", level: 1 }).waitFor();
-  await page.getByText("Pick a frame in Detect first: its views are shown here").waitFor();
+  await page.getByText("or pick one in Detect: its views are shown here").waitFor();
   assert.equal(await page.title(), "Views – Lookdown");
   await go(page, "Floor");
   await page.getByText("its persons are shown here from above").waitFor();
   await go(page, "Calibrate");
-  await page.getByText("Pick a frame of the camera in Detect first").waitFor();
+  await page.locator("#calibrate-empty").getByText("or pick one in Detect").waitFor();
   assert.match(page.url(), /#calibrate$/);
   await go(page, "Zones");
-  await page.getByText("Pick a frame in Detect first: zones are drawn on it").waitFor();
+  await page.getByText("or pick one in Detect: zones are drawn on it").waitFor();
   await page.goBack();
   await page.goBack();
   await page.getByRole("heading", { name: "Floor", level: 1 }).waitFor();
 });
 
 for (const [lens, what] of [["", "a lens that was assumed"], ["office", "a calibration"]]) {
-  pageTest(`the views of ${what} are straightened and highlighted for a selected person`, "", async (page) => {
+  pageTest(`the views of ${what} are straightened and highlighted for a selected person`, "#detect", async (page) => {
     await detectSample(page, "office", lens);
     await go(page, "Views");
     const tiles = page.getByRole("group", { name: "Views", exact: true }).getByRole("button");
@@ -50,7 +50,7 @@ const colours = (page, selector) =>
     return new Set(new Uint32Array(data.buffer)).size;
   });
 
-pageTest("a profile without views shows a hint, and the paper's shows all of its views", "", async (page) => {
+pageTest("a profile without views shows a hint, and the paper's shows all of its views", "#detect", async (page) => {
   await detectSample(page, "office", "office");
   await reportAfter(page, () => page.getByRole("radio", { name: "direct" }).check());
   await go(page, "Views");
@@ -61,7 +61,7 @@ pageTest("a profile without views shows a hint, and the paper's shows all of its
   await page.locator(".tile").nth(127).waitFor();
 });
 
-pageTest("the floor map shows the positions of the report, if the height is known", "", async (page) => {
+pageTest("the floor map shows the positions of the report, if the height is known", "#detect", async (page) => {
   const report = await reportAfter(page, () => detectSample(page, "office", "office"));
   await go(page, "Floor");
   await page.locator(".dot-mark").first().waitFor();
@@ -79,8 +79,8 @@ pageTest("the floor map shows the positions of the report, if the height is know
   await page.getByText("The height of this camera above the floor is not known").waitFor();
 });
 
-pageTest("a new camera appears in Live, and its card is updated", "#live", async (page) => {
-  await page.locator("#section-live").waitFor();
+pageTest("a new camera appears in Cameras, and its card is updated", "#cameras", async (page) => {
+  await page.locator("#section-cameras").waitFor();
   const first = await post("hall 1", "office");
   const card = page.getByRole("article", { name: "Camera hall 1" });
   await card.waitFor();
@@ -94,21 +94,21 @@ pageTest("a new camera appears in Live, and its card is updated", "#live", async
   assert.match(await plot.getAttribute("aria-label"), new RegExp(`${second.persons.length} persons? now, at most ${most} since`));
 });
 
-pageTest("a camera with kept images is shown with them", "#live", async (page) => {
+pageTest("a camera with kept images is shown with them", "#cameras", async (page) => {
   await post("gate", "office");
   await page.getByRole("article", { name: "Camera gate" }).getByAltText("The latest frame of gate").waitFor();
 });
 
-pageTest("a later visitor sees earlier results", "", async (page) => {
+pageTest("a later visitor sees earlier results", "#detect", async (page) => {
   await post("yard", "office");
   await post("yard", "lounge", "profile=fast&max_detections=1");
-  await go(page, "Live");
+  await go(page, "Cameras");
   const card = page.getByRole("article", { name: "Camera yard" });
   await card.waitFor();
   assert.match(await card.locator(".plot .steps").getAttribute("d"), /V/);
 });
 
-pageTest("a click on a false box ignores its place, and Undo takes it back", "#live", async (page) => {
+pageTest("a click on a false box ignores its place, and Undo takes it back", "#cameras", async (page) => {
   const address = (id) => `${SERVER}/calibrations/${id}`;
   const stored = async (id) => (await fetch(address(id))).json();
   const copy = JSON.stringify({ ...(await stored("office")), id: "stall" });
@@ -146,7 +146,7 @@ const sendFrame = async (key) => {
 
 pageTest(
   "a server with keys asks for one, and works with it",
-  "",
+  "#detect",
   async (page) => {
     const dialog = page.getByRole("dialog", { name: "Key" });
     await dialog.waitFor();
@@ -157,7 +157,7 @@ pageTest(
     await page.locator("#calibration option[value=office]").waitFor({ state: "attached" });
     await detectSample(page, "office", "office");
     await page.evaluate(sendFrame, process.env.LOOKDOWN_KEY);
-    await go(page, "Live");
+    await go(page, "Cameras");
     await page.getByRole("article", { name: "Camera door" }).waitFor();
     assert.equal(await page.getByRole("article", { name: "Camera web-page" }).count(), 0);
     assert.equal(await page.evaluate(() => localStorage.length), 0);

@@ -60,7 +60,7 @@ const near = (corners, expected, tolerance = 3) => {
   }
 };
 
-pageTest("a drawn zone is saved, and shown again after a reload", "", async (page) => {
+pageTest("a drawn zone is saved, and shown again after a reload", "#detect", async (page) => {
   await storeCopy("drawn");
   await start(page, "drawn");
   await draw(page, "Zone");
@@ -79,7 +79,7 @@ pageTest("a drawn zone is saved, and shown again after a reload", "", async (pag
   await page.getByRole("button", { name: /^Zone till 3 corners, in the frame/ }).waitFor();
 });
 
-pageTest("a zone has the server's count of persons before it is saved", "", async (page) => {
+pageTest("a zone has the server's count of persons before it is saved", "#detect", async (page) => {
   await storeCopy("counted");
   await start(page, "counted");
   await draw(page, "Zone");
@@ -92,7 +92,7 @@ pageTest("a zone has the server's count of persons before it is saved", "", asyn
   assert.equal(count, `${zone.persons} person${zone.persons === 1 ? "" : "s"}`);
 });
 
-pageTest("corners and areas are dragged, and undo restores them", "", async (page) => {
+pageTest("corners and areas are dragged, and undo restores them", "#detect", async (page) => {
   await storeCopy("dragged", { zones: [{ name: "hall", frame_px: TRIANGLE }] });
   await start(page, "dragged");
   await click(page, [450, 400]);
@@ -112,7 +112,7 @@ pageTest("corners and areas are dragged, and undo restores them", "", async (pag
   assert.deepEqual((await stored("dragged")).zones[0].frame_px, TRIANGLE);
 });
 
-pageTest("everything is drawn and edited with the keyboard", "", async (page) => {
+pageTest("everything is drawn and edited with the keyboard", "#detect", async (page) => {
   await storeCopy("keys");
   await start(page, "keys");
   await page.getByRole("group", { name: "Draw" }).getByRole("button", { name: "Mask" }).focus();
@@ -152,7 +152,7 @@ pageTest("everything is drawn and edited with the keyboard", "", async (page) =>
   assert.equal((await stored("keys")).masks, undefined);
 });
 
-pageTest("taps draw a zone on a phone", "", async (page) => {
+pageTest("taps draw a zone on a phone", "#detect", async (page) => {
   await storeCopy("tapped");
   await start(page, "tapped");
   const tap = async (place) => page.touchscreen.tap(...(await onScreen(page, place)));
@@ -170,7 +170,7 @@ pageTest("taps draw a zone on a phone", "", async (page) => {
   near((await stored("tapped")).zones[0].frame_px, [TRIANGLE[0], TRIANGLE[2], [375, 450]], 6);
 }, { viewport: PHONE, hasTouch: true });
 
-pageTest("a line has named directions, which can be turned", "", async (page) => {
+pageTest("a line has named directions, which can be turned", "#detect", async (page) => {
   await storeCopy("lined");
   await start(page, "lined");
   await draw(page, "Line");
@@ -186,7 +186,7 @@ pageTest("a line has named directions, which can be turned", "", async (page) =>
   near(line.frame_px, [[600, 500], [300, 500]]);
 });
 
-pageTest("a zone is drawn on the floor, in metres", "", async (page) => {
+pageTest("a zone is drawn on the floor, in metres", "#detect", async (page) => {
   await storeCopy("floored");
   await start(page, "floored");
   await page.getByRole("radio", { name: "Floor" }).check();
@@ -202,14 +202,14 @@ pageTest("a zone is drawn on the floor, in metres", "", async (page) => {
   assert.ok(right > 1 && right < 20 && Math.abs(down - right) < 0.05, JSON.stringify(corners));
 });
 
-pageTest("the floor needs the height of the camera", "", async (page) => {
+pageTest("the floor needs the height of the camera", "#detect", async (page) => {
   await storeCopy("low", { mount: { world_up: [0, 0, -1] } });
   await start(page, "low");
   assert.ok(await page.getByRole("radio", { name: "Floor" }).isDisabled());
   await page.getByText("The floor map needs the height of the camera").waitFor();
 });
 
-pageTest("a concurrent change is reported, and the drawing is kept", "", async (page) => {
+pageTest("a concurrent change is reported, and the drawing is kept", "#detect", async (page) => {
   const other = { name: "other", frame_px: [[10, 400], [100, 400], [100, 500]] };
   await storeCopy("contested");
   await start(page, "contested");
@@ -237,7 +237,7 @@ pageTest("a concurrent change is reported, and the drawing is kept", "", async (
   assert.equal(mount.height_m, 3.4);
 }, { expected: /status of 412/ });
 
-pageTest("the server's refusal is shown at the area that it names", "", async (page) => {
+pageTest("the server's refusal is shown at the area that it names", "#detect", async (page) => {
   await storeCopy("refused", { zones: [{ name: "a", frame_px: TRIANGLE }, { name: "b", frame_px: [[700, 700], [800, 700], [800, 800]] }] });
   await start(page, "refused");
   await page.getByRole("button", { name: /^Zone b 3 corners/ }).click();
@@ -258,7 +258,7 @@ pageTest("the server's refusal is shown at the area that it names", "", async (p
   assert.equal(await page.locator(".area.invalid").getAttribute("aria-label"), "Zone zone-1, 0 persons");
 }, { expected: /status of 422/ });
 
-pageTest("the circle editor keeps zones, lines and masks", "", async (page) => {
+pageTest("the circle editor keeps zones, lines and masks", "#detect", async (page) => {
   const areas = {
     zones: [{ name: "till", frame_px: TRIANGLE }],
     lines: [{ name: "door", frame_px: [[300, 500], [620, 480]], directions: ["enter", "leave"] }],

@@ -1,6 +1,6 @@
-//! The parameters `from`, `to` and `step`.
+//! The parameters `from`, `to`, `step` and `time_zone`.
 
-use jiff::{SignedDuration, Timestamp};
+use jiff::{SignedDuration, Timestamp, ToSpan, Zoned, tz::TimeZone};
 use lookdown_http::problem::Problem;
 use serde::Deserialize;
 
@@ -22,20 +22,33 @@ pub(super) struct TimeParameters {
     from: Option<String>,
     to: Option<String>,
     step: Option<String>,
+    /// The time zone of named days.
+    time_zone: Option<String>,
     pub(super) format: Option<String>,
 }
 
 impl TimeParameters {
-    /// Checks the parameters. The time ends now and has a day by default.
+    /// Checks the parameters. The time ends now and has a day by default. Named days are those of
+    /// this machine's time zone, unless the request has one.
     pub(super) fn span(&self) -> Result<Span, Problem> {
+        let (from, until) = match self.from.as_deref() {
+            Some(name @ ("today" | "yesterday" | "week")) => {
+                named(name, &Timestamp::now().to_zoned(self.zone()?))
+            }
+            from => (timestamp("from", from)?, None),
+        };
         let step = match &self.step {
             None => DEFAULT_STEP,
             Some(text) => step(text)?,
         };
         // The last minute is included while it is not over.
         let end_of = |milliseconds: i64| (milliseconds + MINUTE_MS - 1).div_euclid(MINUTE_MS);
-        let to = end_of(timestamp("to", self.to.as_deref())?.unwrap_or_else(now_ms));
-        let from = match timestamp("from", self.from.as_deref())? {
+        let to = end_of(
+            timestamp("to", self.to.as_deref())?
+                .or(until)
+                .unwrap_or_else(now_ms),
+        );
+        let from = match from {
             Some(from) => from.div_euclid(MINUTE_MS),
             // Steps begin at their multiples since midnight UTC.
             None => (to - DEFAULT_SPAN).div_euclid(step) * step,
@@ -52,6 +65,32 @@ impl TimeParameters {
         }
         Ok(Span { from, to, step })
     }
+
+    fn zone(&self) -> Result<TimeZone, Problem> {
+        let Some(name) = &self.time_zone else {
+            return Ok(TimeZone::system());
+        };
+        TimeZone::get(name).map_err(|_| {
+            let fault = "it is not a time zone of this machine: give one like Europe/Berlin or UTC";
+            Problem::of_parameter("time_zone", fault)
+        })
+    }
+}
+
+/// Returns the milliseconds at which a named time begins and ends; `None` is now. A week begins on
+/// Monday.
+fn named(name: &str, now: &Zoned) -> (Option<i64>, Option<i64>) {
+    let start = |days: i64| {
+        let day = now
+            .checked_sub(days.days())
+            .and_then(|day| day.start_of_day());
+        day.ok().map(|day| day.timestamp().as_millisecond())
+    };
+    match name {
+        "yesterday" => (start(1), start(0)),
+        "week" => (start(now.weekday().to_monday_zero_offset().into()), None),
+        _ => (start(0), None),
+    }
 }
 
 fn timestamp(name: &str, text: Option<&str>) -> Result<Option<i64>, Problem> {
@@ -60,7 +99,8 @@ fn timestamp(name: &str, text: Option<&str>) -> Result<Option<i64>, Problem> {
         Ok(time) => Ok(Some(time.as_millisecond())),
         Err(_) => Err(Problem::of_parameter(
             name,
-            "it is not a time: write it like 2026-11-22T10:00:00Z, with + as %2B",
+            "it is not a time: write it like 2026-11-22T10:00:00Z, with + as %2B; `from` may be \
+             today, yesterday or week",
         )),
     }
 }
@@ -78,4 +118,28 @@ fn step(text: &str) -> Result<i64, Problem> {
             "it is not a duration of whole minutes from 1m to 168h: write it like 15m or 24h";
         Problem::of_parameter("step", fault)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn milliseconds(text: &str) -> Option<i64> {
+        Some(text.parse::<Timestamp>().unwrap().as_millisecond())
+    }
+
+    #[test]
+    fn named_days_begin_at_midnight_of_the_zone() {
+        // The clocks went back by an hour on this Sunday.
+        let now: Zoned = "2026-10-25T12:00[Europe/Berlin]".parse().unwrap();
+        let today = milliseconds("2026-10-24T22:00:00Z");
+        assert_eq!(named("today", &now), (today, None));
+        let yesterday = milliseconds("2026-10-23T22:00:00Z");
+        assert_eq!(named("yesterday", &now), (yesterday, today));
+        let monday = milliseconds("2026-10-18T22:00:00Z");
+        assert_eq!(named("week", &now), (monday, None));
+        let later: Zoned = "2026-10-26T12:00[Europe/Berlin]".parse().unwrap();
+        let day = (today, milliseconds("2026-10-25T23:00:00Z"));
+        assert_eq!(named("yesterday", &later), day, "25 hours");
+    }
 }

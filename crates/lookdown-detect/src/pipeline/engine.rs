@@ -314,7 +314,9 @@ impl Engine {
         Some(self.motion_cache.of(camera, &seen.camera.rig, &seen.model))
     }
 
-    pub(super) fn options(&self) -> &EngineOptions {
+    /// Returns the options.
+    #[must_use]
+    pub fn options(&self) -> &EngineOptions {
         &self.options
     }
 

@@ -93,8 +93,9 @@ impl Scalar {
 }
 
 impl CameraEntry {
-    /// Fills absent values with those of another entry.
-    pub(super) fn or(self, defaults: &Self) -> Self {
+    /// Returns the entry with absent values filled by those of another one.
+    #[must_use]
+    pub fn or(self, defaults: &Self) -> Self {
         let mut parameters = defaults.parameters.clone();
         parameters.extend(self.parameters);
         Self {

@@ -8,15 +8,21 @@ use lookdown_lens::{
     calibration::{
         CalibrationFile,
         export::Target,
-        native::{NativeCalibration, NativeImage, NativeMount, NativeSource, ValueSource},
+        native::{NativeCalibration, NativeImage, NativeSource, ValueSource},
     },
-    geometry::lens::{KannalaBrandt, LensModel},
     self_calibration::{KnownLens, RoomFit},
 };
 
 use super::{
     arguments::{Arguments, IdealLens, thousandths},
     preview,
+};
+use crate::room_calibration::{max_theta, room_calibration, tilt_deg};
+
+/// The source of a value of the command line.
+const GIVEN: NativeSource = NativeSource {
+    source: ValueSource::Given,
+    uncertainty: None,
 };
 
 /// Fits the camera and reports its values.
@@ -32,27 +38,19 @@ pub(super) fn fit(
     let fit = fit_room(frames, known).context(
         "the camera cannot be fitted; --circle-only detects the lens circle and assumes the rest",
     )?;
-    let millionths = |value: f64| (value * 1e6).round() / 1e6;
-    let up = fit.directions[0].map(|value| (-value * 1e8).round() / 1e8);
-    let sources = sources(arguments, &fit);
-    report(arguments, &fit, &sources);
-    let calibration = NativeCalibration {
-        id: arguments.id.to_string(),
-        image,
-        lens: lens(arguments, &fit),
-        mount: NativeMount {
-            world_up: up.into(),
-            height_m: arguments.height.map(millionths),
-            ..NativeMount::default()
-        },
-        zones: Vec::new(),
-        lines: Vec::new(),
-        masks: Vec::new(),
-        areas: Vec::new(),
-        ignore: Vec::new(),
-        detect: BTreeMap::new(),
-        sources,
-    };
+    let mut calibration = room_calibration(&arguments.id, image, &fit);
+    if let Some(model) = arguments.lens {
+        let [cx, cy] = fit.center.map(thousandths);
+        calibration.lens = model.with(thousandths(fit.focal), cx, cy, max_theta(&fit));
+    }
+    if arguments.lens.is_some() && arguments.field_of_view.is_some() {
+        calibration.sources.insert("lens".to_owned(), GIVEN);
+    }
+    if let Some(height) = arguments.height {
+        calibration.mount.height_m = Some((height * 1e6).round() / 1e6);
+        calibration.sources.insert("height_m".to_owned(), GIVEN);
+    }
+    report(arguments, &fit, &calibration.sources);
     if let (Some(out), Some(frame)) = (&arguments.preview, frames.first()) {
         let written = Target::Native.write(&calibration)?.content;
         let file = CalibrationFile::parse(written.as_bytes())?;
@@ -64,55 +62,9 @@ pub(super) fn fit(
     Ok(calibration)
 }
 
-/// The lens of a fit: a given model, or a polynomial.
-fn lens(arguments: &Arguments, fit: &RoomFit) -> LensModel {
-    let [cx, cy] = fit.center.map(thousandths);
-    let focal = thousandths(fit.focal);
-    let max_theta = (fit.max_theta * 1e6).floor() / 1e6;
-    match arguments.lens {
-        Some(model) => model.with(focal, cx, cy, max_theta),
-        None => KannalaBrandt {
-            fx: focal,
-            fy: focal,
-            cx,
-            cy,
-            skew: 0.0,
-            max_theta: Some(max_theta),
-            k: fit.k.map(|k| (k * 1e8).round() / 1e8),
-        }
-        .into(),
-    }
-}
-
-fn sources(arguments: &Arguments, fit: &RoomFit) -> BTreeMap<String, NativeSource> {
-    let is_given = arguments.lens.is_some() && arguments.field_of_view.is_some();
-    let measured = |uncertainty: f64| NativeSource {
-        source: ValueSource::Measured,
-        uncertainty: Some(thousandths(uncertainty)),
-    };
-    let given = NativeSource {
-        source: ValueSource::Given,
-        uncertainty: None,
-    };
-    let lens = if is_given {
-        given
-    } else {
-        measured(100.0 * fit.uncertainty.radius)
-    };
-    let mut sources = BTreeMap::from([
-        ("lens".to_owned(), lens),
-        ("center".to_owned(), measured(fit.uncertainty.center)),
-        ("world_up".to_owned(), measured(fit.uncertainty.level_deg)),
-    ]);
-    if arguments.height.is_some() {
-        sources.insert("height_m".to_owned(), given);
-    }
-    sources
-}
-
 /// Prints the values with their uncertainty and source.
 fn report(arguments: &Arguments, fit: &RoomFit, sources: &BTreeMap<String, NativeSource>) {
-    let tilt = fit.directions[0].z.clamp(-1.0, 1.0).acos().to_degrees();
+    let tilt = tilt_deg(fit);
     let [cx, cy] = fit.center;
     let mut rows = vec![
         (

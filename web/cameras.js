@@ -1,12 +1,13 @@
-/** The section Live: a card for each camera, updated by events. */
+/** The section Cameras: a card for each camera, updated by events, and the camera of the address `#camera/NAME` alone. */
 
-import { addCounts, followCounts, layersBelow } from "./counts.js";
+import { addCard, drawCard, drawTools, removeCard, tellAge } from "./camera_card.js";
+import { openForm, startForm } from "./camera_form.js";
+import { followStates, options } from "./camera_states.js";
+import { followCounts } from "./counts.js";
 import { element, find } from "./dom.js";
-import { addBoxes, forgetKey } from "./ignore_place.js";
-import { sketch } from "./marks.js";
-import { stepPlot } from "./plot.js";
+import { forgetKey } from "./ignore_place.js";
 import { shown, showFailure, withProgress } from "./progress.js";
-import { ask, askJson, events } from "./server.js";
+import { askJson, events } from "./server.js";
 
 /** The maximum number of cards; cameras with the latest reports come first. */
 const MAX_CARDS = 60;
@@ -20,6 +21,9 @@ const NUMBERS_MILLIS = 1000;
 const cards = new Map();
 let listening = null;
 let lastId = "";
+/** The camera of the address; empty for all cameras. */
+let selected = "";
+let hasLoaded = false;
 
 /** Reads events until `signal` aborts. After a reconnection the server sends the missed events. */
 async function listen(signal) {
@@ -28,7 +32,8 @@ async function listen(signal) {
   cameras.sort((one, other) => one.age_seconds - other.age_seconds);
   const known = cameras.slice(0, MAX_CARDS);
   await withProgress(wall, "Loading the history", () => Promise.all(known.map((row) => loadHistory(row, signal))));
-  find("#wall-empty").hidden = cards.size > 0;
+  hasLoaded = true;
+  arrange();
   while (!signal.aborted) {
     try {
       const headers = lastId ? { "Last-Event-ID": lastId } : {};
@@ -74,7 +79,7 @@ function addNumber(card, time, persons) {
 
 /** Draws a card once for many simultaneous changes. */
 function redraw(card) {
-  card.drawn ||= requestAnimationFrame(() => draw(card));
+  card.drawn ||= requestAnimationFrame(() => drawCard(card, [...cards.values()]));
 }
 
 /** Adds a report to its card; ignores known reports. The number of an event follows from the next update. */
@@ -92,70 +97,83 @@ function addReport(id, report, persons) {
 }
 
 function added(camera) {
-  const node = element("article", { class: "card", "aria-label": `Camera ${camera}`, "data-camera": camera });
-  const card = { camera, node, id: "0", history: [], reportedAt: 0, report: null, drawn: 0, picture: null, hasPicture: true, isAsking: false, message: null };
   if (cards.size >= MAX_CARDS) {
     const [oldest] = [...cards.values()].sort((one, other) => Number(one.id) - Number(other.id));
-    oldest.node.remove();
-    if (oldest.picture) URL.revokeObjectURL(oldest.picture.src);
-    cards.delete(oldest.camera);
+    dropped(oldest);
   }
+  const card = addCard(camera, { onchange: (info) => openForm(info, readStates), reread: readStates });
   cards.set(camera, card);
   const after = [...cards.values()].filter((other) => other.camera > camera);
   after.sort((one, other) => (one.camera < other.camera ? -1 : 1));
-  find("#wall").insertBefore(node, after[0]?.node ?? null);
-  find("#wall-empty").hidden = true;
+  find("#wall").insertBefore(card.node, after[0]?.node ?? null);
+  redraw(card);
+  arrange();
   return card;
 }
 
-function draw(card) {
-  card.drawn = 0;
-  const { report, history } = card;
-  const count = history.at(-1).persons;
-  const zones = report.zones?.map(({ name, persons }) => element("li", {}, `${name} `, element("b", {}, String(persons))));
-  const focused = card.node.contains(document.activeElement) ? document.activeElement.dataset.box : undefined;
-  card.age = element("span", { class: "age" });
-  card.node.replaceChildren(
-    element("header", {}, element("h2", {}, card.camera), card.age),
-    element("div", { class: "sight" }, card.picture ?? sketch(report), element("p", { class: "big" }, element("b", {}, String(count)), count === 1 ? "person" : "persons")),
-    zones ? element("ul", { class: "zones" }, zones) : "",
-    stepPlot(history, Date.now()),
-  );
-  tellAge(card);
-  showPicture(card);
-  addCounts(card);
-  if (card.message) find(".sight", card.node).after(card.message);
-  addBoxes(card, [...cards.values()], focused);
+function dropped(card) {
+  removeCard(card);
+  cards.delete(card.camera);
+  arrange();
 }
 
-/** Replaces the sketch by the image of the latest report, if the server stores images of this camera. */
-async function showPicture(card) {
-  if (!card.hasPicture || card.isAsking) return;
-  card.isAsking = true;
-  try {
-    const answer = await ask(`results/${encodeURIComponent(card.camera)}/latest.jpg?draw=${layersBelow(card)}&width=480`);
-    const picture = element("img", { alt: `The latest frame of ${card.camera}`, src: URL.createObjectURL(await answer.blob()) });
-    await picture.decode();
-    find(".sight", card.node).firstChild.replaceWith(picture);
-    if (card.picture) URL.revokeObjectURL(card.picture.src);
-    card.picture = picture;
-  } catch (problem) {
-    if (problem.status === 404) card.hasPicture = false;
-  } finally {
-    card.isAsking = false;
+/** Shows the states of the cameras that this server reads. */
+function showStates(rows) {
+  const named = new Map(rows.map((row) => [row.name, row]));
+  for (const row of rows) {
+    const card = cards.get(row.name) ?? added(row.name);
+    drawTools(card, row);
+  }
+  for (const card of cards.values()) {
+    if (named.has(card.camera)) continue;
+    // A removed camera without reports has nothing to show.
+    if (card.info && !card.report) dropped(card);
+    else if (card.info) drawTools(card, null);
   }
 }
 
-function tellAge({ age, reportedAt }) {
-  if (!age) return;
-  const seconds = Math.max(0, Math.round((Date.now() - reportedAt) / 1000));
-  const [value, unit] = seconds < 60 ? [seconds, "s"] : seconds < 3600 ? [Math.floor(seconds / 60), "min"] : [Math.floor(seconds / 3600), "h"];
-  age.textContent = seconds < 2 ? "now" : `${value} ${unit} ago`;
+let readStates = () => {};
+
+/** Shows all cards, or the selected one; a single card fills the width. */
+function arrange() {
+  const wall = find("#wall");
+  const isSingle = Boolean(selected) || cards.size === 1;
+  wall.classList.toggle("single", isSingle);
+  wall.classList.toggle("selected", Boolean(selected));
+  for (const card of cards.values()) {
+    const wasSingle = card.isSingle;
+    card.node.hidden = Boolean(selected) && card.camera !== selected;
+    card.isSingle = isSingle && !card.node.hidden;
+    if (card.isSingle !== wasSingle) redraw(card);
+  }
+  const isMissing = selected ? hasLoaded && !cards.has(selected) : hasLoaded && cards.size === 0;
+  find("#wall-empty").hidden = !isMissing;
+  if (isMissing) showHelp();
+  find("#title-cameras").textContent = selected || "Cameras";
+  find("#all-cameras").hidden = !selected;
+  find("#cameras-lead").hidden = Boolean(selected);
+}
+
+/** How a camera appears here. */
+async function showHelp() {
+  const { has_cameras: reads, can_change: may } = await options();
+  const text = selected ? [`There is no camera ${selected}.`] : reads && may ? ["No camera yet: add the first one."] : helpOf(reads);
+  find("#wall-help").replaceChildren(...text);
+  find("#first-camera").hidden = !(reads && may) || Boolean(selected);
+}
+
+function helpOf(reads) {
+  if (reads) return ["No camera yet. A key with the scope ", element("code", {}, "admin"), " adds one here."];
+  const run = element("code", {}, "lookdown run rtsp://10.0.0.8:554/stream2 --name hall");
+  const send = element("code", {}, "POST /detect?camera=hall");
+  return ["No camera yet. ", run, " reads one; a frame sent with ", send, " appears, too."];
 }
 
 const listenShown = shown(listen);
 
-export function visible(is) {
+/** Shows or hides the section; `camera` is that of the address. */
+export function visible(is, camera = "") {
+  selected = is ? camera : "";
   if (is === !listening) followCounts(is);
   if (!is) {
     listening?.abort();
@@ -164,16 +182,22 @@ export function visible(is) {
     listening = new AbortController();
     listenShown(listening.signal);
     followNumbers(listening.signal);
+    readStates = followStates(showStates, listening.signal);
   }
+  if (is) arrange();
 }
 
 export function restart() {
   if (!listening) return;
   forgetKey();
+  const camera = selected;
   visible(false);
-  visible(true);
+  visible(true, camera);
 }
 
 export function start() {
   setInterval(() => listening && cards.forEach(tellAge), 1000);
+  startForm();
+  const add = () => openForm(null, readStates);
+  for (const id of ["#add-camera", "#first-camera"]) find(id).addEventListener("click", add);
 }

@@ -1,0 +1,90 @@
+/** The section Cameras of `lookdown run`: a camera is added, tested, used in the other sections, changed and removed. */
+
+import assert from "node:assert/strict";
+import { PHONE, WIDE, assertAccessible, assertFits, pageTest, picture } from "./browser.js";
+
+/** The address of `lookdown run`, and that of a camera with the user `viewer`. */
+const { LOOKDOWN_RUN_URL: RUN, LOOKDOWN_CAMERA_URL: CAMERA, LOOKDOWN_CAMERA_PASSWORD: PASSWORD } = process.env;
+const camera = async (name) => (await fetch(`${RUN}/cameras/${name}`)).json();
+
+pageTest(
+  "a camera is added, tested, used and removed in the page",
+  "",
+  async (page) => {
+    await page.getByText("No camera yet: add the first one.").waitFor();
+    await assertAccessible(page);
+    await page.getByText("Add a camera", { exact: true }).last().click();
+    const dialog = page.getByRole("dialog", { name: "Add a camera" });
+    await dialog.getByText("URLs of common makers").click();
+    await dialog.getByRole("button", { name: /Streaming\/Channels/ }).click();
+    assert.equal(await dialog.getByLabel("URL").inputValue(), "rtsp://HOST:554/Streaming/Channels/102");
+    await dialog.getByLabel("URL").fill(`${CAMERA}/snapshot.jpg?token=1`);
+    await dialog.getByLabel("Name").fill("hall");
+    await dialog.getByRole("button", { name: "Test" }).click();
+    await dialog.getByText("the camera requires a user name and a password").waitFor();
+    await dialog.getByLabel("User").fill("viewer");
+    await dialog.getByLabel("Password").fill(PASSWORD);
+    await dialog.getByRole("button", { name: "Test" }).click();
+    await dialog.getByText("It works: 960 × 960 pixels.").waitFor();
+    await assertAccessible(page);
+    await dialog.getByRole("button", { name: "Save" }).click();
+    await page.getByRole("heading", { name: "hall", level: 1 }).waitFor();
+    assert.match(page.url(), /#camera\/hall$/);
+    const card = page.getByRole("article", { name: "Camera hall" });
+    await card.locator(".plot.hours").waitFor();
+    await card.getByText("Images of this camera are not kept.").waitFor();
+    await assertFits(page);
+    await assertAccessible(page);
+    // The frame is read from the camera, because no image of it is kept.
+    await card.getByRole("button", { name: "Calibrate" }).click();
+    await page.locator("#previews canvas").first().waitFor();
+    assert.equal(await page.locator("#calibrate-id").inputValue(), "hall");
+    await page.getByRole("button", { name: "Save", exact: true }).click();
+    await page.getByText("hall is saved and in use.").waitFor();
+    // The running camera uses the calibration of its name at once.
+    const used = async () => (await (await fetch(`${RUN}/results/hall/latest`)).json()).calibration.id;
+    for (let attempt = 0; attempt < 100 && (await used()) !== "hall"; attempt += 1) await page.waitForTimeout(100);
+    assert.equal(await used(), "hall");
+    await page.getByRole("navigation").getByRole("link", { name: "Cameras" }).click();
+    await card.getByRole("button", { name: "Pause" }).click();
+    await card.getByText("Paused: no frames are read.").waitFor();
+    await card.getByRole("button", { name: "Settings" }).click();
+    const settings = page.getByRole("dialog", { name: "Settings of hall" });
+    assert.equal(await settings.getByLabel("Password").inputValue(), "");
+    await settings.getByLabel("Rate").selectOption("200ms");
+    // The stored URL with its query, and the password, stay.
+    await settings.getByRole("button", { name: "Test" }).click();
+    await settings.getByText("It works: 960 × 960 pixels.").waitFor();
+    await settings.getByRole("button", { name: "Save" }).click();
+    await page.getByRole("heading", { name: "hall", level: 1 }).waitFor();
+    const { every, paused } = await camera("hall");
+    assert.deepEqual([every, paused], ["200ms", true]);
+    await card.getByRole("button", { name: "Resume" }).click();
+    await card.getByRole("button", { name: "Pause" }).waitFor();
+    page.on("dialog", (question) => question.accept());
+    await card.getByRole("button", { name: "Remove" }).click();
+    await card.getByRole("button", { name: "Remove" }).waitFor({ state: "detached" });
+    assert.equal((await fetch(`${RUN}/cameras/hall`)).status, 404);
+  },
+  { server: RUN, expected: /status of 4(04|22)/ },
+);
+
+for (const [device, viewport, colorScheme] of [["wide", WIDE, "dark"], ["phone", PHONE, "light"]]) {
+  pageTest(
+    `the address of a camera and the form are well on a ${device} screen`,
+    "#camera/hall",
+    async (page) => {
+      await page.getByRole("heading", { name: "hall", level: 1 }).waitFor();
+      await page.locator(".card .plot").first().waitFor();
+      await assertFits(page);
+      await assertAccessible(page);
+      await picture(page, `camera-${device}`);
+      await page.getByRole("button", { name: "Add a camera" }).click();
+      await page.getByText("URLs of common makers").click();
+      await assertFits(page);
+      await assertAccessible(page);
+      await picture(page, `add-camera-${device}`);
+    },
+    { server: RUN, viewport, colorScheme, expected: /status of 404/ },
+  );
+}

@@ -1,0 +1,133 @@
+/** A card of a camera: image, number of persons, plot, state, and the tools that use its frame. */
+
+import { showDay } from "./camera_day.js";
+import { options } from "./camera_states.js";
+import { addCounts, layersBelow } from "./counts.js";
+import { element, find } from "./dom.js";
+import { addBoxes } from "./ignore_place.js";
+import { sketch } from "./marks.js";
+import { stepPlot } from "./plot.js";
+import { shown, withProgress } from "./progress.js";
+import { ask } from "./server.js";
+import { useFrame } from "./use_frame.js";
+
+/** The widths of images in a card, and in one that fills the page. */
+const [WIDTH, SINGLE_WIDTH] = [480, 1200];
+const TOOLS = ["Detect", "Views", "Floor", "Calibrate", "Zones"];
+
+/** Creates the card of a camera. `onchange` opens its settings, `reread` reads its state again. */
+export function addCard(camera, { onchange, reread }) {
+  const link = element("a", { href: `#camera/${encodeURIComponent(camera)}` }, camera);
+  const age = element("span", { class: "age" });
+  const now = element("div", { class: "now-shown" });
+  const state = element("p", { class: "camera-state", role: "status" });
+  const day = element("section", { class: "day", "aria-label": `The day of ${camera}`, hidden: true });
+  const strip = element("div", { class: "strip" });
+  const manage = element("span", { class: "manage" });
+  const node = element("article", { class: "card", "aria-label": `Camera ${camera}`, "data-camera": camera });
+  const card = { camera, node, now, age, state, day, strip, manage, onchange, reread, info: null, isSingle: false };
+  Object.assign(card, { id: "0", history: [], reportedAt: 0, report: null, drawn: 0, picture: null, hasPicture: true, isAsking: false, message: null });
+  const use = (section) => shown(() => withProgress(strip, "Reading the frame", () => useFrame(card, section)));
+  const tools = TOOLS.map((name) => element("button", { type: "button", onclick: use(name.toLowerCase()) }, name));
+  const group = element("div", { class: "use-frame", role: "group", "aria-label": `Use this frame of ${camera}` }, element("span", { class: "muted", "aria-hidden": "true" }, "Use this frame:"), ...tools);
+  node.append(element("header", {}, element("h2", {}, link), age), now, state, day, element("footer", {}, group, manage, strip));
+  return card;
+}
+
+export function removeCard(card) {
+  card.node.remove();
+  if (card.picture) URL.revokeObjectURL(card.picture.src);
+}
+
+/** Draws the latest report of a card. */
+export function drawCard(card, others) {
+  card.drawn = 0;
+  const { report, history } = card;
+  tellAge(card);
+  if (!report) {
+    card.now.replaceChildren(element("div", { class: "sight waiting" }, element("p", {}, "Waiting for the first frame.")));
+    return;
+  }
+  const count = history.at(-1).persons;
+  const zones = report.zones?.map(({ name, persons }) => element("li", {}, `${name} `, element("b", {}, String(persons))));
+  const focused = card.now.contains(document.activeElement) ? document.activeElement.dataset.box : undefined;
+  card.now.replaceChildren(
+    element("div", { class: "sight" }, card.picture ?? sketch(report), element("p", { class: "big" }, element("b", {}, String(count)), count === 1 ? "person" : "persons")),
+    card.isSingle && !card.hasPicture ? imagesOff(card.camera) : "",
+    zones ? element("ul", { class: "zones" }, zones) : "",
+    stepPlot(history, Date.now()),
+  );
+  showPicture(card);
+  addCounts(card);
+  showDay(card);
+  if (card.message) find(".sight", card.node).after(card.message);
+  addBoxes(card, others, focused);
+}
+
+const imagesOff = (camera) => element("p", { class: "muted images-off" }, "Images of this camera are not kept. The setting ", element("code", {}, `results.pictures = ["${camera}"]`), " shows them.");
+
+/** Replaces the sketch by the image of the latest report, if the server stores images of this camera. */
+async function showPicture(card) {
+  if (!card.hasPicture || card.isAsking || card.node.hidden) return;
+  card.isAsking = true;
+  const width = card.isSingle ? SINGLE_WIDTH : WIDTH;
+  try {
+    const answer = await ask(`results/${encodeURIComponent(card.camera)}/latest.jpg?draw=${layersBelow(card)}&width=${width}`);
+    const picture = element("img", { alt: `The latest frame of ${card.camera}`, src: URL.createObjectURL(await answer.blob()) });
+    await picture.decode();
+    find(".sight", card.node).firstChild.replaceWith(picture);
+    if (card.picture) URL.revokeObjectURL(card.picture.src);
+    card.picture = picture;
+  } catch (problem) {
+    if (problem.status === 404) card.hasPicture = false;
+  } finally {
+    card.isAsking = false;
+  }
+}
+
+/** Shows the state of a camera that this server reads; `info` is null for one that only sends frames. */
+export async function drawTools(card, info) {
+  const before = card.info;
+  card.info = info;
+  const text = stateOf(info);
+  if (card.state.textContent !== text) card.state.textContent = text;
+  card.state.classList.toggle("failing", Boolean(info?.problem));
+  const { can_change: may } = await options();
+  const isStored = Boolean(may && info?.stored);
+  if (Boolean(card.manage.firstChild) === isStored && before?.paused === info?.paused) return;
+  card.manage.replaceChildren(...(isStored ? managing(card) : []));
+}
+
+function stateOf(info) {
+  if (!info) return "";
+  if (info.paused) return "Paused: no frames are read.";
+  if (info.problem) return `No frames: ${info.problem}`;
+  return info.warning ?? "";
+}
+
+function managing(card) {
+  const { camera, info } = card;
+  const path = `cameras/${encodeURIComponent(camera)}`;
+  const act = (label, work) => shown(async () => {
+    await withProgress(card.strip, label, work);
+    await card.reread();
+  });
+  const pause = async () => {
+    const { user, every, calibration, profile } = card.info;
+    await ask(path, { method: "PUT", body: JSON.stringify({ user, every, calibration, profile, paused: !card.info.paused }) });
+  };
+  const remove = () => confirm(`Remove the camera ${camera}? Its reports and counts stay.`) && act("Removing", () => ask(path, { method: "DELETE" }))();
+  const button = (label, onclick) => element("button", { type: "button", class: "quiet", onclick }, label);
+  return [
+    button("Settings", () => card.onchange(card.info)),
+    button(info.paused ? "Resume" : "Pause", act("Saving", pause)),
+    button("Remove", remove),
+  ];
+}
+
+export function tellAge({ age, reportedAt }) {
+  if (!reportedAt) return;
+  const seconds = Math.max(0, Math.round((Date.now() - reportedAt) / 1000));
+  const [value, unit] = seconds < 60 ? [seconds, "s"] : seconds < 3600 ? [Math.floor(seconds / 60), "min"] : [Math.floor(seconds / 3600), "h"];
+  age.textContent = seconds < 2 ? "now" : `${value} ${unit} ago`;
+}

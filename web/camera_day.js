@@ -1,0 +1,62 @@
+/** The numbers of a camera's day: most persons in each hour, and the crossings. */
+
+import { element, plural, shape } from "./dom.js";
+import { askJson } from "./server.js";
+import { options } from "./camera_states.js";
+
+/** The age at which the numbers are loaded again. */
+const MILLIS = 60_000;
+const HOUR = 3_600_000;
+const [WIDTH, HEIGHT, BOTTOM, TOP] = [320, 84, 18, 6];
+
+/** Shows the day of a card that fills the page, if the server counts. */
+export async function showDay(card) {
+  card.day.hidden = !card.isSingle || !card.day.firstChild;
+  if (!card.isSingle || Date.now() - (card.dayAt ?? 0) < MILLIS) return;
+  card.dayAt = Date.now();
+  const { has_counts: hasCounts } = await options();
+  if (!hasCounts) return;
+  const query = new URLSearchParams({ from: "today", step: "1h" });
+  const counts = await askJson(`counts/${encodeURIComponent(card.camera)}?${query}`).catch(() => null);
+  card.day.replaceChildren(...(counts ? drawn(counts) : []));
+  card.day.hidden = !card.isSingle || !counts;
+}
+
+function drawn({ from, steps }) {
+  const most = Math.max(0, ...steps.map(({ persons }) => persons?.max ?? 0));
+  const rows = [...crossingsOf(steps)].map(([line, directions]) =>
+    element("li", {}, element("span", { class: "count-of" }, line), element("span", {}, [...directions].map(([direction, count]) => `${count} ${direction}`).join(", "))),
+  );
+  const text = steps.some(({ persons }) => persons) ? `Today: at most ${plural(most, "person")} at once` : "Today: nothing is counted yet";
+  return [element("h3", {}, text), bars(Date.parse(from), steps, most), element("ul", { class: "count-rows of-day" }, ...rows)];
+}
+
+/** The crossings of the day by line and direction. */
+export function crossingsOf(steps) {
+  const lines = new Map();
+  for (const { lines: counted = {} } of steps) {
+    for (const [line, directions] of Object.entries(counted)) {
+      const sums = lines.get(line) ?? new Map();
+      for (const [direction, count] of Object.entries(directions)) sums.set(direction, (sums.get(direction) ?? 0) + (count ?? 0));
+      lines.set(line, sums);
+    }
+  }
+  return lines;
+}
+
+/** Bars over 24 hours: the most persons at once in each hour. An hour without reports has none. */
+function bars(midnight, steps, most) {
+  const x = (time) => ((time - midnight) / (24 * HOUR)) * WIDTH;
+  const height = (count) => (count / Math.max(1, most)) * (HEIGHT - TOP - BOTTOM);
+  const base = HEIGHT - BOTTOM;
+  const known = steps.filter(({ persons }) => persons);
+  const bar = ({ from, persons: { max } }) => shape("rect", { x: x(Date.parse(from)) + 1, y: base - height(max), width: WIDTH / 24 - 2, height: height(max) });
+  const hours = [0, 6, 12, 18, 24];
+  return shape(
+    "svg",
+    { class: "plot hours", viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": `Most persons at once in each hour of today, at most ${most}` },
+    shape("path", { class: "grid", d: `M0 ${base}H${WIDTH}` }),
+    ...known.map(bar),
+    ...hours.map((hour) => shape("text", { x: (hour / 24) * WIDTH, y: HEIGHT - 3, "text-anchor": hour === 0 ? "start" : hour === 24 ? "end" : "middle" }, `${hour}:00`)),
+  );
+}
