@@ -134,7 +134,7 @@ fn command(commit: Option<&str>) -> clap::Command {
 }
 
 fn print_openapi() -> anyhow::Result<ExitCode> {
-    let document = api::openapi_document().to_pretty_json()?;
+    let document = serde_json::to_string_pretty(&api::openapi_document()?)?;
     writeln!(io::stdout(), "{document}").context(UNWRITABLE)?;
     Ok(ExitCode::SUCCESS)
 }

@@ -3,6 +3,7 @@
 
 mod examples;
 mod failures;
+mod media_types;
 mod parameters;
 mod security;
 
@@ -11,6 +12,7 @@ use utoipa::{OpenApi, openapi};
 use security::Keys;
 
 use crate::api::http::problem::ProblemBody;
+pub use media_types::Document;
 pub(super) use parameters::{
     AnnotationQuery, CalibratedDetectionQuery, DetectForm, DetectQuery, DetectionQuery, RawBytes,
     fields,

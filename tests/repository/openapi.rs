@@ -7,7 +7,7 @@ use lookdown_detect::parameters::DetectParameters;
 use serde_json::Value;
 
 fn document() -> Value {
-    serde_json::to_value(openapi_document()).unwrap()
+    serde_json::to_value(openapi_document().unwrap()).unwrap()
 }
 
 /// Every operation with its path.
@@ -187,4 +187,14 @@ fn operations_that_need_a_key_declare_it() {
         let needs_none = operation["security"] == serde_json::json!([{}]);
         assert_eq!(needs_none, operation["tags"][0] == "operation", "{path}");
     }
+}
+
+#[test]
+fn form_is_the_first_media_type_of_a_body() {
+    let text = serde_json::to_string(&openapi_document().unwrap()).unwrap();
+    let forms = text.matches("\"multipart/form-data\":").count();
+    let first = text
+        .matches("\"content\":{\"multipart/form-data\":")
+        .count();
+    assert!(forms > 0 && forms == first, "{first} of {forms} are first");
 }
