@@ -225,12 +225,11 @@ impl Cameras {
     /// [`ConfigError`].
     pub fn get(&self, name: &str) -> Result<Option<lookdown_watch::Camera>, ConfigError> {
         let configured = self.configured.read().get(name).cloned();
-        let entry = match configured {
-            Some(entry) => Some(entry),
-            None => {
-                let stored = self.stored()?;
-                stored.get(name).map(|camera| self.entry(name, camera))
-            }
+        let entry = if configured.is_some() {
+            configured
+        } else {
+            let stored = self.stored()?;
+            stored.get(name).map(|camera| self.entry(name, camera))
         };
         entry.map(|entry| entry.check("")).transpose()
     }

@@ -103,6 +103,12 @@ impl Running {
         }
     }
 
+    /// Ends the process at once, as `kill -9` and a loss of power do.
+    fn kill(mut self) {
+        self.process.kill().unwrap();
+        self.process.wait().unwrap();
+    }
+
     /// Ends the process as Ctrl-C does, and returns the rest of the log.
     fn interrupt(mut self) -> Vec<String> {
         let kill = format!("kill -INT {}", self.process.id());
@@ -213,7 +219,7 @@ fn it_runs_without_certificates_of_authorities() {
 }
 
 #[test]
-fn a_camera_that_is_added_is_there_after_a_restart() {
+fn a_camera_that_is_added_is_there_after_a_kill() {
     let folder = tempfile::tempdir().unwrap();
     let state = folder.path().join("state");
     let store = folder.path().join("counts.sqlite");
@@ -233,13 +239,23 @@ fn a_camera_that_is_added_is_there_after_a_restart() {
     assert!(refused.starts_with("HTTP/1.1 422 "), "{refused}");
     let tested = running.ask("POST /cameras/test", &body);
     assert!(tested.contains("the camera cannot be reached"), "{tested}");
-    running.interrupt();
+    // The answer was sent after the camera was stored.
+    running.kill();
 
     let running = Running::start(&["run"], &variables);
     let cameras = running.until("/cameras", "", "cannot be reached", || {});
     assert!(
         cameras.contains(&source) && !cameras.contains("geheim"),
         "{cameras}"
+    );
+    let still = running.ask("GET /cameras/hall/frame.jpg", "");
+    assert!(still.contains("the camera cannot be reached"), "{still}");
+    let replaced = running.ask("PUT /cameras/hall", r#"{"user": "viewer", "paused": true}"#);
+    assert!(replaced.starts_with("HTTP/1.1 204 "), "{replaced}");
+    let paused = running.ask("GET /cameras/hall", "");
+    assert!(
+        paused.contains(&source) && paused.contains("\"paused\":true"),
+        "{paused}"
     );
     let deleted = running.ask("DELETE /cameras/hall", "");
     assert!(deleted.starts_with("HTTP/1.1 204 "), "{deleted}");

@@ -31,7 +31,7 @@ async function walk(camera) {
 async function shownCrossings(card, truth) {
   const shown = {};
   for (const [line, directions] of Object.entries(truth)) {
-    const text = await card.getByRole("listitem").filter({ hasText: line }).textContent();
+    const text = await card.locator(".of-line").filter({ hasText: line }).textContent();
     const numbers = Object.keys(directions).map((direction) => [direction, Number(text.match(`(\\d+) [→↘↓↙←↖↑↗] ${direction}`)[1])]);
     shown[line] = Object.fromEntries(numbers);
   }

@@ -77,7 +77,7 @@ pub(in crate::api) async fn fit(
         ));
     }
     let (image, deadline) = (upload.image, upload.deadline);
-    let limits = state.workers.engine().options().decode_limits.clone();
+    let limits = state.workers.engine().options().decode_limits;
     let fitting = state.workers.run(upload.caller.ticket(), move |_| {
         fitted(&limits, &id, &image)
     });
