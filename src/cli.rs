@@ -139,10 +139,9 @@ fn command(commit: Option<&str>) -> clap::Command {
 
 fn print_openapi(of_counts: bool) -> anyhow::Result<ExitCode> {
     let document = match of_counts {
-        true => lookdown_count::openapi_document(),
-        false => api::openapi_document(),
+        true => lookdown_count::openapi_document().to_pretty_json()?,
+        false => serde_json::to_string_pretty(&api::openapi_document()?)?,
     };
-    let document = document.to_pretty_json()?;
     writeln!(io::stdout(), "{document}").context(UNWRITABLE)?;
     Ok(ExitCode::SUCCESS)
 }

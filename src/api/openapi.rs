@@ -2,12 +2,14 @@
 //! the common parts.
 
 mod examples;
+mod media_types;
 mod parameters;
 
 use lookdown_http::openapi::Keys;
 use utoipa::{OpenApi, openapi};
 
 use crate::api::http::problem::ProblemBody;
+pub use media_types::Document;
 pub(super) use parameters::{
     AnnotationQuery, CalibratedDetectionQuery, DetectForm, DetectQuery, DetectionQuery, RawBytes,
     fields,

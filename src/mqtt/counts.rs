@@ -15,19 +15,20 @@ use rumqttc::Publish;
 use serde_json::{Value, json};
 use tokio::{
     sync::watch,
-    time::{Instant, sleep, sleep_until},
+    time::{Instant, sleep_until},
 };
-use uuid::Uuid;
 
 use super::{
     Broker,
-    discovery::{OFFLINE, ONLINE, SENSOR},
+    connector::Connector,
+    discovery::{OFFLINE, ONLINE},
+    entity::{self, SENSOR},
     message::Message,
     retained::RetainedTopics,
-    session::{Session, SessionError, reconnect_backoff},
+    session::{Session, SessionError},
     topics::{Topics, level},
 };
-use crate::tls::{ClientTls, TlsError};
+use crate::tls::TlsError;
 use number::{AVAILABILITY, Number, Owner};
 
 /// The broker of the counts, and the settings of the messages.
@@ -50,8 +51,7 @@ pub struct CountsOptions {
 pub struct CountsPublisher {
     topics: Topics,
     options: CountsOptions,
-    tls: Option<ClientTls>,
-    client_id: String,
+    connector: Connector,
     snapshots: watch::Receiver<Snapshot>,
 }
 
@@ -68,9 +68,12 @@ impl CountsPublisher {
         snapshots: watch::Receiver<Snapshot>,
     ) -> Result<Self, TlsError> {
         Ok(Self {
-            tls: options.broker.tls(options.authorities.as_deref())?,
+            connector: Connector::new(
+                options.broker.clone(),
+                options.authorities.as_deref(),
+                "lookdown-count",
+            )?,
             topics: Topics::new(&options.topic_prefix, options.discovery_prefix.as_deref()),
-            client_id: format!("lookdown-count-{}", Uuid::new_v4().simple()),
             options,
             snapshots,
         })
@@ -80,43 +83,30 @@ impl CountsPublisher {
     pub async fn run(mut self) {
         let mut snapshots = self.snapshots.clone();
         let mut stop = pin!(async move { while snapshots.changed().await.is_ok() {} });
-        let mut backoff = reconnect_backoff();
-        let mut has_warned = false;
+        let will = self.status(OFFLINE);
         loop {
-            let began = Instant::now();
-            let Err(error) = self.serve(&mut has_warned, stop.as_mut()).await else {
+            let session = tokio::select! {
+                session = self.connector.session(&will) => session,
+                () = &mut stop => return,
+            };
+            let Err(error) = self.serve(session, stop.as_mut()).await else {
                 return;
             };
-            backoff.reset_if_stable(began.elapsed());
-            if !has_warned {
-                let broker = &self.options.broker;
-                tracing::warn!("not publishing to the broker {broker} (mqtt.url): {error}");
-            }
-            has_warned = true;
-            tokio::select! {
-                () = sleep(backoff.next_pause()) => {}
-                () = &mut stop => return,
-            }
+            self.connector.lost(&error);
         }
     }
 
-    /// Connects, and publishes every change until the connection or the counts end.
+    fn status(&self, status: &'static str) -> Message {
+        Message::retained(self.topics.counts("status"), status)
+    }
+
+    /// Publishes every change until the session or the counts end.
     async fn serve(
         &mut self,
-        has_warned: &mut bool,
+        mut session: Session,
         mut stop: Pin<&mut impl Future<Output = ()>>,
     ) -> Result<(), SessionError> {
-        let broker = &self.options.broker;
-        let status = |status: &'static str| Message::retained(self.topics.counts("status"), status);
-        let (online, offline) = (status(ONLINE), status(OFFLINE));
-        let opened = Session::open(broker, self.tls.as_ref(), &self.client_id, offline.clone());
-        let mut session = tokio::select! {
-            session = opened => session?,
-            () = &mut stop => return Ok(()),
-        };
-        tracing::info!("publishing to the broker {broker} (mqtt.url)");
-        *has_warned = false;
-        session.publish([online]).await?;
+        session.publish([self.status(ONLINE)]).await?;
         let birth = self.topics.birth();
         let filters = ["cameras/#", "sites/#"].map(|rest| self.topics.counts(rest));
         session
@@ -146,7 +136,7 @@ impl CountsPublisher {
                     session.publish(self.withdrawals(&mut unknown, &published)).await?;
                 }
                 Ok(()) = self.snapshots.changed() => {}
-                () = &mut stop => return session.close(offline).await,
+                () = &mut stop => return session.close(self.status(OFFLINE)).await,
             }
         }
     }
@@ -211,16 +201,16 @@ impl CountsPublisher {
         self.topics.counts(&topic)
     }
 
-    fn device_id(&self, owner: Owner<'_>) -> String {
-        format!("{}_{}", level(&self.options.topic_prefix), owner.device())
-    }
-
-    fn entity_id(&self, owner: Owner<'_>, number: Number<'_>) -> String {
-        format!("{}_count_{}", self.device_id(owner), number.entity())
+    fn device<'a>(&self, owner: Owner<'_>, name: &'a str) -> entity::Device<'a> {
+        entity::Device {
+            id: format!("{}_{}", level(&self.options.topic_prefix), owner.device()),
+            name,
+        }
     }
 
     fn config_topic(&self, owner: Owner<'_>, number: Number<'_>) -> Option<String> {
-        self.topics.config(SENSOR, &self.entity_id(owner, number))
+        let id = self.device(owner, "").entity_id(&number.entity());
+        self.topics.config(SENSOR, &id)
     }
 
     /// Returns all messages that the broker is to retain.
@@ -312,28 +302,15 @@ impl<'a> Device<'a> {
     fn announce(&mut self, name: &str, number: Number<'_>, config: &Value, is_current: bool) {
         let (publisher, owner) = (self.publisher, self.owner);
         let topics = &publisher.topics;
-        let Some(topic) = publisher.config_topic(owner, number) else {
-            return;
-        };
-        let version = env!("CARGO_PKG_VERSION");
-        let mut availability = vec![json!({ "topic": topics.counts("status") })];
-        if is_current {
-            availability.push(json!({ "topic": topics.counts(&owner.availability()) }));
-        }
+        let own = is_current.then(|| topics.counts(&owner.availability()));
+        let availability = [topics.counts("status")].into_iter().chain(own);
         let mut config = config.clone();
         config["name"] = json!(name);
         config["state_topic"] = json!(publisher.state_topic(owner, number));
-        config["unique_id"] = json!(publisher.entity_id(owner, number));
-        config["availability_mode"] = json!("all");
-        config["availability"] = json!(availability);
-        config["device"] = json!({
-            "identifiers": [publisher.device_id(owner)],
-            "name": self.name,
-            "manufacturer": "Lookdown",
-            "sw_version": version,
-        });
-        config["origin"] = json!({ "name": "Lookdown", "sw_version": version });
-        self.retained.insert(topic, config.to_string());
+        let device = publisher.device(owner, self.name);
+        let entity = number.entity();
+        let announcement = device.announcement(topics, SENSOR, &entity, availability, config);
+        self.retained.extend(announcement);
     }
 }
 

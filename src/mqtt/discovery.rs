@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 use url::Url;
 
 use super::{
+    entity::{BINARY_SENSOR, Device, SENSOR},
     message::Message,
     occupancy::{OFF, ON},
     topics::{Topics, level},
@@ -15,9 +16,6 @@ use super::{
 /// The status while the server is connected or a camera sends frames, and the one when it is not.
 pub(super) const ONLINE: &str = "online";
 pub(super) const OFFLINE: &str = "offline";
-/// The component of numbers.
-pub(super) const SENSOR: &str = "sensor";
-const BINARY_SENSOR: &str = "binary_sensor";
 /// The ID of the number of the latest frame.
 const FRAME_PERSONS: &str = "frame_persons";
 
@@ -57,34 +55,21 @@ impl Discovery {
                 occupancy(&name("Occupancy"), Some(zone), &occupied),
             ]
         });
+        let device = device(topics, camera);
         let all = of_camera.into_iter().chain(zones);
         all.filter_map(|(component, entity, config)| {
-            let id = format!("{}_{entity}", topics.device_id(camera));
-            let topic = topics.config(component, &id)?;
-            let config = self.completed(config, &id, topics, camera);
-            Some(Message::retained(topic, config.to_string()))
+            let availability = [topics.status(), topics.availability(camera)];
+            let config = self.completed(config, topics, camera);
+            device.announcement(topics, component, &entity, availability, config)
         })
+        .map(|(topic, payload)| Message::retained(topic, payload))
         .collect()
     }
 
     /// Adds the fields that all entities of a camera have in common.
-    fn completed(&self, mut config: Value, id: &str, topics: &Topics, camera: &str) -> Value {
-        let version = env!("CARGO_PKG_VERSION");
-        config["unique_id"] = json!(id);
-        config["availability_mode"] = json!("all");
-        config["availability"] = json!([
-            {"topic": topics.status()},
-            {"topic": topics.availability(camera)},
-        ]);
+    fn completed(&self, mut config: Value, topics: &Topics, camera: &str) -> Value {
         config["json_attributes_topic"] = json!(topics.attributes(camera));
-        config["device"] = json!({
-            "identifiers": [topics.device_id(camera)],
-            "name": camera,
-            "manufacturer": "Lookdown",
-            "model": "Ceiling fisheye camera",
-            "sw_version": version,
-        });
-        config["origin"] = json!({"name": "Lookdown", "sw_version": version});
+        config["device"]["model"] = json!("Ceiling fisheye camera");
         if let Some(expire_after) = self.expire_after {
             config["expire_after"] = json!(expire_after.as_secs());
         }
@@ -98,6 +83,13 @@ impl Discovery {
     }
 }
 
+fn device<'a>(topics: &Topics, camera: &'a str) -> Device<'a> {
+    Device {
+        id: topics.device_id(camera),
+        name: camera,
+    }
+}
+
 /// The messages that remove the entities of a camera, or of one of its zones, from Home Assistant.
 pub(super) fn config_withdrawals(
     topics: &Topics,
@@ -106,13 +98,11 @@ pub(super) fn config_withdrawals(
 ) -> Vec<Message> {
     let of_frame = zone.is_none().then(|| (SENSOR, FRAME_PERSONS.to_owned()));
     let entities = [occupancy_id(zone), persons_id(zone)];
+    let device = device(topics, camera);
     let topics = entities
         .into_iter()
         .chain(of_frame)
-        .filter_map(|(component, entity)| {
-            let id = format!("{}_{entity}", topics.device_id(camera));
-            topics.config(component, &id)
-        });
+        .filter_map(|(component, entity)| topics.config(component, &device.entity_id(&entity)));
     topics.map(Message::forget).collect()
 }
 

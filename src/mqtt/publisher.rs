@@ -10,20 +10,20 @@ use tokio::{
     sync::broadcast::{self, error::RecvError},
     time::{Instant, MissedTickBehavior, interval, sleep, sleep_until},
 };
-use uuid::Uuid;
 
 use super::{
     Broker,
     cameras::Cameras,
+    connector::Connector,
     discovery::{Discovery, OFFLINE, ONLINE},
     message::Message,
-    session::{Session, SessionError, reconnect_backoff},
+    session::{Session, SessionError},
     topics::Topics,
 };
 use crate::{
     metrics::Metrics,
     results::{self, Headline, ListenError, ResultStore, StoredReport},
-    tls::{ClientTls, TlsError},
+    tls::TlsError,
 };
 
 /// Most reports that wait for the broker. When the queue is full, the oldest report is not sent.
@@ -62,13 +62,16 @@ pub struct MqttOptions {
 
 /// Publishes the results.
 pub struct Publisher {
+    connector: Connector,
+    publication: Publication,
+}
+
+/// What is published, and from where.
+struct Publication {
     options: MqttOptions,
     results: Arc<dyn ResultStore>,
     metrics: Arc<Metrics>,
-    tls: Option<ClientTls>,
     topics: Topics,
-    /// Unique, as a broker drops the first of two clients with the same ID.
-    client_id: String,
 }
 
 type Queue = broadcast::Receiver<Arc<StoredReport>>;
@@ -83,24 +86,37 @@ impl Publisher {
         results: Arc<dyn ResultStore>,
         metrics: Arc<Metrics>,
     ) -> Result<Self, TlsError> {
-        Ok(Self {
-            tls: options.broker.tls(options.authorities.as_deref())?,
+        let connector = Connector::new(
+            options.broker.clone(),
+            options.authorities.as_deref(),
+            "lookdown",
+        )?;
+        let publication = Publication {
             topics: Topics::new(&options.topic_prefix, options.discovery_prefix.as_deref()),
-            client_id: format!("lookdown-{}", Uuid::new_v4().simple()),
             options,
             results,
             metrics,
+        };
+        Ok(Self {
+            connector,
+            publication,
         })
     }
 
     /// Publishes until the results end, and then publishes the status "offline".
     pub async fn run(self) {
         let (sender, queue) = broadcast::channel(QUEUE);
-        tokio::join!(hear(&self.results, sender), self.publish(queue));
+        let publication = &self.publication;
+        tokio::join!(
+            hear(&publication.results, sender),
+            publication.publish(self.connector, queue)
+        );
     }
+}
 
-    /// Keeps a connection, and reconnects when it is lost.
-    async fn publish(&self, mut queue: Queue) {
+impl Publication {
+    /// Publishes in one session after the other, until the reports end.
+    async fn publish(&self, mut connector: Connector, mut queue: Queue) {
         let mut cameras = Cameras::new(
             self.topics.clone(),
             self.options.discovery.clone(),
@@ -114,51 +130,18 @@ impl Publisher {
             let persons = self.headline(&report).await;
             cameras.update(&report, persons, age, Instant::now());
         }
-        let mut backoff = reconnect_backoff();
-        let mut is_told = false;
+        let will = self.status(OFFLINE);
         loop {
-            let opened = tokio::select! {
-                opened = self.open() => opened,
+            let session = tokio::select! {
+                session = connector.session(&will) => session,
                 () = self.skip_reports(&mut cameras, &mut queue) => return,
             };
-            let ended = match opened {
-                Ok(session) => {
-                    tracing::info!(
-                        "publishing to the broker {} (mqtt.url)",
-                        self.options.broker
-                    );
-                    is_told = false;
-                    let began = Instant::now();
-                    self.metrics.mqtt_connected.set(1);
-                    let ended = self.serve(session, &mut cameras, &mut queue).await;
-                    self.metrics.mqtt_connected.set(0);
-                    backoff.reset_if_stable(began.elapsed());
-                    ended
-                }
-                Err(error) => Err(error),
-            };
+            self.metrics.mqtt_connected.set(1);
+            let ended = self.serve(session, &mut cameras, &mut queue).await;
+            self.metrics.mqtt_connected.set(0);
             let Err(error) = ended else { return };
-            if !is_told {
-                let broker = &self.options.broker;
-                tracing::warn!("not publishing to the broker {broker} (mqtt.url): {error}");
-            }
-            is_told = true;
-            tokio::select! {
-                () = sleep(backoff.next_pause()) => {}
-                () = self.skip_reports(&mut cameras, &mut queue) => return,
-            }
+            connector.lost(&error);
         }
-    }
-
-    async fn open(&self) -> Result<Session, SessionError> {
-        let broker = &self.options.broker;
-        Session::open(
-            broker,
-            self.tls.as_ref(),
-            &self.client_id,
-            self.status(OFFLINE),
-        )
-        .await
     }
 
     fn status(&self, status: &'static str) -> Message {

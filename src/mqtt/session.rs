@@ -4,7 +4,6 @@
 use std::{future::Future, io, time::Duration};
 
 use futures_util::{SinkExt, StreamExt};
-use lookdown_common::Backoff;
 use rumqttc::{
     Codec, ConnAck, Connect, ConnectReturnCode, LastWill, Packet, Publish, QoS, Subscribe,
     SubscribeFilter,
@@ -30,11 +29,6 @@ const PATIENCE: Duration = Duration::from_secs(10);
 const MAX_INCOMING: usize = 64 * 1024;
 /// Most bytes of an outgoing packet: much more than the largest report.
 const MAX_OUTGOING: usize = 16 * 1024 * 1024;
-
-/// Returns the pauses between attempts to connect to the broker.
-pub(super) fn reconnect_backoff() -> Backoff {
-    Backoff::new(Duration::from_secs(1), Duration::from_mins(1))
-}
 
 /// The reason why a connection has ended or could not be opened.
 #[derive(Debug, thiserror::Error)]

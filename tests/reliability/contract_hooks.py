@@ -48,7 +48,12 @@ def filter_case(context, case):
 def form_fields(operation):
     """The fields of an operation's form, by name."""
     form = DOCUMENT["paths"][operation.path][operation.method.lower()]["requestBody"]["content"]["multipart/form-data"]
-    return DOCUMENT["components"]["schemas"][form["schema"]["$ref"].rsplit("/", 1)[-1]]["properties"]
+    return {name: schema(field) for name, field in schema(form["schema"])["properties"].items()}
+
+
+def schema(declared):
+    """The schema itself, or the component that it refers to."""
+    return DOCUMENT["components"]["schemas"][declared["$ref"].rsplit("/", 1)[-1]] if "$ref" in declared else declared
 
 
 def reads_well(name, value, field):

@@ -7,7 +7,7 @@ use lookdown_detect::parameters::DetectParameters;
 use serde_json::Value;
 
 fn document() -> Value {
-    serde_json::to_value(openapi_document()).unwrap()
+    serde_json::to_value(openapi_document().unwrap()).unwrap()
 }
 
 /// The documents of the server and of the counts, with their files.
@@ -211,4 +211,14 @@ fn all_counts_need_a_key_or_the_scope_read() {
         };
         assert_eq!(&operation["security"], expected, "{path}");
     }
+}
+
+#[test]
+fn form_is_the_first_media_type_of_a_body() {
+    let text = serde_json::to_string(&openapi_document().unwrap()).unwrap();
+    let forms = text.matches("\"multipart/form-data\":").count();
+    let first = text
+        .matches("\"content\":{\"multipart/form-data\":")
+        .count();
+    assert!(forms > 0 && forms == first, "{first} of {forms} are first");
 }

@@ -101,11 +101,11 @@ impl<'a> Number<'a> {
     /// The ID of its entity within the device of its owner.
     pub(super) fn entity(self) -> String {
         match self {
-            Self::Persons => "tracked".to_owned(),
-            Self::Crossings { line, direction } => format!("line_{line}_{direction}"),
-            Self::ZonePersons { zone } => format!("tracked_in_{zone}"),
-            Self::Entries { zone } => format!("entries_{zone}"),
-            Self::DwellSeconds { zone } => format!("dwell_{zone}"),
+            Self::Persons => "count_tracked".to_owned(),
+            Self::Crossings { line, direction } => format!("count_line_{line}_{direction}"),
+            Self::ZonePersons { zone } => format!("count_tracked_in_{zone}"),
+            Self::Entries { zone } => format!("count_entries_{zone}"),
+            Self::DwellSeconds { zone } => format!("count_dwell_{zone}"),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::{sync::Arc, time::Duration};
 
-use lookdown_common::text::one_line;
+use lookdown_common::{Backoff, text::one_line};
 use redis::{RedisResult, aio::MultiplexedConnection};
 use tokio::time::{Instant, sleep};
 
@@ -13,7 +13,6 @@ use super::{
 };
 use crate::results::ReportId;
 
-/// Pause before the second attempt to connect. Each pause is twice as long as the one before.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
 const LONGEST_PAUSE: Duration = Duration::from_secs(5);
 
@@ -28,7 +27,7 @@ struct Session {
 /// Connects for as long as the server runs. A loss and a reconnection are logged once each.
 pub(super) async fn keep(shared: Arc<Shared>) {
     let address = &shared.options.address;
-    let mut pause = FIRST_PAUSE;
+    let mut backoff = Backoff::new(FIRST_PAUSE, LONGEST_PAUSE);
     let mut positions = Positions::new();
     let mut loss_was_logged = false;
     for number in 1.. {
@@ -58,9 +57,7 @@ pub(super) async fn keep(shared: Arc<Shared>) {
                     problem = shared.link.lost() => problem,
                 };
                 shared.followed.clear();
-                if began.elapsed() > LONGEST_PAUSE {
-                    pause = FIRST_PAUSE;
-                }
+                backoff.reset_if_stable(began.elapsed());
                 problem
             }
         };
@@ -71,8 +68,7 @@ pub(super) async fn keep(shared: Arc<Shared>) {
             );
             loss_was_logged = true;
         }
-        sleep(pause).await;
-        pause = LONGEST_PAUSE.min(2 * pause);
+        sleep(backoff.next_pause()).await;
     }
 }
 
