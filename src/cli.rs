@@ -138,9 +138,10 @@ fn command(commit: Option<&str>) -> clap::Command {
 }
 
 fn print_openapi(of_counts: bool) -> anyhow::Result<ExitCode> {
-    let document = match of_counts {
-        true => lookdown_count::openapi_document().to_pretty_json()?,
-        false => serde_json::to_string_pretty(&api::openapi_document()?)?,
+    let document = if of_counts {
+        lookdown_count::openapi_document().to_pretty_json()?
+    } else {
+        serde_json::to_string_pretty(&api::openapi_document()?)?
     };
     writeln!(io::stdout(), "{document}").context(UNWRITABLE)?;
     Ok(ExitCode::SUCCESS)

@@ -205,11 +205,12 @@ fn all_counts_need_a_key_or_the_scope_read() {
     let read = serde_json::json!([{}, {"bearer": ["read"]}, {"api_key": ["read"]}]);
     for (path, operation) in operations(&document) {
         let is_public = path == "/livez";
-        let expected = match is_public {
-            true => &serde_json::json!([{}]),
-            false => &read,
+        let expected = if is_public {
+            serde_json::json!([{}])
+        } else {
+            read.clone()
         };
-        assert_eq!(&operation["security"], expected, "{path}");
+        assert_eq!(operation["security"], expected, "{path}");
     }
 }
 

@@ -120,10 +120,8 @@ fn a_clock_that_is_ahead_removes_one_day_at_most() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(&folder.path().join("counts.sqlite")).unwrap();
     let day = DAY_MS / MINUTE_MS;
-    for (number, minute) in [10, 100, day + 100, 3 * day].into_iter().enumerate() {
-        store
-            .commit(&batch(minute, number as u64), &[], None)
-            .unwrap();
+    for (event, minute) in [(0, 10), (1, 100), (2, day + 100), (3, 3 * day)] {
+        store.commit(&batch(minute, event), &[], None).unwrap();
     }
     let hall = Owner::Camera("hall".to_owned());
     let known_days = || {
