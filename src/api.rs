@@ -2,12 +2,10 @@
 //! failure is returned as a problem document.
 
 mod answer;
-mod caller;
 mod companions;
 mod detect_parameters;
 mod http;
 mod in_process;
-mod limit;
 mod openapi;
 mod parameters;
 mod protocols;
@@ -36,8 +34,10 @@ use utoipa_swagger_ui::{Config, SwaggerUi};
 
 use self::{
     http::{
-        connection_limit, cors, drain_body,
-        envelope::{self, Surroundings},
+        connection_limit,
+        context::ContextSource,
+        cors, drain_body,
+        envelope::{self, Envelope},
         rate_limit::{self, RateLimiter},
     },
     protocols::{
@@ -130,10 +130,7 @@ fn metrics() -> OpenApiRouter<ApiState> {
 
 /// The router of the whole service.
 pub fn router(state: ApiState) -> Router {
-    let limiter = state
-        .options
-        .request_rate
-        .map(|rate| RateLimiter::new(rate, &state.options.access));
+    let limiter = state.options.request_rate.map(RateLimiter::new);
     limited_router(state, limiter)
 }
 
@@ -164,19 +161,19 @@ fn limited_router(state: ApiState, limiter: Option<RateLimiter>) -> Router {
         .merge(deepstack::with_failures(deepstack))
         .merge(description)
         .merge(operation(state.options.metrics_elsewhere));
-    surrounded(router.merge(pages()), state)
+    with_common_layers(router.merge(pages()), state)
 }
 
 /// The router of the metrics port: metrics and health checks for operators.
 pub fn operation_router(state: ApiState) -> Router {
-    surrounded(operation(false), state)
+    with_common_layers(operation(false), state)
 }
 
 /// The router for connections beyond the limit: health checks, and metrics unless they have a port
 /// of their own. All other requests are refused.
 pub fn overload_router(state: ApiState) -> Router {
     let router = operation(state.options.metrics_elsewhere);
-    surrounded(router.fallback(connection_limit::refuse), state)
+    with_common_layers(router.fallback(connection_limit::refuse), state)
 }
 
 fn operation(metrics_elsewhere: bool) -> Router<ApiState> {
@@ -193,14 +190,18 @@ fn pages() -> Router<ApiState> {
     web_page::router().merge(api_page)
 }
 
-/// Adds the state and the layers of every route, the outermost first. A router clones and boxes each of its
-/// layers for each request, so all of these are one layer. A panic of a handler fails only its own
-/// request.
-fn surrounded(router: Router<ApiState>, state: ApiState) -> Router {
+/// Adds the state and the layers of every route, the outermost first. A router clones and boxes
+/// each of its layers for each request, so all of these are one layer. A panic of a handler fails
+/// only its own request.
+fn with_common_layers(router: Router<ApiState>, state: ApiState) -> Router {
     let options = &state.options;
-    let surroundings = Surroundings {
+    let envelope = Envelope {
         metrics: state.metrics.clone(),
-        tracer: options.tracer.clone(),
+        contexts: ContextSource {
+            tracer: options.tracer.clone(),
+            access: options.access.clone(),
+            request_timeout: options.request_timeout,
+        },
     };
     let (body_limits, header_limits) = (options.body_limits(), options.header_limits());
     let head_length = HeaderName::from_static(HEAD_LENGTH);
@@ -210,7 +211,7 @@ fn surrounded(router: Router<ApiState>, state: ApiState) -> Router {
     let for_other_origins =
         has_other_origins.then(|| map_response(page_headers::for_other_origins));
     let layers = ServiceBuilder::new()
-        .layer(from_fn_with_state(surroundings, envelope::wrap))
+        .layer(from_fn_with_state(envelope, envelope::wrap))
         .layer(option_layer(cors::layer(
             &options.cors_origins,
             &sent,

@@ -7,7 +7,7 @@ mod form;
 mod names;
 mod received_request;
 
-use std::time::Instant;
+use std::{sync::Arc, time::Instant};
 
 use axum::{
     extract::{FromRequest, Request},
@@ -27,9 +27,8 @@ use crate::{
     access::Scope,
     api::{
         ApiState,
-        caller::Caller,
         http::{
-            deadline::Deadline, problem::Problem, query::query_parameters,
+            caller::Caller, context::RequestContext, problem::Problem, query::query_parameters,
             request_body::UploadBudget,
         },
     },
@@ -43,12 +42,12 @@ pub(super) struct Upload {
     pub(super) file_name: Option<String>,
     /// The headers of the request, such as `Accept`.
     pub(super) headers: HeaderMap,
-    /// The caller.
+    /// The context of the request.
+    pub(super) context: Arc<RequestContext>,
+    /// The caller, by a key in the headers or in the form.
     pub(super) caller: Caller,
     /// Parameters by name. The names are checked, the values are not.
     pub(super) parameters: Vec<(String, String)>,
-    /// The deadline of the response.
-    pub(super) deadline: Deadline,
     /// Time at which the request arrived.
     pub(super) received_at: Timestamp,
     /// Time at which the whole body was in memory.
@@ -59,8 +58,9 @@ impl FromRequest<ApiState> for Upload {
     type Rejection = Problem;
 
     async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
+        let context = RequestContext::of(request.extensions())?;
         let access = &state.options.access;
-        access.check(request.headers(), Scope::Detect)?;
+        access.check(request.headers(), &context.identity, Scope::Detect)?;
         let uri = request.uri().clone();
         let mut upload = Self::receive(request, state, &state.uploads, names::use_of).await?;
         let mut parameters = query_parameters(&uri)?;
@@ -100,9 +100,8 @@ impl Upload {
     ) -> Result<Self, Problem> {
         let ReceivedRequest {
             parts,
-            caller,
+            context,
             body: held,
-            deadline,
             received_at,
             arrived,
         } = ReceivedRequest::receive(request, state, budget).await?;
@@ -117,9 +116,9 @@ impl Upload {
             image: image.into_bytes(),
             file_name,
             headers,
-            caller,
+            caller: context.caller.clone(),
+            context,
             parameters,
-            deadline,
             received_at,
             arrived,
         })

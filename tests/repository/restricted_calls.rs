@@ -1,4 +1,5 @@
-//! Calls that belong in one place each: opening files to read them, and starting processes.
+//! Calls that belong in one place each: opening files to read them, starting processes, and comparing
+//! API keys.
 
 use std::{
     fs,
@@ -37,6 +38,23 @@ const STARTERS: [&str; 2] = [
     "crates/lookdown-watch/src/child.rs",
     // Replaces the process by itself.
     "src/main.rs",
+];
+
+/// Calls that compare the key of a request with all known keys. The layer of the context makes it
+/// once for each request; a stream that goes on repeats it.
+const COMPARISONS: [&str; 2] = [".identify(", ".holder_of("];
+/// The files that may make them.
+const COMPARERS: [&str; 4] = [
+    "src/access/keys.rs",
+    "src/api/http/access.rs",
+    "src/api/http/context.rs",
+    "src/api/require_scope.rs",
+];
+/// The repeated comparison, and the files of the answers that last.
+const REPEATED: [&str; 1] = ["::check_again("];
+const LASTING: [&str; 2] = [
+    "src/api/routes/results/events.rs",
+    "src/api/routes/results/latest.rs",
 ];
 
 /// The source files of all crates without those of tests.
@@ -92,5 +110,15 @@ fn processes_are_started_by_one_module() {
     assert!(
         found.is_empty(),
         "use `child::spawn`, which limits the process: {found:#?}"
+    );
+}
+
+#[test]
+fn keys_are_compared_once_for_each_request() {
+    let mut found = callers(&COMPARISONS, &COMPARERS);
+    found.extend(callers(&REPEATED, &LASTING));
+    assert!(
+        found.is_empty(),
+        "read RequestContext, which holds the identity: {found:#?}"
     );
 }
