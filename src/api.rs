@@ -1,23 +1,18 @@
 //! The HTTP API: the table of routes and the layers around them. No other module uses HTTP. Every
 //! failure is returned as a problem document.
 
-mod answer;
 mod companions;
-mod detect_parameters;
+mod detect;
 mod http;
 mod in_process;
 mod openapi;
 mod parameters;
 mod protocols;
 mod readiness;
-mod report;
-mod report_headers;
 mod require_scope;
 mod response_memory;
 mod routes;
-mod run_detection;
 mod state;
-mod upload;
 
 use axum::{
     Extension, Router,
@@ -33,6 +28,7 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
 use self::{
+    detect::headers::{PERSON_COUNT, SERVER_TIMING},
     http::{
         connection_limit,
         context::ContextSource,
@@ -44,7 +40,6 @@ use self::{
         deepstack,
         open_inference::{self, repository},
     },
-    report_headers::{PERSON_COUNT, SERVER_TIMING},
     routes::{
         counts, health,
         openapi::{self as document, DocumentSource},
@@ -56,10 +51,10 @@ use self::{
 
 pub use self::{
     companions::Companions,
+    detect::report::Report,
     http::{access::Access, rate_limit::RequestRate},
     in_process::in_process,
     readiness::{Phase, Readiness},
-    report::Report,
     routes::problems::problem_table,
     state::{ApiOptions, ApiState},
 };

@@ -21,10 +21,10 @@ use self::{
 };
 use crate::api::{
     ApiState,
+    detect::run::run_detection,
     http::problem::{Problem, ProblemKind},
     openapi::{CalibratedDetectionQuery, DetectionQuery},
     require_scope::RequireRead,
-    run_detection::run_detection,
 };
 
 pub(in crate::api) use failures::with_failures;

@@ -12,14 +12,14 @@ use crate::{
     access::Scope,
     api::{
         ApiState,
-        detect_parameters::detect_parameters,
+        detect::defaults::detect_parameters,
+        detect::upload::{FieldUse, Upload, is_multipart},
         http::{
             access,
             context::RequestContext,
             problem::{Problem, ProblemKind},
             query::query_parameters,
         },
-        upload::{FieldUse, Upload, is_multipart},
     },
 };
 

@@ -18,8 +18,8 @@ use super::{
 };
 use crate::api::{
     ApiState,
+    detect::run::wait_for_workers,
     http::{context::RequestContext, problem::Problem, query::pairs, request_body::Held},
-    run_detection::wait_for_workers,
 };
 
 const INPUT: &str = "views";

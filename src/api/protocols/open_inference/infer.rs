@@ -12,9 +12,9 @@ use super::{
 };
 use crate::api::{
     ApiState,
+    detect::upload::ReceivedRequest,
     http::{problem::Problem, rate_limit::RequestTokens},
     openapi::RawBytes,
-    upload::ReceivedRequest,
 };
 
 /// Run inference

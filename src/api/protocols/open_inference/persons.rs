@@ -19,11 +19,11 @@ use super::{
 };
 use crate::api::{
     ApiState,
-    detect_parameters::detect_parameters,
+    detect::defaults::detect_parameters,
+    detect::headers::{PERSON_COUNT, report_headers},
+    detect::report::ReportPerson,
+    detect::run::{AnswerInput, Answered, run_detection},
     http::{context::RequestContext, problem::Problem, query::pairs, rate_limit::RequestTokens},
-    report::ReportPerson,
-    report_headers::{PERSON_COUNT, report_headers},
-    run_detection::{Answered, DetectionOutcome, run_detection},
 };
 
 /// The model that detects persons in frames.
@@ -139,9 +139,8 @@ async fn detect(
     if let Some(tokens) = tokens {
         tokens.take()?;
     }
-    let write = |found: DetectionOutcome<'_>| {
-        Ok(FrameOutputs::of(&found.report.persons, found.json.clone()))
-    };
+    let write =
+        |found: AnswerInput<'_>| Ok(FrameOutputs::of(&found.report.persons, found.json.clone()));
     run_detection(state, context, job, write).await
 }
 

@@ -17,6 +17,7 @@ use super::{NO_CACHE, address::CameraAddress, unknown};
 use crate::{
     api::{
         ApiState,
+        detect::report::Report,
         http::{
             caller::Caller,
             deadline::Deadline,
@@ -24,7 +25,6 @@ use crate::{
             problem::Problem,
             query::parameters_named,
         },
-        report::Report,
         require_scope::RequireRead,
     },
     results::{Cameras, StoredReport},

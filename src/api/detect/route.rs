@@ -11,14 +11,14 @@ use lookdown_detect::pipeline::DetectJob;
 
 use crate::api::{
     ApiState,
-    answer::{AnswerOptions, Content},
-    detect_parameters::detect_parameters,
+    detect::answer::{AnswerOptions, Content},
+    detect::defaults::detect_parameters,
+    detect::headers::report_headers,
+    detect::report::Report,
+    detect::run::{AnswerInput, run_detection},
+    detect::upload::Upload,
     http::{problem::Problem, query::pairs},
     openapi::{DetectForm, DetectQuery, RawBytes},
-    report::Report,
-    report_headers::report_headers,
-    run_detection::{DetectionOutcome, run_detection},
-    upload::Upload,
 };
 
 /// Detect persons
@@ -64,7 +64,7 @@ pub(in crate::api) async fn detect_persons(
     let context = Arc::clone(&upload.context);
     context.note_upload(upload.arrived);
     let (job, answer) = job(&state, upload)?;
-    let write = move |found: DetectionOutcome<'_>| answer.content(found.detected, found.json);
+    let write = move |input: AnswerInput<'_>| answer.content(input.frame, input.json);
     let answered = run_detection(&state, &context, job, write).await?;
     let headers = AppendHeaders(report_headers(&answered.report));
     let Content { media_type, bytes } = answered.answer;

@@ -9,37 +9,37 @@ use std::{
 use bytes::Bytes;
 use lookdown_detect::{
     imaging::annotate::Concealment,
-    pipeline::{DetectJob, Detected, DetectionReport, PipelineError, Timeline},
+    pipeline::{DetectJob, DetectedFrame, DetectionReport, PipelineError, Timeline},
 };
 
 use crate::{
     annotated_image::StoredFrame,
     api::{
         ApiState,
+        detect::report::Report,
         http::{context::RequestContext, problem::Problem},
-        report::Report,
     },
     metrics::Metrics,
     results::{NewPicture, NewReport},
     telemetry::RequestTrace,
 };
 
-/// The input of a response writer.
-pub(super) struct DetectionOutcome<'a> {
+/// What a response is written from.
+pub(in crate::api) struct AnswerInput<'a> {
     /// The frame and its detections.
-    pub(super) detected: Detected,
+    pub(in crate::api) frame: DetectedFrame,
     /// The report.
-    pub(super) report: &'a Report,
+    pub(in crate::api) report: &'a Report,
     /// The report as stored JSON.
-    pub(super) json: &'a Bytes,
+    pub(in crate::api) json: &'a Bytes,
 }
 
 /// An answered request.
-pub(super) struct Answered<T> {
+pub(in crate::api) struct Answered<T> {
     /// The report.
-    pub(super) report: DetectionReport,
+    pub(in crate::api) report: DetectionReport,
     /// The response of the writer.
-    pub(super) answer: T,
+    pub(in crate::api) answer: T,
 }
 
 /// The report as stored JSON, and the response of the writer.
@@ -57,11 +57,11 @@ struct Finished<T> {
 
 /// Detects the persons in a frame. `write` builds the response while the frame still holds its
 /// permit.
-pub(super) async fn run_detection<T: Send + 'static>(
+pub(in crate::api) async fn run_detection<T: Send + 'static>(
     state: &ApiState,
     context: &RequestContext,
     job: DetectJob,
-    write: impl FnOnce(DetectionOutcome<'_>) -> Result<T, Problem> + Send + 'static,
+    write: impl FnOnce(AnswerInput<'_>) -> Result<T, Problem> + Send + 'static,
 ) -> Result<Answered<T>, Problem> {
     let timeout = job.parameters.timeout;
     let timeline = job.ticket.timeline.clone();
@@ -99,7 +99,7 @@ pub(super) async fn run_detection<T: Send + 'static>(
 
 /// Waits for work of the worker threads until the deadline, or until the timeout of the request
 /// itself. Adds the stages of the work to the trace.
-pub(super) async fn wait_for_workers<T>(
+pub(in crate::api) async fn wait_for_workers<T>(
     context: &RequestContext,
     timeout: Option<Duration>,
     timeline: &Timeline,
@@ -118,14 +118,14 @@ pub(super) async fn wait_for_workers<T>(
 
 /// Serialises the report for the result store and the response.
 fn written<T>(
-    detected: Detected,
-    write: impl FnOnce(DetectionOutcome<'_>) -> Result<T, Problem>,
+    detected: DetectedFrame,
+    write: impl FnOnce(AnswerInput<'_>) -> Result<T, Problem>,
 ) -> Result<Written<T>, Problem> {
     let report = Report::from(&detected.report);
     let json = serde_json::to_vec(&report).map_err(Problem::internal)?;
     let json = Bytes::from(json);
-    let answer = write(DetectionOutcome {
-        detected,
+    let answer = write(AnswerInput {
+        frame: detected,
         report: &report,
         json: &json,
     })?;
@@ -133,7 +133,7 @@ fn written<T>(
 }
 
 /// Returns the image to store with the report. A failure here does not fail the request.
-fn picture(detected: &Detected, concealment: Option<Concealment>) -> Option<NewPicture> {
+fn picture(detected: &DetectedFrame, concealment: Option<Concealment>) -> Option<NewPicture> {
     match StoredFrame::of(detected, concealment) {
         Ok(kept) => Some(NewPicture {
             frame: kept.jpeg,
