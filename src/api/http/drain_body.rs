@@ -12,7 +12,7 @@ use axum::{
     body::{Body, HttpBody},
     extract::{Request, State},
     http::{
-        HeaderValue, StatusCode,
+        HeaderValue, StatusCode, Version,
         header::{CONNECTION, EXPECT},
     },
     middleware::Next,
@@ -51,7 +51,8 @@ pub(in crate::api) async fn discard(
         Ok(context) => context.deadline,
         Err(problem) => return problem.into_response(),
     };
-    if body.is_end_stream() {
+    if body.is_end_stream() || parts.version >= Version::HTTP_2 {
+        // An HTTP/2 client receives the response while it sends.
         return next.run(Request::from_parts(parts, body)).await;
     }
     // A client with `Expect: 100-continue` sends nothing until the server starts to read.
