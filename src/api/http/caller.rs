@@ -3,7 +3,7 @@
 
 use std::net::{IpAddr, SocketAddr};
 
-use axum::{extract::FromRequestParts, http::request::Parts};
+use axum::http::request::Parts;
 use lookdown_detect::{
     fairness::{Client, PriorityLevel},
     parameters::Priority,
@@ -14,7 +14,6 @@ use lookdown_http::request_id::RequestId;
 
 use super::{
     access::{Access, Identity},
-    context::RequestContext,
     problem::{Problem, ProblemKind},
 };
 use crate::access::Holder;
@@ -90,14 +89,6 @@ impl Caller {
             priority,
             ..self.ticket()
         })
-    }
-}
-
-impl<S: Sync> FromRequestParts<S> for Caller {
-    type Rejection = Problem;
-
-    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Problem> {
-        Ok(RequestContext::of(&parts.extensions)?.caller.clone())
     }
 }
 

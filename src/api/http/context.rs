@@ -6,7 +6,10 @@ use std::{
     time::{Duration, Instant},
 };
 
-use axum::http::{Extensions, request::Parts};
+use axum::{
+    extract::FromRequestParts,
+    http::{Extensions, request::Parts},
+};
 use lookdown_http::request_id::RequestId;
 
 use super::{
@@ -72,5 +75,21 @@ impl RequestContext {
     pub(in crate::api) fn note_upload(&self, arrived: Instant) {
         let began = self.deadline.began().into_std();
         self.trace.stage("upload", began, arrived);
+    }
+}
+
+impl<S: Sync> FromRequestParts<S> for Deadline {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Problem> {
+        Ok(RequestContext::of(&parts.extensions)?.deadline)
+    }
+}
+
+impl<S: Sync> FromRequestParts<S> for Caller {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Problem> {
+        Ok(RequestContext::of(&parts.extensions)?.caller.clone())
     }
 }

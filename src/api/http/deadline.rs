@@ -2,17 +2,13 @@
 
 use std::{future::Future, time::Duration};
 
-use axum::{extract::FromRequestParts, http::request::Parts};
 use lookdown_detect::pipeline::PipelineError;
 use tokio::{
     task::spawn_blocking,
     time::{Instant, timeout_at},
 };
 
-use super::{
-    context::RequestContext,
-    problem::{Problem, ProblemKind},
-};
+use super::problem::{Problem, ProblemKind};
 
 /// The setting of the limit.
 const REQUEST_TIMEOUT: &str = "server.request_timeout_millis";
@@ -102,13 +98,5 @@ impl Deadline {
             Problem::new(ProblemKind::Timeout, detail)
         })?;
         done.map_err(Problem::internal)?.map_err(Into::into)
-    }
-}
-
-impl<S: Sync> FromRequestParts<S> for Deadline {
-    type Rejection = Problem;
-
-    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Problem> {
-        Ok(RequestContext::of(&parts.extensions)?.deadline)
     }
 }
