@@ -54,6 +54,7 @@ pub use self::{
     detect::report::Report,
     http::{access::Access, rate_limit::RequestRate},
     in_process::in_process,
+    openapi::Document,
     readiness::{Phase, Readiness},
     routes::problems::problem_table,
     state::{ApiOptions, ApiState},
@@ -69,9 +70,11 @@ fn routes() -> OpenApiRouter<ApiState> {
 }
 
 /// Returns the OpenAPI document of all routes.
-#[must_use]
-pub fn openapi_document() -> utoipa::openapi::OpenApi {
-    openapi::complete(routes().into_openapi())
+///
+/// # Errors
+/// A document that is not JSON.
+pub fn openapi_document() -> serde_json::Result<Document> {
+    Document::of(&openapi::complete(routes().into_openapi()))
 }
 
 /// The routes of the native API and of the Open Inference Protocol.

@@ -48,6 +48,9 @@ pub(super) struct Arguments {
     /// IP address and port to listen on, such as 0.0.0.0:8080 (`server.listen`)
     #[arg(long, value_name = "ADDRESS:PORT")]
     listen: Option<String>,
+    /// Port to listen on, at the address of `server.listen`
+    #[arg(long, conflicts_with = "listen")]
+    port: Option<u16>,
     /// The file of the counts (`counts.path`) [default: counts.sqlite]
     #[arg(long, value_name = "FILE")]
     store: Option<String>,
@@ -71,6 +74,9 @@ pub(super) fn run(arguments: &Arguments, commit: Option<&str>) -> anyhow::Result
     }
     let camera = source.map(|source| arguments.camera.entry(source, Some(CAMERA)));
     let mut settings = source_of_settings.load()?;
+    if let Some(port) = arguments.port {
+        settings.server.listen.set_port(port);
+    }
     check(&settings)?;
     let key = own_key(&mut settings)?;
     let runtime = runtime::Builder::new_multi_thread()

@@ -41,6 +41,9 @@ pub(super) struct Arguments {
     /// IP address and port to listen on, such as 0.0.0.0:8080 (`server.listen`)
     #[arg(long, value_name = "ADDRESS:PORT")]
     listen: Option<String>,
+    /// Port to listen on, at the address of `server.listen`
+    #[arg(long, conflicts_with = "listen")]
+    port: Option<u16>,
     #[command(flatten)]
     settings_file: SettingsFile,
 }
@@ -51,7 +54,10 @@ pub(super) fn run(arguments: &Arguments, commit: Option<&str>) -> anyhow::Result
     let flags: Vec<_> = listen
         .map(|address| ("server.listen".to_owned(), address.clone()))
         .collect();
-    let settings = arguments.settings_file.load_with(&flags)?;
+    let mut settings = arguments.settings_file.load_with(&flags)?;
+    if let Some(port) = arguments.port {
+        settings.server.listen.set_port(port);
+    }
     let runtime = runtime::Builder::new_multi_thread()
         .worker_threads(runtime_threads())
         .enable_all()

@@ -200,6 +200,19 @@ fn cameras_of_the_settings_file_are_counted() {
 }
 
 #[test]
+fn it_runs_without_certificates_of_authorities() {
+    let folder = tempfile::tempdir().unwrap();
+    let variables = [
+        ("SSL_CERT_FILE", "/dev/null"),
+        ("SSL_CERT_DIR", folder.path().to_str().unwrap()),
+    ];
+    let store = folder.path().join("counts.sqlite");
+    let running = Running::start(&["run", "--store", store.to_str().unwrap()], &variables);
+    running.until("/counts", "", "200 OK", || ());
+    running.interrupt();
+}
+
+#[test]
 fn a_camera_that_is_added_is_there_after_a_restart() {
     let folder = tempfile::tempdir().unwrap();
     let state = folder.path().join("state");

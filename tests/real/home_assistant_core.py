@@ -33,11 +33,11 @@ def prepare(folder: Path, port: int, user: str, password: str) -> None:
 
 
 def snapshot(hass) -> dict:
-    """The entities of the integration with their states, and their devices."""
+    """The enabled entities of the integration with their states, and their devices."""
     entities, devices = entity_registry.async_get(hass), device_registry.async_get(hass)
     found = {}
     for entry in entities.entities.values():
-        if entry.platform != "mqtt":
+        if entry.platform != "mqtt" or entry.disabled_by is not None:
             continue
         state, device = hass.states.get(entry.entity_id), devices.async_get(entry.device_id or "")
         found[entry.unique_id] = {

@@ -81,7 +81,8 @@ class DebianPackage(unittest.TestCase):
         changes.write_text("[Service]\nWatchdogSec=2\n", encoding="utf-8")
         log = ROOT / "target" / "deb" / "console.log"
         with booted(chroot.root, log) as system:
-            self.assertEqual(system.show(SERVICE, "ActiveState"), "active")
+            said = system.run("sh", "-c", f"journalctl --no-pager --unit={SERVICE}; true")
+            self.assertEqual(system.show(SERVICE, "ActiveState"), "active", said)
             self.assertNotEqual(system.run("stat", "--format=%U", f"/proc/{system.show(SERVICE, 'MainPID')}"), "root")
 
             server = f"http://127.0.0.1:{port}"

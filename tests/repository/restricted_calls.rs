@@ -1,5 +1,5 @@
-//! Calls that belong in one place each: opening files to read them, starting processes, and comparing
-//! API keys.
+//! Calls that belong in few places: opening files to read them, starting processes, comparing API
+//! keys, and reading the clock, which jumps.
 
 use std::{
     fs,
@@ -55,6 +55,32 @@ const REPEATED: [&str; 1] = ["::check_again("];
 const LASTING: [&str; 2] = [
     "src/api/routes/results/events.rs",
     "src/api/routes/results/latest.rs",
+];
+
+/// Calls that read the clock of the machine. Everything that waits or limits uses the monotonic clock.
+const CLOCKS: [&str; 3] = ["SystemTime::now()", "Timestamp::now()", "Zoned::now()"];
+/// The files that may make them: they date reports, and compare with the dates of others.
+/// docs/lab/reliability.md states what holds when the clock jumps.
+const CLOCK_READERS: [&str; 18] = [
+    "crates/lookdown-count/src/follower.rs",
+    "crates/lookdown-count/src/http/shared.rs",
+    "crates/lookdown-count/src/now.rs",
+    "crates/lookdown-count/src/run.rs",
+    "crates/lookdown-count/src/webhooks/delivery.rs",
+    "crates/lookdown-detect/src/pipeline/job.rs",
+    "crates/lookdown-watch/src/source/folder.rs",
+    "crates/lookdown-watch/src/source/sink.rs",
+    "src/api/protocols/open_inference/persons.rs",
+    "src/api/routes/results.rs",
+    "src/api/routes/results/followed.rs",
+    "src/api/detect/upload/received_request.rs",
+    "src/calibration_store/store/folder.rs",
+    "src/mqtt/publisher.rs",
+    "src/results/memory.rs",
+    "src/results/redis/sender.rs",
+    "src/telemetry/request_trace.rs",
+    // The validity of certificates.
+    "src/tls.rs",
 ];
 
 /// The source files of all crates without those of tests.
@@ -120,5 +146,14 @@ fn keys_are_compared_once_for_each_request() {
     assert!(
         found.is_empty(),
         "read RequestContext, which holds the identity: {found:#?}"
+    );
+}
+
+#[test]
+fn only_listed_files_read_the_clock() {
+    let found = callers(&CLOCKS, &CLOCK_READERS);
+    assert!(
+        found.is_empty(),
+        "use the monotonic clock, or state what holds when the clock jumps: {found:#?}"
     );
 }

@@ -1,6 +1,6 @@
 //! HTTP requests to the server, with its key, its authorities and limits.
 
-use std::time::Duration;
+use std::{sync::OnceLock, time::Duration};
 
 use http_body::Body as _;
 use reqwest::{
@@ -48,10 +48,21 @@ struct Problem {
     detail: String,
 }
 
-/// Starts an HTTP client with a connect timeout, without redirections and proxies.
+/// Starts an HTTP client with a connect timeout, without redirections and proxies. On a system
+/// without certificates of authorities it trusts none: plain HTTP works, and HTTPS needs
+/// authorities of its own.
 pub fn client_builder() -> reqwest::ClientBuilder {
+    static SYSTEM_HAS_AUTHORITIES: OnceLock<bool> = OnceLock::new();
     // Fails when a provider is already installed, which has the same effect.
     let _ = rustls::crypto::ring::default_provider().install_default();
+    if *SYSTEM_HAS_AUTHORITIES.get_or_init(|| bare_builder().build().is_ok()) {
+        bare_builder()
+    } else {
+        bare_builder().tls_certs_only([])
+    }
+}
+
+fn bare_builder() -> reqwest::ClientBuilder {
     Client::builder()
         .connect_timeout(CONNECT_TIMEOUT)
         .pool_idle_timeout(IDLE_TIMEOUT)

@@ -16,7 +16,10 @@ use lookdown_http::{
 use tracing::Instrument;
 use uuid::Uuid;
 
-use super::{context::ContextSource, problem::Problem};
+use super::{
+    context::ContextSource,
+    problem::{Problem, ProblemKind},
+};
 use crate::{metrics::Metrics, telemetry::RequestTrace};
 
 /// The route label of requests that match no route.
@@ -44,7 +47,8 @@ pub(in crate::api) fn of_panic(_: Box<dyn Any + Send>) -> Response {
     Problem::fault().into_response()
 }
 
-/// Adds the context of the request, the request ID, the access log line, the metrics and the problem document.
+/// Adds the context of the request, the request ID, the access log line, the metrics and the problem
+/// document.
 pub(in crate::api) async fn wrap(
     State(Envelope { metrics, contexts }): State<Envelope>,
     request: Request,
@@ -104,16 +108,21 @@ pub(in crate::api) async fn wrap(
     response
 }
 
-/// Writes the access log line: level info for server errors, otherwise debug.
+/// Writes the access log line: level info for unexpected server errors, otherwise debug.
 fn log_answer(status: StatusCode, seconds: f64, failure: Option<&Failure>) {
     let code = status.as_u16();
     let reason = failure.map(|failure| failure.reason);
     let instance = failure.map(|failure| tracing::field::display(failure.occurrence));
-    if status.is_server_error() {
+    if is_unexpected(status, reason) {
         tracing::info!(target: ACCESS_LOG, status = code, seconds, reason, instance, "answered");
     } else {
         tracing::debug!(target: ACCESS_LOG, status = code, seconds, reason, instance, "answered");
     }
+}
+
+/// Returns true for server errors, except those of clients that poll while the server starts.
+fn is_unexpected(status: StatusCode, reason: Option<&str>) -> bool {
+    status.is_server_error() && reason != Some(ProblemKind::WarmingUp.name())
 }
 
 /// Ends the span of the request. Only server errors set its error status.

@@ -1,11 +1,12 @@
 //! The OpenAPI document of the server.
 
 use axum::{Extension, Json};
-use utoipa::openapi::OpenApi;
+
+use crate::api::{http::problem::Problem, openapi::Document};
 
 /// Builds the OpenAPI document of all routes.
 #[derive(Clone, Copy)]
-pub(in crate::api) struct DocumentSource(pub(in crate::api) fn() -> OpenApi);
+pub(in crate::api) struct DocumentSource(pub(in crate::api) fn() -> serde_json::Result<Document>);
 
 /// Get the OpenAPI document
 #[utoipa::path(
@@ -14,6 +15,6 @@ pub(in crate::api) struct DocumentSource(pub(in crate::api) fn() -> OpenApi);
 )]
 pub(in crate::api) async fn openapi_json(
     Extension(DocumentSource(document)): Extension<DocumentSource>,
-) -> Json<OpenApi> {
-    Json(document())
+) -> Result<Json<Document>, Problem> {
+    document().map(Json).map_err(Problem::internal)
 }

@@ -36,3 +36,21 @@ cv2.imwrite("persons.png", frame)
 # %% Other libraries: COCO results, and supervision.
 print(detections.to_coco(image_id=1)[0])
 assert len(detections.to_supervision()) == len(detections)
+
+# %% A notebook shows the frame with the persons. Tables, polygons and GeoJSON.
+shown = detections._repr_html_()
+assert shown is not None and shown.count("<polygon") == len(detections)
+assert detections.to_pandas()["score"].is_monotonic_decreasing
+assert all(polygon.is_valid for polygon in detections.to_shapely())
+assert len(detections.to_geojson()["features"]) == len(detections)
+
+# %% Files are shown as they are. Persons without a frame have no figure.
+shown = detector.detect(samples / "office.jpg", calibration)._repr_html_()
+assert shown is not None and "data:image/jpeg;base64," in shown
+assert lookdown.Detections(detections.report)._repr_html_() is None
+
+# %% Counts of recordings are a table; a recording that is missing is one sentence.
+try:
+    lookdown.count("missing.mp4", calibration=samples / "calibrations" / "office.json")
+except lookdown.LookdownError as error:
+    assert "missing.mp4" in str(error)

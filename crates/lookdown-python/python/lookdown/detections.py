@@ -6,7 +6,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from lookdown.figure import Source, figure
+
 if TYPE_CHECKING:
+    import pandas
+    import shapely
     import supervision
 
 Floats = npt.NDArray[np.float64]
@@ -28,9 +32,10 @@ class Detections:
     report: dict[str, Any]
     """The whole report, as the server sends it."""
 
-    def __init__(self, report: dict[str, Any]) -> None:
-        """Takes a report of the server."""
+    def __init__(self, report: dict[str, Any], image: Source | None = None) -> None:
+        """Takes a report of the server, and the frame for figures in notebooks."""
         persons = report["persons"]
+        self._image = image
         self.report = report
         self.boxes = _array(persons, "box", ("x_min", "y_min", "x_max", "y_max"))
         self.oriented_boxes = _array(persons, "oriented_box", ("cx", "cy", "width", "height", "angle_deg"))
@@ -39,9 +44,9 @@ class Detections:
         self.floor = _array(persons, "floor", ("x_m", "y_m"))
 
     @classmethod
-    def from_json(cls, report: str | bytes) -> "Detections":
+    def from_json(cls, report: str | bytes, image: Source | None = None) -> "Detections":
         """Reads a report as the server sends it."""
-        return cls(json.loads(report))
+        return cls(json.loads(report), image)
 
     def __len__(self) -> int:
         """Returns the number of persons."""
@@ -51,6 +56,10 @@ class Detections:
         """Returns the number of persons and the size of the frame."""
         image = self.report["image"]
         return f"Detections({len(self)} persons, frame {image['width']}×{image['height']})"
+
+    def _repr_html_(self) -> str | None:
+        """Returns the frame with the persons, which a notebook shows."""
+        return None if self._image is None else figure(self._image, self.report, self.corners())
 
     @property
     def zones(self) -> list[list[str]]:
@@ -85,6 +94,38 @@ class Detections:
             class_id=np.zeros(count, dtype=int),
             data={"xyxyxyxy": self.corners().astype(np.float32), "class_name": np.array(["person"] * count)},
         )
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """Converts to a table with a row per person."""
+        import pandas
+
+        columns = [
+            (("score",), self.scores[:, None]),
+            (("x_min", "y_min", "x_max", "y_max"), self.boxes),
+            (("cx", "cy", "width", "height", "angle_deg"), self.oriented_boxes),
+            (("azimuth_deg", "off_axis_deg"), self.bearings),
+            (("x_m", "y_m"), self.floor),
+        ]
+        table = {name: values[:, index] for names, values in columns for index, name in enumerate(names)}
+        return pandas.DataFrame({**table, "zones": self.zones})
+
+    def to_shapely(self) -> "list[shapely.Polygon]":
+        """Converts the oriented boxes to polygons in pixels."""
+        import shapely
+
+        return [shapely.Polygon(corners) for corners in self.corners()]
+
+    def to_geojson(self) -> dict[str, Any]:
+        """Returns the oriented boxes as GeoJSON polygons in pixels, as `format=geojson` of the server has them."""
+        features = [
+            {
+                "type": "Feature",
+                "geometry": {"type": "Polygon", "coordinates": [[*corners, corners[0]]]},
+                "properties": {"score": score},
+            }
+            for corners, score in zip(self.corners().tolist(), self.scores.tolist(), strict=True)
+        ]
+        return {"type": "FeatureCollection", "features": features}
 
     def corners(self) -> Floats:
         """Returns the corners of the oriented boxes, (N, 4, 2) pixels, clockwise from the top left."""

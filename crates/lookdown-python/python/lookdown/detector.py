@@ -52,7 +52,9 @@ class Detector:
             except OSError as error:
                 raise LookdownError(f"image: {os.fspath(image)} cannot be read: {error.strerror}") from error
             report = self._detector.detect_file(content, os.fspath(image), calibration)
-        return Detections.from_json(report)
+        if isinstance(image, np.ndarray) and channel_order == "BGR":
+            image = image[..., ::-1]
+        return Detections.from_json(report, image)
 
     def views(self, calibration: Calibration | Path) -> list[View]:
         """Returns the views of the profile for frames of the calibration, in the order in which the network receives them."""
