@@ -50,9 +50,9 @@ pub(super) async fn bound(State(state): State<ApiState>, request: Request, next:
     };
     let (parts, body) = response.into_parts();
     match to_bytes(body, size).await {
-        Ok(content) => {
-            let content = Held::new(content, share).into_bytes();
-            Response::from_parts(parts, Body::from(content))
+        Ok(held) => {
+            let held = Held::new(held, share).into_bytes();
+            Response::from_parts(parts, Body::from(held))
         }
         Err(error) => Problem::internal(error).into_response(),
     }

@@ -94,8 +94,8 @@ impl FromRequest<ApiState> for NewCamera {
         let (parts, body) = request.into_parts();
         let context = RequestContext::of(&parts.extensions)?;
         let reader = state.body_reader(&context, MAX_BYTES, "send a camera");
-        let content = reader.read(&parts.headers, body).await?.into_bytes();
-        serde_json::from_slice(&content).map_err(|error| {
+        let bytes = reader.read(&parts.headers, body).await?.into_bytes();
+        serde_json::from_slice(&bytes).map_err(|error| {
             // The value is not repeated: it may hold a password.
             let fault = format!("line {}: not a camera: compare it with /docs", error.line());
             Problem::of_parameter(ProblemKind::InvalidParameter, "body", &fault)

@@ -81,6 +81,6 @@ async fn content(request: Request, state: &ApiState) -> Result<(Bytes, Uri), Pro
     let remedy = "send a calibration file";
     let max_bytes = CalibrationFile::MAX_BYTES;
     let reader = state.body_reader(&context, max_bytes, remedy);
-    let content = reader.read(&parts.headers, body).await?;
-    Ok((content.into_bytes(), parts.uri))
+    let bytes = reader.read(&parts.headers, body).await?;
+    Ok((bytes.into_bytes(), parts.uri))
 }

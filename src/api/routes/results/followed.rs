@@ -43,8 +43,8 @@ impl FromRequest<ApiState> for FollowedPersons {
         let context = RequestContext::of(&parts.extensions)?;
         let remedy = "send an object such as {\"persons\": 5}";
         let reader = state.body_reader(&context, MAX_BYTES, remedy);
-        let content = reader.read(&parts.headers, body).await?.into_bytes();
-        let sent: Self = serde_json::from_slice(&content).map_err(|error| {
+        let bytes = reader.read(&parts.headers, body).await?.into_bytes();
+        let sent: Self = serde_json::from_slice(&bytes).map_err(|error| {
             Problem::new(
                 ProblemKind::InvalidParameter,
                 format!("the body: {error}: {remedy}"),
