@@ -18,7 +18,6 @@ mod serve;
 mod server_flags;
 mod settings_file;
 mod shell;
-mod tune;
 mod watch;
 
 use std::{
@@ -69,8 +68,6 @@ enum Command {
     /// Create API keys
     #[command(subcommand)]
     Key(key::Command),
-    /// Measure which sessions, threads and batches are fastest on this machine
-    Tune(tune::Arguments),
     /// Print the OpenAPI document
     #[command(hide = true)]
     Openapi {
@@ -107,7 +104,6 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, commit: Option<&str>) 
         Command::Calibration(command) => calibration::run(&command),
         Command::Model(command) => model::run(&command),
         Command::Key(command) => key::run(&command),
-        Command::Tune(arguments) => tune::run(&arguments),
         Command::Openapi { counts } => print_openapi(counts),
         Command::Completions(arguments) => shell::print_completions(&arguments),
         Command::Manual(arguments) => shell::write_manual(&arguments, command(commit)),

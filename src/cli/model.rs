@@ -17,7 +17,7 @@ use lookdown_detect::{
     imaging::ViewBatch,
     inference::{Detector, InferenceError, OnnxDetector},
     parameters::DetectParameters,
-    pipeline::{DetectJob, Detected, JobImage},
+    pipeline::{DetectJob, DetectedFrame, JobImage},
 };
 
 use super::{SettingsFile, annotate};
@@ -156,7 +156,7 @@ fn time(detector: &mut OnnxDetector, views: usize) -> Result<Duration, Inference
 }
 
 /// Detects persons in the sample with the model of the settings.
-fn detect(settings: &Settings, sample: &Path, profile: &str) -> anyhow::Result<Detected> {
+fn detect(settings: &Settings, sample: &Path, profile: &str) -> anyhow::Result<DetectedFrame> {
     let parameters = DetectParameters::parse([("profile", profile)])?;
     let engine = engine_for(settings, std::slice::from_ref(&parameters))?;
     let image = files::read(sample, MAX_IMAGE_BYTES)

@@ -301,7 +301,7 @@ pub struct ReportTimings {
 
 impl ReportTimings {
     /// Returns every stage by name, the total last.
-    pub(super) fn stages(&self) -> [(&'static str, f64); 7] {
+    pub(in crate::api) fn stages(&self) -> [(&'static str, f64); 7] {
         [
             ("decode", self.decode),
             ("calibrate", self.calibrate),

@@ -5,10 +5,10 @@ mod format;
 
 use axum::http::HeaderMap;
 use bytes::Bytes;
-use lookdown_detect::pipeline::{Detected, PipelineError};
+use lookdown_detect::pipeline::{DetectedFrame, PipelineError};
 
 use self::format::AnswerFormat;
-pub(super) use self::format::TABLE;
+pub(in crate::api) use self::format::TABLE;
 use crate::{
     annotated_image::{AnnotationError, AnnotationOptions, annotated_image},
     annotation_formats::AnnotatedImage,
@@ -22,7 +22,7 @@ use crate::{
 const NAMELESS: &str = "frame";
 
 /// The requested form of the response.
-pub(super) struct AnswerOptions {
+pub(in crate::api) struct AnswerOptions {
     format: AnswerFormat,
     picture: AnnotationOptions,
     /// The file name of the frame as the client sent it.
@@ -30,14 +30,14 @@ pub(super) struct AnswerOptions {
 }
 
 /// The content of a response.
-pub(super) struct Content {
-    pub(super) media_type: &'static str,
-    pub(super) bytes: Bytes,
+pub(in crate::api) struct Content {
+    pub(in crate::api) media_type: &'static str,
+    pub(in crate::api) bytes: Bytes,
 }
 
 impl AnswerOptions {
     /// Takes the parameters of the response out of those of a request.
-    pub(super) fn take_from(
+    pub(in crate::api) fn take_from(
         given: &mut Vec<(String, String)>,
         headers: &HeaderMap,
         file_name: Option<String>,
@@ -52,7 +52,7 @@ impl AnswerOptions {
     }
 
     /// Returns the width of the annotated image, pixels; 0 for other formats.
-    pub(super) fn drawn_width(&self) -> u32 {
+    pub(in crate::api) fn drawn_width(&self) -> u32 {
         match self.format {
             AnswerFormat::Picture(_) => self.picture.width,
             AnswerFormat::Report | AnswerFormat::Annotations(..) => 0,
@@ -61,7 +61,11 @@ impl AnswerOptions {
 
     /// Builds the response for a frame whose report is `json`. Drawing blocks: call it on a worker
     /// thread.
-    pub(super) fn content(self, detected: Detected, json: &Bytes) -> Result<Content, Problem> {
+    pub(in crate::api) fn content(
+        self,
+        detected: DetectedFrame,
+        json: &Bytes,
+    ) -> Result<Content, Problem> {
         let report = &detected.report;
         let bytes = match self.format {
             AnswerFormat::Report => json.clone(),

@@ -4,11 +4,11 @@
 use lookdown_detect::parameters::{DefaultSource, DetectParameters, ParameterError};
 use lookdown_lens::calibration::CalibrationId;
 
-use super::ApiState;
+use crate::api::ApiState;
 
 /// Checks the parameters of a request. `protocol` has the defaults of the request's protocol, which
 /// apply where neither the calibration nor the server has one.
-pub(super) fn detect_parameters<'a>(
+pub(in crate::api) fn detect_parameters<'a>(
     state: &ApiState,
     mut given: Vec<(&'a str, &'a str)>,
     protocol: &[(&'a str, &'a str)],

@@ -1,26 +1,24 @@
 //! `POST /detect`: detects the persons in one frame.
 
+use std::sync::Arc;
+
 use axum::{
-    Extension,
     extract::State,
     http::{HeaderValue, header::CONTENT_TYPE},
     response::{AppendHeaders, IntoResponse},
 };
 use lookdown_detect::pipeline::DetectJob;
 
-use crate::{
-    api::{
-        ApiState,
-        answer::AnswerOptions,
-        detect_parameters::detect_parameters,
-        http::{problem::Problem, query::pairs},
-        openapi::{DetectForm, DetectQuery, RawBytes},
-        report::Report,
-        report_headers::report_headers,
-        run_detection::{DetectionOutcome, run_detection},
-        upload::Upload,
-    },
-    telemetry::RequestTrace,
+use crate::api::{
+    ApiState,
+    detect::answer::{AnswerOptions, Content},
+    detect::defaults::detect_parameters,
+    detect::headers::report_headers,
+    detect::report::Report,
+    detect::run::{AnswerInput, run_detection},
+    detect::upload::Upload,
+    http::{problem::Problem, query::pairs},
+    openapi::{DetectForm, DetectQuery, RawBytes},
 };
 
 /// Detect persons
@@ -61,20 +59,17 @@ use crate::{
 )]
 pub(in crate::api) async fn detect_persons(
     State(state): State<ApiState>,
-    Extension(trace): Extension<RequestTrace>,
     upload: Upload,
 ) -> Result<impl IntoResponse, Problem> {
-    let deadline = upload.deadline;
-    trace.stage("upload", deadline.began().into_std(), upload.arrived);
+    let context = Arc::clone(&upload.context);
+    context.note_upload(upload.arrived);
     let (job, answer) = job(&state, upload)?;
-    let write = move |found: DetectionOutcome<'_>| answer.content(found.detected, found.json);
-    let (report, content) = run_detection(&state, &trace, deadline, job, write).await?;
-    let media_type = [(CONTENT_TYPE, HeaderValue::from_static(content.media_type))];
-    Ok((
-        AppendHeaders(report_headers(&report)),
-        media_type,
-        content.bytes,
-    ))
+    let write = move |input: AnswerInput<'_>| answer.content(input.frame, input.json);
+    let answered = run_detection(&state, &context, job, write).await?;
+    let headers = AppendHeaders(report_headers(&answered.report));
+    let Content { media_type, bytes } = answered.answer;
+    let media_type = [(CONTENT_TYPE, HeaderValue::from_static(media_type))];
+    Ok((headers, media_type, bytes))
 }
 
 fn job(state: &ApiState, mut upload: Upload) -> Result<(DetectJob, AnswerOptions), Problem> {

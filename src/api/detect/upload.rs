@@ -7,7 +7,7 @@ mod form;
 mod names;
 mod received_request;
 
-use std::time::Instant;
+use std::{sync::Arc, time::Instant};
 
 use axum::{
     extract::{FromRequest, Request},
@@ -17,50 +17,50 @@ use bytes::Bytes;
 use jiff::Timestamp;
 use lookdown_detect::{parameters::DetectParameters, pipeline::DetectJob};
 
-pub(super) use received_request::ReceivedRequest;
+pub(in crate::api) use received_request::ReceivedRequest;
 
 use names::{is_parameter, unknown_parameter};
 
-pub(super) use form::FieldUse;
+pub(in crate::api) use form::FieldUse;
 
 use crate::{
     access::Scope,
     api::{
         ApiState,
-        caller::Caller,
         http::{
-            deadline::Deadline, problem::Problem, query::query_parameters,
+            caller::Caller, context::RequestContext, problem::Problem, query::query_parameters,
             request_body::UploadBudget,
         },
     },
 };
 
 /// A frame in memory with the parameters of its request.
-pub(super) struct Upload {
+pub(in crate::api) struct Upload {
     /// The encoded frame.
-    pub(super) image: Bytes,
+    pub(in crate::api) image: Bytes,
     /// The name of its file, if it was sent.
-    pub(super) file_name: Option<String>,
+    pub(in crate::api) file_name: Option<String>,
     /// The headers of the request, such as `Accept`.
-    pub(super) headers: HeaderMap,
-    /// The caller.
-    pub(super) caller: Caller,
+    pub(in crate::api) headers: HeaderMap,
+    /// The context of the request.
+    pub(in crate::api) context: Arc<RequestContext>,
+    /// The caller, by a key in the headers or in the form.
+    pub(in crate::api) caller: Caller,
     /// Parameters by name. The names are checked, the values are not.
-    pub(super) parameters: Vec<(String, String)>,
-    /// The deadline of the response.
-    pub(super) deadline: Deadline,
+    pub(in crate::api) parameters: Vec<(String, String)>,
     /// Time at which the request arrived.
-    pub(super) received_at: Timestamp,
+    pub(in crate::api) received_at: Timestamp,
     /// Time at which the whole body was in memory.
-    pub(super) arrived: Instant,
+    pub(in crate::api) arrived: Instant,
 }
 
 impl FromRequest<ApiState> for Upload {
     type Rejection = Problem;
 
     async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
+        let context = RequestContext::of(request.extensions())?;
         let access = &state.options.access;
-        access.check(request.headers(), Scope::Detect)?;
+        access.check(request.headers(), &context.identity, Scope::Detect)?;
         let uri = request.uri().clone();
         let mut upload = Self::receive(request, state, &state.uploads, names::use_of).await?;
         let mut parameters = query_parameters(&uri)?;
@@ -78,7 +78,7 @@ impl Upload {
     ///
     /// # Errors
     /// [`Problem`] if the caller may not use the priority.
-    pub(super) fn job(self, parameters: DetectParameters) -> Result<DetectJob, Problem> {
+    pub(in crate::api) fn job(self, parameters: DetectParameters) -> Result<DetectJob, Problem> {
         let ticket = self.caller.ticket_at(parameters.priority)?;
         let (received_at, arrived) = (self.received_at, self.arrived);
         Ok(DetectJob::sent(
@@ -92,7 +92,7 @@ impl Upload {
 
     /// Reads a frame, alone or in a form whose fields `use_of` classifies by name. The body uses
     /// memory of `budget`. The key is not checked here.
-    pub(super) async fn receive(
+    pub(in crate::api) async fn receive(
         request: Request,
         state: &ApiState,
         budget: &UploadBudget,
@@ -100,9 +100,8 @@ impl Upload {
     ) -> Result<Self, Problem> {
         let ReceivedRequest {
             parts,
-            caller,
+            context,
             body: held,
-            deadline,
             received_at,
             arrived,
         } = ReceivedRequest::receive(request, state, budget).await?;
@@ -117,9 +116,9 @@ impl Upload {
             image: image.into_bytes(),
             file_name,
             headers,
-            caller,
+            caller: context.caller.clone(),
+            context,
             parameters,
-            deadline,
             received_at,
             arrived,
         })
@@ -127,7 +126,7 @@ impl Upload {
 }
 
 /// Returns `true` if the body is a multipart form.
-pub(super) fn is_multipart(headers: &HeaderMap) -> bool {
+pub(in crate::api) fn is_multipart(headers: &HeaderMap) -> bool {
     let content_type = headers.get(CONTENT_TYPE);
     content_type.is_some_and(|value| {
         let value = value.as_bytes();

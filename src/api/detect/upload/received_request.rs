@@ -1,6 +1,6 @@
 //! A detection request whose whole body is in memory.
 
-use std::time::Instant;
+use std::{sync::Arc, time::Instant};
 
 use axum::{
     extract::{FromRequest, Request},
@@ -13,9 +13,8 @@ use crate::{
     access::Scope,
     api::{
         ApiState,
-        caller::Caller,
         http::{
-            deadline::Deadline,
+            context::RequestContext,
             problem::Problem,
             request_body::{BodyReader, Held, UploadBudget},
         },
@@ -26,11 +25,8 @@ use crate::{
 /// A complete detection request. As an extractor, it also checks the scope `detect`.
 pub(in crate::api) struct ReceivedRequest {
     pub(in crate::api) parts: Parts,
-    /// The caller by the key in the headers.
-    pub(in crate::api) caller: Caller,
+    pub(in crate::api) context: Arc<RequestContext>,
     pub(in crate::api) body: Held<Bytes>,
-    /// The deadline of the response.
-    pub(in crate::api) deadline: Deadline,
     /// Time at which the request arrived.
     pub(in crate::api) received_at: Timestamp,
     /// Time at which the whole body was in memory.
@@ -41,8 +37,9 @@ impl FromRequest<ApiState> for ReceivedRequest {
     type Rejection = Problem;
 
     async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
+        let context = RequestContext::of(request.extensions())?;
         let access = &state.options.access;
-        access.check(request.headers(), Scope::Detect)?;
+        access.check(request.headers(), &context.identity, Scope::Detect)?;
         Self::receive(request, state, &state.uploads).await
     }
 }
@@ -59,22 +56,21 @@ impl ReceivedRequest {
         if state.readiness.phase() == Phase::WarmingUp {
             return Err(Problem::warming_up());
         }
-        let caller = Caller::of(&parts, state);
+        let context = RequestContext::of(&parts.extensions)?;
+        let client = &context.caller.client;
         // A frame that finds no place in the queue is refused before its body is read.
-        state.workers.admits(&caller.client)?;
-        let deadline = Deadline::of(&parts, state);
+        state.workers.admits(client)?;
         let max_bytes = state.options.max_body_bytes;
         let remedy = "send a smaller image or raise server.max_body_bytes";
         let reader = BodyReader {
-            budget: budget.of(&caller.client),
-            ..state.body_reader(&caller.client, max_bytes, remedy, deadline)
+            budget: budget.of(client),
+            ..state.body_reader(&context, max_bytes, remedy)
         };
         let body = reader.read(&parts.headers, body).await?;
         Ok(Self {
             parts,
-            caller,
+            context,
             body,
-            deadline,
             received_at,
             arrived: Instant::now(),
         })

@@ -5,12 +5,12 @@ use lookdown_detect::pipeline::DetectionReport;
 
 use super::report::ReportTimings;
 
-pub(super) const SERVER_TIMING: HeaderName = HeaderName::from_static("server-timing");
-pub(super) const PERSON_COUNT: HeaderName = HeaderName::from_static("x-person-count");
+pub(in crate::api) const SERVER_TIMING: HeaderName = HeaderName::from_static("server-timing");
+pub(in crate::api) const PERSON_COUNT: HeaderName = HeaderName::from_static("x-person-count");
 
 /// Returns the headers about a report: the number of persons, and the stages as
 /// `Server-Timing: decode;dur=3.1, …, total;dur=412.0` (W3C), milliseconds.
-pub(super) fn report_headers(report: &DetectionReport) -> [(HeaderName, HeaderValue); 2] {
+pub(in crate::api) fn report_headers(report: &DetectionReport) -> [(HeaderName, HeaderValue); 2] {
     let timings = ReportTimings::from(&report.timings);
     let stages = timings
         .stages()

@@ -1,12 +1,9 @@
 //! The caller of a request: the client whose share of the budgets it uses, and its highest permitted
 //! priority.
 
-use std::{
-    convert::Infallible,
-    net::{IpAddr, SocketAddr},
-};
+use std::net::{IpAddr, SocketAddr};
 
-use axum::{extract::FromRequestParts, http::request::Parts};
+use axum::http::request::Parts;
 use lookdown_detect::{
     fairness::{Client, PriorityLevel},
     parameters::Priority,
@@ -16,19 +13,18 @@ use lookdown_detect::{
 use lookdown_http::request_id::RequestId;
 
 use super::{
-    ApiState,
-    http::{
-        access::Access,
-        problem::{Problem, ProblemKind},
-    },
+    access::{Access, Identity},
+    problem::{Problem, ProblemKind},
 };
 use crate::access::Holder;
 
 /// The caller of a request.
 #[derive(Debug, Clone)]
-pub(super) struct Caller {
+pub(in crate::api) struct Caller {
     /// The client for budgets and turns.
-    pub(super) client: Client,
+    pub(in crate::api) client: Client,
+    /// The client for the rate limit: a key or an address, even if no other client exists.
+    pub(super) rate_limited: Client,
     /// The highest priority that the client may use.
     highest_priority: Priority,
     /// The ID of the request.
@@ -36,21 +32,25 @@ pub(super) struct Caller {
 }
 
 impl Caller {
-    /// Returns the caller with the key in this head. The routes check the key itself.
-    pub(super) fn of(parts: &Parts, state: &ApiState) -> Self {
-        let access = &state.options.access;
-        let holder = access.holder(&parts.headers);
+    /// Returns the caller with this identity. The routes check the key itself.
+    pub(super) fn of(
+        access: &Access,
+        identity: &Identity,
+        request_id: &RequestId,
+        parts: &Parts,
+    ) -> Self {
+        let holder = identity.holder();
         let address = parts.extensions.get::<SocketAddr>().map(SocketAddr::ip);
-        let request_id = parts.extensions.get::<RequestId>();
         Self {
-            client: client(access, holder.as_ref(), address),
-            highest_priority: highest_priority(access, holder.as_ref()),
-            request_id: request_id.map_or_else(String::new, |id| id.as_str().to_owned()),
+            client: client(access, holder, address),
+            rate_limited: key_or_address(holder, address),
+            highest_priority: highest_priority(access, holder),
+            request_id: request_id.as_str().to_owned(),
         }
     }
 
     /// Returns this caller with the key that its form holds, if it has one.
-    pub(super) fn with_holder(self, access: &Access, holder: Option<&Holder>) -> Self {
+    pub(in crate::api) fn with_holder(self, access: &Access, holder: Option<&Holder>) -> Self {
         if holder.is_none() {
             return self;
         }
@@ -62,7 +62,7 @@ impl Caller {
     }
 
     /// Returns the ticket of work at normal priority.
-    pub(super) fn ticket(&self) -> Ticket {
+    pub(in crate::api) fn ticket(&self) -> Ticket {
         Ticket {
             client: self.client.clone(),
             request_id: self.request_id.clone(),
@@ -74,7 +74,7 @@ impl Caller {
     ///
     /// # Errors
     /// [`Problem`] if the caller may not use the priority.
-    pub(super) fn ticket_at(&self, priority: Priority) -> Result<Ticket, Problem> {
+    pub(in crate::api) fn ticket_at(&self, priority: Priority) -> Result<Ticket, Problem> {
         if priority < self.highest_priority {
             let (client, highest) = (&self.client, self.highest_priority.highest_level());
             let lowest = PriorityLevel::LOWEST;
@@ -92,25 +92,23 @@ impl Caller {
     }
 }
 
-impl FromRequestParts<ApiState> for Caller {
-    type Rejection = Infallible;
-
-    async fn from_request_parts(parts: &mut Parts, state: &ApiState) -> Result<Self, Infallible> {
-        Ok(Self::of(parts, state))
-    }
-}
-
 fn client(access: &Access, holder: Option<&Holder>, address: Option<IpAddr>) -> Client {
     match (access, holder) {
         (Access::Keys(keys), Some(_)) if keys.known().len() == 1 => Client::Only,
-        (_, Some(holder)) => Client::with_key(holder.name.as_str()),
         (
             Access::Open {
                 own_machine_only: true,
             },
             None,
         ) => Client::Only,
-        (_, None) => address.map_or(Client::Others, Client::at),
+        _ => key_or_address(holder, address),
+    }
+}
+
+fn key_or_address(holder: Option<&Holder>, address: Option<IpAddr>) -> Client {
+    match holder {
+        Some(holder) => Client::with_key(holder.name.as_str()),
+        None => address.map_or(Client::Others, Client::at),
     }
 }
 

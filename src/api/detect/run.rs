@@ -1,47 +1,69 @@
 //! Detection for all routes: waits for the report until the deadline, and counts, traces and stores
 //! it.
 
-use std::sync::Arc;
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use bytes::Bytes;
 use lookdown_detect::{
     imaging::annotate::Concealment,
-    pipeline::{DetectJob, Detected, DetectionReport},
+    pipeline::{DetectJob, DetectedFrame, DetectionReport, PipelineError, Timeline},
 };
 
 use crate::{
     annotated_image::StoredFrame,
     api::{
         ApiState,
-        http::{deadline::Deadline, problem::Problem},
-        limit::Limit,
-        report::Report,
+        detect::report::Report,
+        http::{context::RequestContext, problem::Problem},
     },
     metrics::Metrics,
     results::{NewPicture, NewReport},
     telemetry::RequestTrace,
 };
 
-/// The input of a response writer.
-pub(super) struct DetectionOutcome<'a> {
+/// What a response is written from.
+pub(in crate::api) struct AnswerInput<'a> {
     /// The frame and its detections.
-    pub(super) detected: Detected,
+    pub(in crate::api) frame: DetectedFrame,
     /// The report.
-    pub(super) report: &'a Report,
+    pub(in crate::api) report: &'a Report,
     /// The report as stored JSON.
-    pub(super) json: &'a Bytes,
+    pub(in crate::api) json: &'a Bytes,
+}
+
+/// An answered request.
+pub(in crate::api) struct Answered<T> {
+    /// The report.
+    pub(in crate::api) report: DetectionReport,
+    /// The response of the writer.
+    pub(in crate::api) answer: T,
+}
+
+/// The report as stored JSON, and the response of the writer.
+struct Written<T> {
+    json: Bytes,
+    answer: T,
+}
+
+/// The results of the work on a worker thread.
+struct Finished<T> {
+    report: DetectionReport,
+    picture: Option<NewPicture>,
+    written: Result<Written<T>, Problem>,
 }
 
 /// Detects the persons in a frame. `write` builds the response while the frame still holds its
 /// permit.
-pub(super) async fn run_detection<T: Send + 'static>(
+pub(in crate::api) async fn run_detection<T: Send + 'static>(
     state: &ApiState,
-    trace: &RequestTrace,
-    deadline: Deadline,
+    context: &RequestContext,
     job: DetectJob,
-    write: impl FnOnce(DetectionOutcome<'_>) -> Result<T, Problem> + Send + 'static,
-) -> Result<(DetectionReport, T), Problem> {
-    let limit = Limit::of(deadline, job.parameters.timeout);
+    write: impl FnOnce(AnswerInput<'_>) -> Result<T, Problem> + Send + 'static,
+) -> Result<Answered<T>, Problem> {
+    let timeout = job.parameters.timeout;
     let timeline = job.ticket.timeline.clone();
     let is_stored = job.parameters.store;
     let concealment = state.options.conceal_pictures;
@@ -51,12 +73,17 @@ pub(super) async fn run_detection<T: Send + 'static>(
         let report = detected.report.clone();
         let is_kept = is_stored && pictures_of.include(&report.camera);
         let picture = is_kept.then(|| picture(&detected, concealment)).flatten();
-        (report, picture, written(detected, write))
+        Finished {
+            report,
+            picture,
+            written: written(detected, write),
+        }
     });
-    let (report, picture, written) = limit.wait(trace, &timeline, work).await?;
-    describe(trace, &report);
+    let finished = wait_for_workers(context, timeout, &timeline, work).await?;
+    let report = finished.report;
+    describe(&context.trace, &report);
     record(&state.metrics, &report);
-    let (json, answer) = written?;
+    let Written { json, answer } = finished.written?;
     if is_stored {
         let kept = NewReport {
             camera: report.camera.clone(),
@@ -64,30 +91,49 @@ pub(super) async fn run_detection<T: Send + 'static>(
             persons: report.persons.len(),
             json,
         };
-        state.results.publish(kept, picture);
+        state.results.publish(kept, finished.picture);
         record_zones(state, &report);
     }
-    Ok((report, answer))
+    Ok(Answered { report, answer })
+}
+
+/// Waits for work of the worker threads until the deadline, or until the timeout of the request
+/// itself. Adds the stages of the work to the trace.
+pub(in crate::api) async fn wait_for_workers<T>(
+    context: &RequestContext,
+    timeout: Option<Duration>,
+    timeline: &Timeline,
+    work: impl Future<Output = Result<T, PipelineError>>,
+) -> Result<T, Problem> {
+    let remedy = "send fewer frames or views at a time, use a faster profile for frames";
+    let deadline = context.deadline.within(timeout, "timeout_millis");
+    let done = deadline.wait("no result", remedy, work).await;
+    for span in timeline.spans(Instant::now()) {
+        context
+            .trace
+            .stage(span.stage.name(), span.began, span.ended);
+    }
+    done
 }
 
 /// Serialises the report for the result store and the response.
 fn written<T>(
-    detected: Detected,
-    write: impl FnOnce(DetectionOutcome<'_>) -> Result<T, Problem>,
-) -> Result<(Bytes, T), Problem> {
+    detected: DetectedFrame,
+    write: impl FnOnce(AnswerInput<'_>) -> Result<T, Problem>,
+) -> Result<Written<T>, Problem> {
     let report = Report::from(&detected.report);
     let json = serde_json::to_vec(&report).map_err(Problem::internal)?;
     let json = Bytes::from(json);
-    let answer = write(DetectionOutcome {
-        detected,
+    let answer = write(AnswerInput {
+        frame: detected,
         report: &report,
         json: &json,
     })?;
-    Ok((json, answer))
+    Ok(Written { json, answer })
 }
 
 /// Returns the image to store with the report. A failure here does not fail the request.
-fn picture(detected: &Detected, concealment: Option<Concealment>) -> Option<NewPicture> {
+fn picture(detected: &DetectedFrame, concealment: Option<Concealment>) -> Option<NewPicture> {
     match StoredFrame::of(detected, concealment) {
         Ok(kept) => Some(NewPicture {
             frame: kept.jpeg,
