@@ -3,6 +3,7 @@
 use jiff::{SignedDuration, Timestamp};
 use lookdown_http::problem::Problem;
 use serde::Deserialize;
+use utoipa::IntoParams;
 
 use super::shared::now_ms;
 use crate::{store::Span, sums::MINUTE_MS};
@@ -16,12 +17,21 @@ const DEFAULT_SPAN: i64 = 24 * 60;
 const DEFAULT_STEP: i64 = 15;
 
 /// The parameters as they are sent.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
 pub(super) struct TimeParameters {
+    /// The begin, in whole minutes; a day before `to` if absent.
+    #[param(format = DateTime, nullable = false)]
     from: Option<String>,
+    /// The end; now if absent.
+    #[param(format = DateTime, nullable = false)]
     to: Option<String>,
+    /// A duration of whole minutes, up to a week, such as `1h`; `15m` if absent.
+    #[param(nullable = false)]
     step: Option<String>,
+    /// `json` or `csv`; `Accept: text/csv` if absent.
+    #[param(nullable = false, pattern = "^(json|csv)$")]
     pub(super) format: Option<String>,
 }
 

@@ -9,7 +9,7 @@ use utoipa::{
     },
 };
 
-use crate::api::http::problem::ProblemBody;
+use crate::problem::ProblemBody;
 
 /// The name of the response among the document's components.
 const NAME: &str = "Problem";

@@ -11,7 +11,8 @@ use utoipa::{
 };
 
 /// The two ways to send a key.
-pub(super) struct Keys;
+#[derive(Debug, Clone, Copy)]
+pub struct Keys;
 
 impl Modify for Keys {
     fn modify(&self, document: &mut OpenApi) {
