@@ -118,7 +118,10 @@ pub fn guess_size(inputs: &[OnnxTensor]) -> ((u32, u32), bool) {
 mod tests {
     use super::*;
 
-    fn outputs(shapes: &[(&str, &[i64])]) -> Vec<OnnxTensor> {
+    /// The names and shapes of the outputs of a network.
+    type Shapes<'a> = &'a [(&'a str, &'a [i64])];
+
+    fn outputs(shapes: Shapes<'_>) -> Vec<OnnxTensor> {
         let tensors = shapes.iter().map(|(name, shape)| OnnxTensor {
             name: (*name).to_owned(),
             element: "f32".to_owned(),
@@ -127,14 +130,14 @@ mod tests {
         tensors.collect()
     }
 
-    fn family(shapes: &[(&str, &[i64])]) -> Option<&'static str> {
+    fn family(shapes: Shapes<'_>) -> Option<&'static str> {
         guess_head(&outputs(shapes), (416, 416)).map(|row| row.family)
     }
 
     #[test]
     fn families_are_guessed_from_their_outputs() {
         let queries: &[i64] = &[1, 300, 4];
-        let known: [(&[(&str, &[i64])], &str); 8] = [
+        let known: [(Shapes<'_>, &str); 8] = [
             (&[("output", &[1, 3549, 85])], "YOLOX"),
             (&[("output0", &[1, 84, 3549])], "YOLOv8, YOLO11"),
             (&[("output", &[-1, 3598, 112])], "NanoDet-Plus"),
