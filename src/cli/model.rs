@@ -2,6 +2,7 @@
 
 mod description;
 mod fetch;
+mod manifest;
 
 use std::{
     io::{self, Write},
@@ -58,6 +59,10 @@ pub(super) struct Arguments {
     /// Draw the detected persons into the sample
     #[arg(long, value_name = "OUT.jpg")]
     annotate: Option<PathBuf>,
+    /// First write a `model.toml` beside the ONNX file: guess the head from the outputs, and the
+    /// input from the persons in the sample
+    #[arg(long)]
+    write_manifest: bool,
     #[command(flatten)]
     settings_file: SettingsFile,
 }
@@ -74,6 +79,11 @@ pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
 fn check(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let mut settings = arguments.settings_file.load()?;
     let library = settings.inference.find_library()?;
+    if arguments.write_manifest {
+        let sample = arguments.sample.clone();
+        let sample = sample.or_else(|| find_installed(Path::new(SAMPLE)));
+        manifest::write(&arguments.model, sample.as_deref(), &settings)?;
+    }
     let loading = Instant::now();
     let mut detector = OnnxDetector::load(&library, &arguments.model, &onnx_options(&settings))?;
     let loaded = loading.elapsed();
