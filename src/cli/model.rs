@@ -3,6 +3,7 @@
 mod description;
 mod fetch;
 mod manifest;
+mod sample;
 
 use std::{
     io::{self, Write},
@@ -13,21 +14,15 @@ use std::{
 
 use anyhow::Context;
 use clap::{Args, Subcommand};
-use lookdown_common::files::{self, MAX_IMAGE_BYTES};
 use lookdown_detect::{
     imaging::ViewBatch,
     inference::{Detector, InferenceError, OnnxDetector},
-    parameters::DetectParameters,
-    pipeline::{DetectJob, DetectedFrame, JobImage},
 };
 
+use self::sample::detect;
 use super::{SettingsFile, annotate};
 use crate::cli::output::UNWRITABLE;
-use crate::{
-    annotated_image::AnnotationOptions,
-    app::{engine_for, onnx_options},
-    settings::{Settings, find_installed},
-};
+use crate::{annotated_image::AnnotationOptions, app::onnx_options, settings::find_installed};
 
 /// The default sample image: a fisheye frame.
 const SAMPLE: &str = "samples/office.jpg";
@@ -163,18 +158,4 @@ fn time(detector: &mut OnnxDetector, views: usize) -> Result<Duration, Inference
     }
     times.sort_unstable();
     Ok(times[RUNS / 2])
-}
-
-/// Detects persons in the sample with the model of the settings.
-fn detect(settings: &Settings, sample: &Path, profile: &str) -> anyhow::Result<DetectedFrame> {
-    let parameters = DetectParameters::parse([("profile", profile)])?;
-    let engine = engine_for(settings, std::slice::from_ref(&parameters))?;
-    let image = files::read(sample, MAX_IMAGE_BYTES)
-        .with_context(|| format!("--sample: {} cannot be read", sample.display()))?;
-    Ok(engine.detect(&DetectJob::local(
-        sample.display().to_string(),
-        JobImage::Encoded(image.into()),
-        parameters,
-        None,
-    ))?)
 }

@@ -9,12 +9,12 @@ use std::{
 use anyhow::{Context, bail};
 use lookdown_detect::{
     inference::{GuessedHead, INPUTS, MANIFEST, OnnxDetector, guess_head, guess_size, name_from},
-    pipeline::{Detected, Person},
+    pipeline::{DetectedFrame, Person},
 };
 
 use crate::{
     app::onnx_options,
-    cli::{model::detect, output::UNWRITABLE},
+    cli::{model::sample::detect, output::UNWRITABLE},
     settings::Settings,
 };
 
@@ -151,7 +151,7 @@ impl Guess<'_> {
 }
 
 /// Returns the number of persons whose boxes can be those of people, and the sum of their scores.
-fn plausible(detected: &Detected) -> (usize, f64) {
+fn plausible(detected: &DetectedFrame) -> (usize, f64) {
     let longest = LONGEST_SIDE * f64::from(detected.report.image_width);
     let is_plausible = |person: &&Person| {
         let shape = &person.oriented_box;
