@@ -24,7 +24,7 @@ use crate::{
     telemetry::RequestTrace,
 };
 
-/// What a response is written from.
+/// The input of a response.
 pub(in crate::api) struct AnswerInput<'a> {
     /// The frame and its detections.
     pub(in crate::api) frame: DetectedFrame,

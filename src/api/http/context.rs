@@ -30,7 +30,7 @@ pub(in crate::api) struct ContextSource {
     pub(in crate::api) request_timeout: Duration,
 }
 
-/// What follows from the head of a request.
+/// The facts that follow from the head of a request.
 pub(in crate::api) struct RequestContext {
     pub(in crate::api) id: RequestId,
     pub(in crate::api) trace: RequestTrace,
