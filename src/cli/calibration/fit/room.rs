@@ -37,21 +37,13 @@ pub(super) fn fit(
     let sources = sources(arguments, &fit);
     report(arguments, &fit, &sources);
     let calibration = NativeCalibration {
-        id: arguments.id.to_string(),
-        image,
-        lens: lens(arguments, &fit),
         mount: NativeMount {
             world_up: up.into(),
             height_m: arguments.height.map(millionths),
             ..NativeMount::default()
         },
-        zones: Vec::new(),
-        lines: Vec::new(),
-        masks: Vec::new(),
-        areas: Vec::new(),
-        ignore: Vec::new(),
-        detect: BTreeMap::new(),
         sources,
+        ..NativeCalibration::new(arguments.id.to_string(), image, lens(arguments, &fit))
     };
     if let (Some(out), Some(frame)) = (&arguments.preview, frames.first()) {
         let written = Target::Native.write(&calibration)?.content;
