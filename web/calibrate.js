@@ -87,6 +87,7 @@ function reading() {
 async function preview() {
   const { frame } = shared;
   if (!frame || !circle) return;
+  previewSoon.cancel();
   trying?.abort();
   trying = new AbortController();
   const options = { method: "POST", body: content(), signal: trying.signal };
