@@ -141,11 +141,13 @@ ci: ## run the continuous integration
 fuzz: ## run every fuzzer RUNS times (an hour or more); needs cargo-fuzz and C++: docs/lab/reliability.md
 	$(PYTHON) scripts/fuzz.py --runs $(RUNS)
 
-bless: ## regenerate openapi/openapi.json, settings, tables of docs/ and snapshots
+bless: ## regenerate openapi/, settings, tables of docs/ and snapshots
 	@$(PYTHON) scripts/setup.py
 	mkdir -p openapi
 	cargo run --release --locked -- openapi > openapi/openapi.json.new || { rm -f openapi/openapi.json.new; exit 1; }
 	mv openapi/openapi.json.new openapi/openapi.json
+	cargo run --release --locked -- openapi --counts > openapi/counts.json.new || { rm -f openapi/counts.json.new; exit 1; }
+	mv openapi/counts.json.new openapi/counts.json
 	BLESS=1 INSTA_UPDATE=always INSTA_FORCE_PASS=1 cargo test --workspace --locked
 
 bench-remap: ## time remap tables and rendering, and the same with OpenCV

@@ -17,7 +17,7 @@ use lookdown_detect::{
         },
         narrowed,
     },
-    pipeline::Detected,
+    pipeline::DetectedFrame,
 };
 pub use options::{AnnotationOptions, Layer};
 use sketch::Sketch;
@@ -49,7 +49,7 @@ pub enum AnnotationError {
 /// # Errors
 /// [`AnnotationError`] if the frame is larger than the format allows, or the job was withdrawn.
 pub fn annotated_image(
-    detected: Detected,
+    detected: DetectedFrame,
     format: ImageFormat,
     options: &AnnotationOptions,
 ) -> Result<Vec<u8>, AnnotationError> {

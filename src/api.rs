@@ -1,25 +1,18 @@
 //! The HTTP API: the table of routes and the layers around them. No other module uses HTTP. Every
 //! failure is returned as a problem document.
 
-mod answer;
-mod caller;
 mod companions;
-mod detect_parameters;
+mod detect;
 mod http;
 mod in_process;
-mod limit;
 mod openapi;
 mod parameters;
 mod protocols;
 mod readiness;
-mod report;
-mod report_headers;
 mod require_scope;
 mod response_memory;
 mod routes;
-mod run_detection;
 mod state;
-mod upload;
 
 use axum::{
     Extension, Router,
@@ -35,16 +28,18 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
 use self::{
+    detect::headers::{PERSON_COUNT, SERVER_TIMING},
     http::{
-        connection_limit, cors, drain_body,
-        envelope::{self, Surroundings},
+        connection_limit,
+        context::ContextSource,
+        cors, drain_body,
+        envelope::{self, Envelope},
         rate_limit::{self, RateLimiter},
     },
     protocols::{
         deepstack,
         open_inference::{self, repository},
     },
-    report_headers::{PERSON_COUNT, SERVER_TIMING},
     routes::{
         counts, health,
         openapi::{self as document, DocumentSource},
@@ -56,11 +51,11 @@ use self::{
 
 pub use self::{
     companions::Companions,
+    detect::report::Report,
     http::{access::Access, rate_limit::RequestRate},
     in_process::in_process,
     openapi::Document,
     readiness::{Phase, Readiness},
-    report::Report,
     routes::problems::problem_table,
     state::{ApiOptions, ApiState},
 };
@@ -133,10 +128,7 @@ fn metrics() -> OpenApiRouter<ApiState> {
 
 /// The router of the whole service.
 pub fn router(state: ApiState) -> Router {
-    let limiter = state
-        .options
-        .request_rate
-        .map(|rate| RateLimiter::new(rate, &state.options.access));
+    let limiter = state.options.request_rate.map(RateLimiter::new);
     limited_router(state, limiter)
 }
 
@@ -167,19 +159,19 @@ fn limited_router(state: ApiState, limiter: Option<RateLimiter>) -> Router {
         .merge(deepstack::with_failures(deepstack))
         .merge(description)
         .merge(operation(state.options.metrics_elsewhere));
-    surrounded(router.merge(pages()), state)
+    with_common_layers(router.merge(pages()), state)
 }
 
 /// The router of the metrics port: metrics and health checks for operators.
 pub fn operation_router(state: ApiState) -> Router {
-    surrounded(operation(false), state)
+    with_common_layers(operation(false), state)
 }
 
 /// The router for connections beyond the limit: health checks, and metrics unless they have a port
 /// of their own. All other requests are refused.
 pub fn overload_router(state: ApiState) -> Router {
     let router = operation(state.options.metrics_elsewhere);
-    surrounded(router.fallback(connection_limit::refuse), state)
+    with_common_layers(router.fallback(connection_limit::refuse), state)
 }
 
 fn operation(metrics_elsewhere: bool) -> Router<ApiState> {
@@ -196,14 +188,18 @@ fn pages() -> Router<ApiState> {
     web_page::router().merge(api_page)
 }
 
-/// Adds the state and the layers of every route, the outermost first. A router clones and boxes each of its
-/// layers for each request, so all of these are one layer. A panic of a handler fails only its own
-/// request.
-fn surrounded(router: Router<ApiState>, state: ApiState) -> Router {
+/// Adds the state and the layers of every route, the outermost first. A router clones and boxes
+/// each of its layers for each request, so all of these are one layer. A panic of a handler fails
+/// only its own request.
+fn with_common_layers(router: Router<ApiState>, state: ApiState) -> Router {
     let options = &state.options;
-    let surroundings = Surroundings {
+    let envelope = Envelope {
         metrics: state.metrics.clone(),
-        tracer: options.tracer.clone(),
+        contexts: ContextSource {
+            tracer: options.tracer.clone(),
+            access: options.access.clone(),
+            request_timeout: options.request_timeout,
+        },
     };
     let (body_limits, header_limits) = (options.body_limits(), options.header_limits());
     let head_length = HeaderName::from_static(HEAD_LENGTH);
@@ -213,7 +209,7 @@ fn surrounded(router: Router<ApiState>, state: ApiState) -> Router {
     let for_other_origins =
         has_other_origins.then(|| map_response(page_headers::for_other_origins));
     let layers = ServiceBuilder::new()
-        .layer(from_fn_with_state(surroundings, envelope::wrap))
+        .layer(from_fn_with_state(envelope, envelope::wrap))
         .layer(option_layer(cors::layer(
             &options.cors_origins,
             &sent,

@@ -18,7 +18,6 @@ mod serve;
 mod server_flags;
 mod settings_file;
 mod shell;
-mod tune;
 mod watch;
 
 use std::{
@@ -69,11 +68,13 @@ enum Command {
     /// Create API keys
     #[command(subcommand)]
     Key(key::Command),
-    /// Measure which sessions, threads and batches are fastest on this machine
-    Tune(tune::Arguments),
     /// Print the OpenAPI document
     #[command(hide = true)]
-    Openapi,
+    Openapi {
+        /// Print that of the counts instead
+        #[arg(long)]
+        counts: bool,
+    },
     /// Print shell completions
     #[command(hide = true)]
     Completions(shell::CompletionArguments),
@@ -103,8 +104,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, commit: Option<&str>) 
         Command::Calibration(command) => calibration::run(&command),
         Command::Model(command) => model::run(&command),
         Command::Key(command) => key::run(&command),
-        Command::Tune(arguments) => tune::run(&arguments),
-        Command::Openapi => print_openapi(),
+        Command::Openapi { counts } => print_openapi(counts),
         Command::Completions(arguments) => shell::print_completions(&arguments),
         Command::Manual(arguments) => shell::write_manual(&arguments, command(commit)),
     };
@@ -133,8 +133,12 @@ fn command(commit: Option<&str>) -> clap::Command {
     })
 }
 
-fn print_openapi() -> anyhow::Result<ExitCode> {
-    let document = serde_json::to_string_pretty(&api::openapi_document()?)?;
+fn print_openapi(of_counts: bool) -> anyhow::Result<ExitCode> {
+    let document = if of_counts {
+        lookdown_count::openapi_document().to_pretty_json()?
+    } else {
+        serde_json::to_string_pretty(&api::openapi_document()?)?
+    };
     writeln!(io::stdout(), "{document}").context(UNWRITABLE)?;
     Ok(ExitCode::SUCCESS)
 }

@@ -32,20 +32,12 @@ pub(crate) fn room_calibration(
     };
     let up = fit.directions[0].map(|value| (-value * 1e8).round() / 1e8);
     NativeCalibration {
-        id: id.to_string(),
-        image,
-        lens: lens.into(),
         mount: NativeMount {
             world_up: up.into(),
             ..NativeMount::default()
         },
-        zones: Vec::new(),
-        lines: Vec::new(),
-        masks: Vec::new(),
-        areas: Vec::new(),
-        ignore: Vec::new(),
-        detect: BTreeMap::new(),
         sources: sources(fit),
+        ..NativeCalibration::new(id.to_string(), image, lens.into())
     }
 }
 

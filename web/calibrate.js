@@ -121,6 +121,7 @@ function reading() {
 async function preview() {
   const { frame } = shared;
   if (!frame || !circle) return;
+  previewSoon.cancel();
   trying?.abort();
   trying = new AbortController();
   const options = { method: "POST", body: content(), signal: trying.signal };

@@ -16,6 +16,7 @@ let running = null;
 async function run() {
   const { frame } = shared;
   if (!frame) return;
+  runSoon.cancel();
   running?.abort();
   const now = new AbortController();
   running = now;
@@ -26,6 +27,7 @@ async function run() {
 }
 
 export const runShown = shown(run);
+const runSoon = afterPause(REST_MILLIS, runShown);
 
 function showFrame() {
   const { frame } = shared;
@@ -61,7 +63,7 @@ function save() {
 }
 
 export function start() {
-  parameters.start(afterPause(REST_MILLIS, runShown));
+  parameters.start(runSoon);
   find("#report-link").addEventListener("click", save);
   // Marks keep their size on the screen for all image sizes.
   new ResizeObserver(() => shared.report && drawMarks(find("#marks"), shared.report)).observe(find("#marks"));

@@ -23,13 +23,15 @@ function furnished(node, attributes, children) {
   return node;
 }
 
-/** Returns a function that calls `act` after a pause without further calls. */
+/** Returns a function that calls `act` after a pause without further calls; its `cancel` ends the pause without `act`. */
 export function afterPause(millis, act) {
   let timer;
-  return () => {
-    clearTimeout(timer);
+  const cancel = () => clearTimeout(timer);
+  const soon = () => {
+    cancel();
     timer = setTimeout(act, millis);
   };
+  return Object.assign(soon, { cancel });
 }
 
 export const percent = (share) => `${Math.round(share * 100)} %`;

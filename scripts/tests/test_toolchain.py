@@ -1,9 +1,13 @@
-"""Missing build programs are reported before any download, with the remedy."""
+"""Missing build programs are reported before any download, with the remedy; the workflows pin the compiler."""
 
+import re
+import tomllib
+import unittest
 from unittest import mock
 
 from assets.console import SetupError
 from assets.toolchain import check_toolchain
+from dist import ROOT
 
 from .support import InEmptyRepository
 
@@ -43,3 +47,18 @@ class Toolchain(InEmptyRepository):
     def test_a_linker_of_the_users_own_is_enough(self):
         with mock.patch.dict("os.environ", CARGO_TARGET_X86_64_UNKNOWN_LINUX_GNU_LINKER="clang"):
             self.check_with("cargo", "rustc")
+
+
+class Workflows(unittest.TestCase):
+    def test_the_workflows_name_one_compiler_that_is_new_enough(self):
+        found = set()
+        for workflow in (ROOT / ".github" / "workflows").glob("*.yml"):
+            pinned = re.findall(r"RUSTUP_TOOLCHAIN: \"([\d.]+)\"", workflow.read_text(encoding="utf-8"))
+            self.assertEqual(len(pinned), 1, workflow.name)
+            found.update(pinned)
+        self.assertEqual(len(found), 1, found)
+        oldest = tomllib.loads((ROOT / "Cargo.toml").read_text(encoding="utf-8"))["workspace"]["package"][
+            "rust-version"
+        ]
+        version = [int(part) for part in found.pop().split(".")]
+        self.assertGreaterEqual(version, [int(part) for part in oldest.split(".")])

@@ -12,7 +12,7 @@ use lookdown_detect::{
         decode::{DecodeError, DecodeLimits, decode},
         narrowed,
     },
-    pipeline::Detected,
+    pipeline::DetectedFrame,
 };
 use strum::VariantArray;
 
@@ -62,7 +62,7 @@ impl StoredFrame {
     /// # Errors
     /// [`StoredFrameError`] for a frame that cannot be kept.
     pub fn of(
-        detected: &Detected,
+        detected: &DetectedFrame,
         concealment: Option<Concealment>,
     ) -> Result<Self, StoredFrameError> {
         let sketch = Sketch::of(detected, Layer::VARIANTS).rounded();

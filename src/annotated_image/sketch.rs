@@ -2,7 +2,7 @@
 
 use lookdown_detect::{
     imaging::annotate::{Drawing, Mark, ZoneOutline},
-    pipeline::{Detected, DetectionReport},
+    pipeline::{DetectedFrame, DetectionReport},
 };
 use serde::{Deserialize, Serialize};
 
@@ -24,7 +24,7 @@ pub(super) struct Sketch {
 
 impl Sketch {
     /// Selects what these layers need from a detection.
-    pub(super) fn of(detected: &Detected, layers: &[Layer]) -> Self {
+    pub(super) fn of(detected: &DetectedFrame, layers: &[Layer]) -> Self {
         let report = &detected.report;
         let views = layers.contains(&Layer::Views);
         let views = views.then(|| detected.view_outlines());

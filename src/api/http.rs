@@ -3,7 +3,9 @@
 
 pub(super) mod accept;
 pub(super) mod access;
+pub(super) mod caller;
 pub(super) mod connection_limit;
+pub(super) mod context;
 pub(super) mod cors;
 pub(super) mod deadline;
 pub(super) mod drain_body;

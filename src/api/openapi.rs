@@ -2,14 +2,11 @@
 //! the common parts.
 
 mod examples;
-mod failures;
 mod media_types;
 mod parameters;
-mod security;
 
+use lookdown_http::openapi::Keys;
 use utoipa::{OpenApi, openapi};
-
-use security::Keys;
 
 use crate::api::http::problem::ProblemBody;
 pub use media_types::Document;
@@ -46,8 +43,7 @@ pub(super) struct Common;
 /// Adds the failures, and the operations that need no key, to the document of the routes.
 pub(super) fn complete(mut document: openapi::OpenApi) -> openapi::OpenApi {
     parameters::add_choices(document.components.get_or_insert_default());
-    failures::describe(&mut document);
     examples::add(&mut document);
-    security::state_public_operations(&mut document);
+    lookdown_http::openapi::complete(&mut document);
     document
 }

@@ -5,7 +5,7 @@ mod reference;
 
 use lookdown_detect::parameters::{DetectParameters, ParameterSpec};
 
-use crate::{annotated_image::AnnotationOptions, api::answer};
+use crate::{annotated_image::AnnotationOptions, api::detect::answer};
 
 /// Lists all parameters in the order of the documentation.
 pub(super) fn all() -> impl Iterator<Item = &'static ParameterSpec> {

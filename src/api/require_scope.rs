@@ -8,7 +8,10 @@ use axum::{
     http::{HeaderMap, request::Parts},
 };
 
-use super::{ApiState, http::problem::Problem};
+use super::{
+    ApiState,
+    http::{access::Identity, context::RequestContext, problem::Problem},
+};
 use crate::access::Scope;
 
 /// Proof that the request has the scope of `S`.
@@ -52,15 +55,19 @@ required_scopes! {
 }
 
 impl<S: RequiredScope> RequireScope<S> {
-    /// Checks the scope. A running request repeats the check, as its key may have been removed.
-    pub(super) fn check(state: &ApiState, headers: &HeaderMap) -> Result<Self, Problem> {
+    fn check(state: &ApiState, headers: &HeaderMap, identity: &Identity) -> Result<Self, Problem> {
         let access = &state.options.access;
         if S::OWN_MACHINE_ONLY {
-            access.check_of_its_own(headers, S::SCOPE)?;
+            access.check_of_its_own(headers, identity, S::SCOPE)?;
         } else {
-            access.check(headers, S::SCOPE)?;
+            access.check(headers, identity, S::SCOPE)?;
         }
         Ok(Self(PhantomData))
+    }
+
+    /// Checks the scope of a stream again: its key may have been removed.
+    pub(super) fn check_again(state: &ApiState, headers: &HeaderMap) -> Result<Self, Problem> {
+        Self::check(state, headers, &state.options.access.identify(headers))
     }
 }
 
@@ -68,6 +75,7 @@ impl<S: RequiredScope> FromRequestParts<ApiState> for RequireScope<S> {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, state: &ApiState) -> Result<Self, Problem> {
-        Self::check(state, &parts.headers)
+        let context = RequestContext::of(&parts.extensions)?;
+        Self::check(state, &parts.headers, &context.identity)
     }
 }

@@ -12,8 +12,9 @@ use lookdown_detect::fairness::{BudgetError, Client};
 
 use super::{
     ApiState,
-    caller::Caller,
     http::{
+        caller::Caller,
+        context::RequestContext,
         problem::{Problem, ProblemKind},
         request_body::Held,
     },
@@ -25,9 +26,12 @@ const SMALL: u64 = 64 << 10;
 
 /// Makes a large response take a share of the budget, or refuses it with 429.
 pub(super) async fn bound(State(state): State<ApiState>, request: Request, next: Next) -> Response {
-    let (parts, body) = request.into_parts();
-    let caller = Caller::of(&parts, &state);
-    let response = next.run(Request::from_parts(parts, body)).await;
+    let context = match RequestContext::of(request.extensions()) {
+        Ok(context) => context,
+        Err(problem) => return problem.into_response(),
+    };
+    let caller = &context.caller;
+    let response = next.run(request).await;
     let size = response.body().size_hint().exact();
     let Some(size) = size.filter(|size| *size > SMALL) else {
         // Streams hold at most a few reports each.
@@ -42,13 +46,13 @@ pub(super) async fn bound(State(state): State<ApiState>, request: Request, next:
     let amount = size.min(largest);
     let share = match state.responses.take(&caller.client, amount) {
         Ok(share) => share,
-        Err(error) => return refusal(&caller, error).into_response(),
+        Err(error) => return refusal(caller, error).into_response(),
     };
     let (parts, body) = response.into_parts();
     match to_bytes(body, size).await {
-        Ok(content) => {
-            let content = Held::new(content, share).into_bytes();
-            Response::from_parts(parts, Body::from(content))
+        Ok(held) => {
+            let held = Held::new(held, share).into_bytes();
+            Response::from_parts(parts, Body::from(held))
         }
         Err(error) => Problem::internal(error).into_response(),
     }

@@ -4,7 +4,6 @@
 pub(super) mod calibrations;
 pub(super) mod cameras;
 pub(super) mod counts;
-pub(super) mod detect;
 pub(super) mod health;
 pub(super) mod openapi;
 pub(super) mod problems;
@@ -13,12 +12,12 @@ pub(super) mod web_page;
 
 use utoipa_axum::{router::OpenApiRouter, routes};
 
-use super::ApiState;
+use super::{ApiState, detect};
 
 /// Returns the routes of clients, with their entries in the OpenAPI document.
 pub(super) fn of_clients() -> OpenApiRouter<ApiState> {
     OpenApiRouter::new()
-        .routes(routes!(detect::detect_persons))
+        .routes(routes!(detect::route::detect_persons))
         .routes(routes!(calibrations::list))
         .routes(routes!(
             calibrations::get,

@@ -7,9 +7,8 @@ use std::{
     time::{Duration, Instant},
 };
 
-use axum::extract::FromRef;
 use lookdown_detect::{
-    fairness::{Client, SharedBudget},
+    fairness::SharedBudget,
     imaging::annotate::Concealment,
     inference::ModelRepository,
     parameters::DetectDefaults,
@@ -21,7 +20,7 @@ use super::{
     companions::Companions,
     http::{
         access::Access,
-        deadline::{Deadline, RequestTimeout},
+        context::RequestContext,
         drain_body::BodyLimits,
         problem::{Problem, ProblemKind},
         rate_limit::RequestRate,
@@ -84,7 +83,6 @@ impl ApiOptions {
     /// The limits of request bodies.
     pub(super) fn body_limits(&self) -> BodyLimits {
         BodyLimits {
-            request_timeout: self.request_timeout,
             max_body_bytes: self.max_body_bytes,
             min_upload_bytes_per_second: self.min_upload_bytes_per_second,
         }
@@ -218,28 +216,21 @@ impl ApiState {
         self.options.stall_limit()
     }
 
-    /// Returns a reader of the bodies of a client, up to `max_bytes`; `remedy` is the advice for
+    /// Returns a reader of the body of a request, up to `max_bytes`; `remedy` is the advice for
     /// larger ones.
     pub(super) fn body_reader(
         &self,
-        client: &Client,
+        context: &RequestContext,
         max_bytes: usize,
         remedy: &'static str,
-        deadline: Deadline,
     ) -> BodyReader {
         BodyReader {
             max_bytes,
             remedy,
-            budget: self.uploads.of(client),
+            budget: self.uploads.of(&context.caller.client),
             least_bytes_per_second: self.options.min_upload_bytes_per_second,
-            deadline,
+            deadline: context.deadline,
         }
-    }
-}
-
-impl FromRef<ApiState> for RequestTimeout {
-    fn from_ref(state: &ApiState) -> Self {
-        Self(state.options.request_timeout)
     }
 }
 

@@ -3,12 +3,15 @@
 use std::{fs, path::Path};
 
 use anyhow::{Context, bail};
-use lookdown_detect::pipeline::Detected;
+use lookdown_detect::pipeline::DetectedFrame;
 
 use crate::annotated_image::{AnnotationOptions, ImageFormat, annotated_image};
 
 /// Draws the persons, and returns a JPEG.
-pub(super) fn jpeg(detected: Detected, options: &AnnotationOptions) -> anyhow::Result<Vec<u8>> {
+pub(super) fn jpeg(
+    detected: DetectedFrame,
+    options: &AnnotationOptions,
+) -> anyhow::Result<Vec<u8>> {
     Ok(annotated_image(detected, ImageFormat::Jpeg, options)?)
 }
 
@@ -30,7 +33,7 @@ pub(super) fn format_of(path: &Path) -> anyhow::Result<ImageFormat> {
 
 /// Draws the persons and writes a file in the format that its name ends with.
 pub(super) fn write(
-    detected: Detected,
+    detected: DetectedFrame,
     options: &AnnotationOptions,
     path: &Path,
 ) -> anyhow::Result<()> {

@@ -22,7 +22,7 @@ use clap::{
 use lookdown_common::files;
 use lookdown_detect::{
     parameters::DetectParameters,
-    pipeline::{DetectJob, Detected, Engine, JobImage},
+    pipeline::{DetectJob, DetectedFrame, Engine, JobImage},
 };
 use lookdown_lens::calibration::{Calibration, CalibrationId};
 use strum::VariantArray;
@@ -274,7 +274,7 @@ fn detect(
     image: Bytes,
     parameters: &DetectParameters,
     calibration: Option<Arc<Calibration>>,
-) -> anyhow::Result<Detected> {
+) -> anyhow::Result<DetectedFrame> {
     Ok(engine.detect(&DetectJob::local(
         name,
         JobImage::Encoded(image),
@@ -283,7 +283,7 @@ fn detect(
     ))?)
 }
 
-fn print(detected: &Detected) -> anyhow::Result<()> {
+fn print(detected: &DetectedFrame) -> anyhow::Result<()> {
     let report = serde_json::to_string(&Report::from(&detected.report))?;
     writeln!(io::stdout(), "{report}").context(UNWRITABLE)
 }

@@ -2,6 +2,8 @@
 
 mod description;
 mod fetch;
+mod manifest;
+mod sample;
 
 use std::{
     io::{self, Write},
@@ -12,21 +14,15 @@ use std::{
 
 use anyhow::Context;
 use clap::{Args, Subcommand};
-use lookdown_common::files::{self, MAX_IMAGE_BYTES};
 use lookdown_detect::{
     imaging::ViewBatch,
     inference::{Detector, InferenceError, OnnxDetector},
-    parameters::DetectParameters,
-    pipeline::{DetectJob, Detected, JobImage},
 };
 
+use self::sample::detect;
 use super::{SettingsFile, annotate};
 use crate::cli::output::UNWRITABLE;
-use crate::{
-    annotated_image::AnnotationOptions,
-    app::{engine_for, onnx_options},
-    settings::{Settings, find_installed},
-};
+use crate::{annotated_image::AnnotationOptions, app::onnx_options, settings::find_installed};
 
 /// The default sample image: a fisheye frame.
 const SAMPLE: &str = "samples/office.jpg";
@@ -58,6 +54,10 @@ pub(super) struct Arguments {
     /// Draw the detected persons into the sample
     #[arg(long, value_name = "OUT.jpg")]
     annotate: Option<PathBuf>,
+    /// First write a `model.toml` beside the ONNX file: guess the head from the outputs, and the
+    /// input from the persons in the sample
+    #[arg(long)]
+    write_manifest: bool,
     #[command(flatten)]
     settings_file: SettingsFile,
 }
@@ -74,6 +74,11 @@ pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
 fn check(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let mut settings = arguments.settings_file.load()?;
     let library = settings.inference.find_library()?;
+    if arguments.write_manifest {
+        let sample = arguments.sample.clone();
+        let sample = sample.or_else(|| find_installed(Path::new(SAMPLE)));
+        manifest::write(&arguments.model, sample.as_deref(), &settings)?;
+    }
     let loading = Instant::now();
     let mut detector = OnnxDetector::load(&library, &arguments.model, &onnx_options(&settings))?;
     let loaded = loading.elapsed();
@@ -153,18 +158,4 @@ fn time(detector: &mut OnnxDetector, views: usize) -> Result<Duration, Inference
     }
     times.sort_unstable();
     Ok(times[RUNS / 2])
-}
-
-/// Detects persons in the sample with the model of the settings.
-fn detect(settings: &Settings, sample: &Path, profile: &str) -> anyhow::Result<Detected> {
-    let parameters = DetectParameters::parse([("profile", profile)])?;
-    let engine = engine_for(settings, std::slice::from_ref(&parameters))?;
-    let image = files::read(sample, MAX_IMAGE_BYTES)
-        .with_context(|| format!("--sample: {} cannot be read", sample.display()))?;
-    Ok(engine.detect(&DetectJob::local(
-        sample.display().to_string(),
-        JobImage::Encoded(image.into()),
-        parameters,
-        None,
-    ))?)
 }

@@ -66,7 +66,7 @@ pub struct Publisher {
     publication: Publication,
 }
 
-/// What is published, and from where.
+/// The results that are published, and their source.
 struct Publication {
     options: MqttOptions,
     results: Arc<dyn ResultStore>,

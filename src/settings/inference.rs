@@ -30,9 +30,8 @@ settings! {
         /// `onnxruntime-gpu`. GPUs are experimental: none has been tested.
         device: Device = Device::Cpu => device();
         /// The precision of the default models on the CPU. `auto`: 8-bit integers for upright
-        /// crops and all profiles except `quality`, and for `balanced` only if the CPU has
-        /// instructions for them (VNNI, or `dotprod` on arm64). `int8`: also for `balanced` on any
-        /// CPU. A GPU uses `fp32`.
+        /// crops and all profiles, for `balanced` and `quality` only if the CPU has instructions
+        /// for them (VNNI, or `dotprod` on arm64). `int8`: for all on any CPU. A GPU uses `fp32`.
         precision: PrecisionChoice = PrecisionChoice::Auto => choice(&[
             ("auto", PrecisionChoice::Auto),
             ("int8", PrecisionChoice::Int8),

@@ -3,8 +3,7 @@
 //!
 //! On a CPU there are as many sessions as cores, each with one thread and one view at a time.
 //! Sessions do not wait for each other, while the threads of one session synchronise at every
-//! layer. A batch of views takes as long as its views one by one. Measured in lab/benches/NOTES.md;
-//! `lookdown tune` measures it on the current machine.
+//! layer. A batch of views takes as long as its views one by one. Measured in lab/benches/NOTES.md.
 //!
 //! The counts follow from the cores that this process may use:
 //! [`std::thread::available_parallelism`] respects the affinity mask and the CPU quota of the
@@ -28,7 +27,6 @@ settings! {
     pub(super) struct ThreadKeys in "inference" {
         /// The sessions of each model, which run side by side. 0: on a CPU one for each core that
         /// the machine or the container's CPU limit gives, on a GPU or another server two.
-        /// `lookdown tune` measures the best number.
         sessions: Option<NonZeroUsize> = None => count();
         /// The threads of each session. 0: one; where `inference.sessions` is set, their share of
         /// the cores.

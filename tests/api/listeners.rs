@@ -31,12 +31,12 @@ struct Listener {
     key: Option<&'static str>,
 }
 
-const KEY: &str = "0123456789abcdef";
+pub(crate) const KEY: &str = "0123456789abcdef";
 /// More connections than a companion serves at a time, and than those that wait beyond the limit.
 const SILENT: usize = 330;
 
 /// Sends bytes and reads until the listener closes the connection.
-fn answer(address: SocketAddr, request: &str) -> String {
+pub(crate) fn answer(address: SocketAddr, request: &str) -> String {
     let mut connection = TcpStream::connect(address).unwrap();
     connection
         .set_read_timeout(Some(Duration::from_secs(20)))
@@ -151,7 +151,7 @@ impl Listener {
     }
 }
 
-fn status(answer: &str) -> u16 {
+pub(crate) fn status(answer: &str) -> u16 {
     let code = answer.split(' ').nth(1);
     code.and_then(|code| code.parse().ok()).unwrap_or_default()
 }
@@ -162,7 +162,10 @@ fn free_address() -> SocketAddr {
 }
 
 /// Starts `lookdown count` for a server that does not run.
-fn start_count(folder: &Path, key_file: Option<PathBuf>) -> (SocketAddr, JoinHandle<()>) {
+pub(crate) fn start_count(
+    folder: &Path,
+    key_file: Option<PathBuf>,
+) -> (SocketAddr, JoinHandle<()>) {
     let address = free_address();
     let entry = CountEntry {
         server: nowhere(),
@@ -209,7 +212,7 @@ fn nowhere() -> ServerEntry {
     }
 }
 
-async fn accepts(address: SocketAddr) {
+pub(crate) async fn accepts(address: SocketAddr) {
     while TcpStream::connect(address).is_err() {
         sleep(Duration::from_millis(20)).await;
     }

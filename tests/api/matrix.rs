@@ -1,19 +1,24 @@
-//! Every operation of the OpenAPI document with every kind of key, and every other method of its
+//! Every operation of the OpenAPI documents with every kind of key, and every other method of their
 //! paths.
 
+use std::fs;
+
 use serde_json::Value;
+use tokio::task::spawn_blocking;
 
 use crate::{
     access::{ADMINISTRATOR, BOTH, FINDER, READER, guarded},
+    listeners::{KEY, accepts, answer, start_count, status},
     service::{Answer, Service},
 };
 
 const METHODS: [&str; 5] = ["GET", "POST", "PUT", "DELETE", "PATCH"];
 /// The values of the parameters in paths.
-const PARAMETERS: [(&str, &str); 6] = [
+const PARAMETERS: [(&str, &str); 7] = [
     ("{calibration}", "lobby"),
     ("{camera}", "lobby"),
     ("{id}", "lobby"),
+    ("{site}", "ground"),
     ("{version}", "1"),
     ("/problems/{name}", "/problems/not-found"),
     ("{name}", "eager"),
@@ -34,9 +39,21 @@ struct Operation {
     scope: Option<String>,
 }
 
-/// Every operation of the document, and the paths with their documented methods.
+/// Every operation of the server, and of the counts that it forwards.
 async fn operations(service: &Service) -> Vec<Operation> {
-    let document = service.get("/openapi.json").await.json();
+    let mut operations = documented(&service.get("/openapi.json").await.json());
+    let counts = documented(&counts_document()).into_iter();
+    let is_forwarded = |path: &str| path.starts_with("/counts") || path.starts_with("/sites");
+    operations.extend(counts.filter(|operation| is_forwarded(&operation.path)));
+    operations
+}
+
+fn counts_document() -> Value {
+    serde_json::to_value(lookdown_count::openapi_document()).unwrap()
+}
+
+/// Every operation of a document, with values in its path.
+fn documented(document: &Value) -> Vec<Operation> {
     let mut operations = Vec::new();
     for (path, item) in document["paths"].as_object().unwrap() {
         let mut filled = path.clone();
@@ -72,7 +89,7 @@ async fn ask(service: &Service, method: &str, path: &str, key: Option<&str>) -> 
 async fn every_operation_needs_the_scope_of_the_document() {
     let service = guarded();
     let operations = operations(&service).await;
-    assert!(operations.len() >= 38, "{}", operations.len());
+    assert!(operations.len() >= 49, "{}", operations.len());
     for Operation {
         method,
         path,
@@ -129,4 +146,37 @@ async fn methods_outside_the_document_are_refused() {
             );
         }
     }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn every_operation_of_the_counts_needs_the_key() {
+    let folder = tempfile::tempdir().unwrap();
+    let key_file = folder.path().join("key");
+    fs::write(&key_file, KEY).unwrap();
+    let (address, counting) = start_count(folder.path(), Some(key_file));
+    accepts(address).await;
+    let operations = documented(&counts_document());
+    assert!(operations.len() >= 14, "{}", operations.len());
+    for Operation { path, scope, .. } in operations {
+        for method in METHODS {
+            for key in [None, Some("another"), Some(KEY)] {
+                let header = key.map_or(String::new(), |key| format!("X-API-Key: {key}\r\n"));
+                let head = format!("{method} {path} HTTP/1.1\r\nHost: localhost\r\n{header}");
+                let request = head + "Content-Length: 0\r\nConnection: close\r\n\r\n";
+                let answer = spawn_blocking(move || answer(address, &request)).await;
+                let status = status(&answer.unwrap());
+                let expected = match (&scope, key) {
+                    (Some(_), None | Some("another")) => [401].as_slice(),
+                    _ if method != "GET" => &[405],
+                    // No camera and no site is known.
+                    _ => &[200, 404],
+                };
+                assert!(
+                    expected.contains(&status),
+                    "{method} {path} with {key:?}: {status}"
+                );
+            }
+        }
+    }
+    counting.abort();
 }

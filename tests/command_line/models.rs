@@ -107,3 +107,45 @@ fn other_weights_are_refused_and_change_nothing() {
     let unknown = fetch(repository.path(), "huge", from);
     assert_fails_with(&unknown, &["huge", "tiny"]);
 }
+
+/// A folder with a network of random weights in the layout of YOLOX, without a manifest.
+fn yolox_without_manifest() -> TempDir {
+    let folder = tempdir().unwrap();
+    let families = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/models/families");
+    let model = folder.path().join("yolox_s.onnx");
+    fs::copy(families.join("yolox/model.onnx"), model).unwrap();
+    folder
+}
+
+#[test]
+fn check_writes_a_manifest_and_warns_without_a_person() {
+    let folder = yolox_without_manifest();
+    let model = folder.path().join("yolox_s.onnx");
+    let write = [
+        "model",
+        "check",
+        "--write-manifest",
+        model.to_str().unwrap(),
+    ];
+    let output = lookdown(&write, &[]);
+    let warning = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{warning}");
+    assert!(warning.contains("no plausible person"), "{warning}");
+    let written = fs::read_to_string(folder.path().join("model.toml")).unwrap();
+    let manifest = "name = \"yolox_s\"\nonnx = \"yolox_s.onnx\"\n\n[input]\n\n[output]\nhead = \
+                    \"yolox\"\nperson_class = 0\n";
+    assert_eq!(written, manifest);
+    assert_fails_with(
+        &lookdown(&write, &[]),
+        &["--write-manifest", "model.toml exists"],
+    );
+}
+
+#[test]
+fn folder_without_a_manifest_names_the_command_that_writes_it() {
+    let folder = yolox_without_manifest();
+    let output = lookdown(&["model", "check", folder.path().to_str().unwrap()], &[]);
+    let model = folder.path().join("yolox_s.onnx");
+    let command = format!("lookdown model check --write-manifest {}", model.display());
+    assert_fails_with(&output, &["model.toml", &command]);
+}

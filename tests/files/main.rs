@@ -4,3 +4,4 @@
 mod buckets;
 mod models;
 mod settings;
+mod upgrade;

@@ -2,8 +2,10 @@
 
 mod custom_models;
 mod darknet;
+mod families;
 mod folder;
 mod lifecycle;
+mod manifest_keys;
 mod refusals;
 mod shipped;
 mod swap;

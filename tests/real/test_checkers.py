@@ -1,4 +1,4 @@
-"""The checkers that need Node.js: Redocly for the OpenAPI document, Biome for the JavaScript."""
+"""The checkers that need Node.js: Redocly for the OpenAPI documents, Biome for the JavaScript."""
 
 import subprocess
 import unittest
@@ -16,8 +16,9 @@ class Checkers(unittest.TestCase):
         command = ["npm", "ci", "--no-audit", "--no-fund", "--ignore-scripts", "--loglevel=error"]
         subprocess.run(command, cwd=HERE, check=True)
 
-    def test_the_openapi_document_follows_the_recommended_rules(self) -> None:
-        self.run_checker(HERE / "node_modules/.bin/redocly", "lint", "openapi/openapi.json")
+    def test_the_openapi_documents_follow_the_recommended_rules(self) -> None:
+        documents = ("openapi/openapi.json", "openapi/counts.json")
+        self.run_checker(HERE / "node_modules/.bin/redocly", "lint", *documents)
 
     def test_the_scripts_of_the_page_have_no_lint(self) -> None:
         scripts = [*sorted(ROOT.glob("web/*.js")), *sorted(ROOT.glob("tests/real/page/*.js"))]

@@ -16,7 +16,9 @@ from harness.machine import made  # noqa: E402
 from harness.processes import BenchError  # noqa: E402
 from proofs import (  # noqa: E402
     clock,
+    companions,
     contract,
+    counting_clock,
     descriptors,
     disk,
     drawing,
@@ -46,6 +48,8 @@ PARTS = (
     descriptors,
     memory,
     clock,
+    counting_clock,
+    companions,
     planted,
     streams,
     rude,

@@ -1,4 +1,4 @@
-//! The checked-in OpenAPI document and its properties.
+//! The checked-in OpenAPI documents and their properties.
 
 use std::{collections::BTreeSet, fs};
 
@@ -8,6 +8,12 @@ use serde_json::Value;
 
 fn document() -> Value {
     serde_json::to_value(openapi_document().unwrap()).unwrap()
+}
+
+/// The documents of the server and of the counts, with their files.
+fn documents() -> [(&'static str, Value); 2] {
+    let counts = serde_json::to_value(lookdown_count::openapi_document()).unwrap();
+    [("openapi.json", document()), ("counts.json", counts)]
 }
 
 /// Every operation with its path.
@@ -21,57 +27,61 @@ fn operations(document: &Value) -> Vec<(String, Value)> {
 }
 
 #[test]
-fn the_checked_in_document_matches_the_code() {
-    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/openapi/openapi.json");
-    let checked_in: Value = serde_json::from_str(&fs::read_to_string(file).unwrap()).unwrap();
-    assert!(
-        checked_in == document(),
-        "run `make bless` and review the difference"
-    );
+fn the_checked_in_documents_match_the_code() {
+    for (file, document) in documents() {
+        let path = format!("{}/openapi/{file}", env!("CARGO_MANIFEST_DIR"));
+        let checked_in: Value = serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();
+        assert!(
+            checked_in == document,
+            "{file}: run `make bless` and review the difference"
+        );
+    }
 }
 
 #[test]
 fn every_operation_has_name_summary_tag_and_responses() {
-    let document = document();
-    let mut names = BTreeSet::new();
-    for (path, operation) in operations(&document) {
-        let name = operation["operationId"].as_str().unwrap();
-        assert!(
-            name.contains('_'),
-            "{path}: {name} is not <verb>_<resource>"
-        );
-        assert!(names.insert(name.to_owned()), "{name} is not unique");
-        assert!(operation["summary"].is_string(), "{path} has no summary");
-        assert!(operation["tags"][0].is_string(), "{path} has no tag");
-        let statuses = operation["responses"].as_object().unwrap();
-        assert!(
-            statuses.keys().any(|status| status.starts_with('2')),
-            "{path} never succeeds"
-        );
+    for (_, document) in documents() {
+        let mut names = BTreeSet::new();
+        for (path, operation) in operations(&document) {
+            let name = operation["operationId"].as_str().unwrap();
+            assert!(
+                name.contains('_'),
+                "{path}: {name} is not <verb>_<resource>"
+            );
+            assert!(names.insert(name.to_owned()), "{name} is not unique");
+            assert!(operation["summary"].is_string(), "{path} has no summary");
+            assert!(operation["tags"][0].is_string(), "{path} has no tag");
+            let statuses = operation["responses"].as_object().unwrap();
+            assert!(
+                statuses.keys().any(|status| status.starts_with('2')),
+                "{path} never succeeds"
+            );
+        }
+        assert_eq!(document["info"]["license"]["identifier"], "Apache-2.0");
+        assert!(document["servers"][0]["url"].is_string());
     }
-    assert_eq!(document["info"]["license"]["identifier"], "Apache-2.0");
-    assert!(document["servers"][0]["url"].is_string());
 }
 
 #[test]
 fn every_operation_refers_to_the_one_problem_response() {
-    let document = document();
-    for (path, operation) in operations(&document) {
-        let responses = operation["responses"].as_object().unwrap();
-        let failures = responses
-            .iter()
-            .filter(|(status, _)| status.as_str() >= "4");
-        let failures: Vec<_> = failures
-            .map(|(status, response)| (&**status, &response["$ref"]))
-            .collect();
-        let problem = &Value::from("#/components/responses/Problem");
-        assert_eq!(failures, [("4XX", problem), ("5XX", problem)], "{path}");
-    }
-    let response = &document["components"]["responses"]["Problem"];
-    let schema = &response["content"]["application/problem+json"]["schema"]["$ref"];
-    assert_eq!(schema, "#/components/schemas/Problem");
-    for header in ["Retry-After", "WWW-Authenticate"] {
-        assert!(response["headers"][header].is_object(), "{header}");
+    for (_, document) in documents() {
+        for (path, operation) in operations(&document) {
+            let responses = operation["responses"].as_object().unwrap();
+            let failures = responses
+                .iter()
+                .filter(|(status, _)| status.as_str() >= "4");
+            let failures: Vec<_> = failures
+                .map(|(status, response)| (&**status, &response["$ref"]))
+                .collect();
+            let problem = &Value::from("#/components/responses/Problem");
+            assert_eq!(failures, [("4XX", problem), ("5XX", problem)], "{path}");
+        }
+        let response = &document["components"]["responses"]["Problem"];
+        let schema = &response["content"]["application/problem+json"]["schema"]["$ref"];
+        assert_eq!(schema, "#/components/schemas/Problem");
+        for header in ["Retry-After", "WWW-Authenticate"] {
+            assert!(response["headers"][header].is_object(), "{header}");
+        }
     }
 }
 
@@ -186,6 +196,21 @@ fn operations_that_need_a_key_declare_it() {
     for (path, operation) in operations(&document) {
         let needs_none = operation["security"] == serde_json::json!([{}]);
         assert_eq!(needs_none, operation["tags"][0] == "operation", "{path}");
+    }
+}
+
+#[test]
+fn all_counts_need_a_key_or_the_scope_read() {
+    let [_, (_, document)] = documents();
+    let read = serde_json::json!([{}, {"bearer": ["read"]}, {"api_key": ["read"]}]);
+    for (path, operation) in operations(&document) {
+        let is_public = path == "/livez";
+        let expected = if is_public {
+            serde_json::json!([{}])
+        } else {
+            read.clone()
+        };
+        assert_eq!(operation["security"], expected, "{path}");
     }
 }
 

@@ -1,4 +1,5 @@
-//! Calls that belong in one place each: opening files to read them, and starting processes.
+//! Calls that belong in few places: opening files to read them, starting processes, comparing API
+//! keys, and reading the clock, which jumps.
 
 use std::{
     fs,
@@ -37,6 +38,49 @@ const STARTERS: [&str; 2] = [
     "crates/lookdown-watch/src/child.rs",
     // Replaces the process by itself.
     "src/main.rs",
+];
+
+/// Calls that compare the key of a request with all known keys. The layer of the context makes it
+/// once for each request; a stream that goes on repeats it.
+const COMPARISONS: [&str; 2] = [".identify(", ".holder_of("];
+/// The files that may make them.
+const COMPARERS: [&str; 4] = [
+    "src/access/keys.rs",
+    "src/api/http/access.rs",
+    "src/api/http/context.rs",
+    "src/api/require_scope.rs",
+];
+/// The repeated comparison, and the files of the answers that last.
+const REPEATED: [&str; 1] = ["::check_again("];
+const LASTING: [&str; 2] = [
+    "src/api/routes/results/events.rs",
+    "src/api/routes/results/latest.rs",
+];
+
+/// Calls that read the clock of the machine. Everything that waits or limits uses the monotonic clock.
+const CLOCKS: [&str; 3] = ["SystemTime::now()", "Timestamp::now()", "Zoned::now()"];
+/// The files that may make them: they date reports, and compare with the dates of others.
+/// docs/lab/reliability.md states what holds when the clock jumps.
+const CLOCK_READERS: [&str; 18] = [
+    "crates/lookdown-count/src/follower.rs",
+    "crates/lookdown-count/src/http/shared.rs",
+    "crates/lookdown-count/src/now.rs",
+    "crates/lookdown-count/src/run.rs",
+    "crates/lookdown-count/src/webhooks/delivery.rs",
+    "crates/lookdown-detect/src/pipeline/job.rs",
+    "crates/lookdown-watch/src/source/folder.rs",
+    "crates/lookdown-watch/src/source/sink.rs",
+    "src/api/protocols/open_inference/persons.rs",
+    "src/api/routes/results.rs",
+    "src/api/routes/results/followed.rs",
+    "src/api/detect/upload/received_request.rs",
+    "src/calibration_store/store/folder.rs",
+    "src/mqtt/publisher.rs",
+    "src/results/memory.rs",
+    "src/results/redis/sender.rs",
+    "src/telemetry/request_trace.rs",
+    // The validity of certificates.
+    "src/tls.rs",
 ];
 
 /// The source files of all crates without those of tests.
@@ -92,5 +136,24 @@ fn processes_are_started_by_one_module() {
     assert!(
         found.is_empty(),
         "use `child::spawn`, which limits the process: {found:#?}"
+    );
+}
+
+#[test]
+fn keys_are_compared_once_for_each_request() {
+    let mut found = callers(&COMPARISONS, &COMPARERS);
+    found.extend(callers(&REPEATED, &LASTING));
+    assert!(
+        found.is_empty(),
+        "read RequestContext, which holds the identity: {found:#?}"
+    );
+}
+
+#[test]
+fn only_listed_files_read_the_clock() {
+    let found = callers(&CLOCKS, &CLOCK_READERS);
+    assert!(
+        found.is_empty(),
+        "use the monotonic clock, or state what holds when the clock jumps: {found:#?}"
     );
 }

@@ -1,9 +1,11 @@
 //! The HTTP API of the companion.
 
 mod counts;
+mod document;
 mod floor;
 mod frame_heat_map;
 mod heat_map;
+mod operation;
 mod shared;
 mod time;
 mod tracks;
@@ -13,60 +15,59 @@ use std::{collections::BTreeMap, sync::Arc};
 use axum::{
     Json, Router,
     extract::State,
-    http::{
-        HeaderValue,
-        header::{CACHE_CONTROL, CONTENT_TYPE},
-    },
+    http::{HeaderValue, header::CACHE_CONTROL},
     middleware,
     response::Response,
-    routing::get,
 };
 use jiff::Timestamp;
 use parking_lot::Mutex;
 use serde::Serialize;
+use utoipa::{ToSchema, openapi::OpenApi};
+use utoipa_axum::{router::OpenApiRouter, routes};
 
 use crate::{engine::Engine, metrics::Metrics, sums::Owner};
 pub(crate) use counts::{MAX_VALUES, table};
+pub(crate) use operation::probes;
 pub(crate) use shared::Api;
 use shared::{Shared, now_ms};
 
 /// Returns the routes, without protection: a listener adds it.
 pub(crate) fn router(api: Api) -> Router {
-    Router::new()
-        .route("/counts", get(cameras))
-        .route("/counts/{camera}", get(counts::of_camera))
-        .route("/counts/{camera}/tracks", get(tracks::of_camera))
-        .route(
-            "/counts/{camera}/heatmap.json",
-            get(heat_map::json_of_camera),
-        )
-        .route("/counts/{camera}/heatmap.png", get(heat_map::png_of_camera))
-        .route(
-            "/counts/{camera}/heatmap-frame.png",
-            get(frame_heat_map::png),
-        )
-        .route("/sites/{site}", get(counts::of_site))
-        .route("/sites/{site}/tracks", get(tracks::of_site))
-        .route("/sites/{site}/heatmap.json", get(heat_map::json_of_site))
-        .route("/sites/{site}/heatmap.png", get(heat_map::png_of_site))
-        .route("/sites/{site}/floor.svg", get(floor::svg))
+    let (routes, _) = routes().split_for_parts();
+    routes
         .layer(middleware::map_response(without_cache))
         .with_state(Arc::new(api))
 }
 
-/// Returns the route of the metrics.
-pub(crate) fn metrics_router(engine: &Arc<Mutex<Engine>>, metrics: &Arc<Metrics>) -> Router {
-    let (engine, metrics) = (Arc::clone(engine), Arc::clone(metrics));
-    let text = async move || {
-        let text = metrics.text(&engine.lock(), now_ms());
-        ([(CONTENT_TYPE, "text/plain; version=0.0.4")], text)
-    };
-    Router::new().route("/metrics", get(text))
+/// Returns the routes with their entries in the OpenAPI document.
+fn routes() -> OpenApiRouter<Shared> {
+    OpenApiRouter::new()
+        .routes(routes!(cameras))
+        .routes(routes!(counts::of_camera))
+        .routes(routes!(tracks::of_camera))
+        .routes(routes!(heat_map::json_of_camera))
+        .routes(routes!(heat_map::png_of_camera))
+        .routes(routes!(frame_heat_map::png))
+        .routes(routes!(counts::of_site))
+        .routes(routes!(tracks::of_site))
+        .routes(routes!(heat_map::json_of_site))
+        .routes(routes!(heat_map::png_of_site))
+        .routes(routes!(floor::svg))
 }
 
-/// Returns the route of the health check.
-pub(crate) fn probes() -> Router {
-    Router::new().route("/livez", get(async || "ok\n"))
+/// Returns the routes of the listener itself for clients with access.
+pub(crate) fn operation_router(engine: &Arc<Mutex<Engine>>, metrics: &Arc<Metrics>) -> Router {
+    operation::router(engine, metrics, openapi_document)
+}
+
+/// Returns the OpenAPI document of the counts.
+#[must_use]
+pub fn openapi_document() -> OpenApi {
+    document::merged([
+        routes().into_openapi(),
+        operation::protected().into_openapi(),
+        operation::unprotected().into_openapi(),
+    ])
 }
 
 async fn without_cache(mut response: Response) -> Response {
@@ -76,11 +77,15 @@ async fn without_cache(mut response: Response) -> Response {
 }
 
 /// A camera of the list.
-#[derive(Serialize)]
+#[derive(Serialize, ToSchema)]
 struct CameraRow {
+    /// The name.
     name: String,
+    /// Time of the last counted frame.
     last_report: Option<Timestamp>,
+    /// Persons now; null while unknown.
     persons: Option<u64>,
+    /// The site of its calibration.
     site: Option<String>,
     /// Reports that were not counted since the start.
     dropped_reports: u64,
@@ -89,9 +94,11 @@ struct CameraRow {
 }
 
 /// Reports of a camera that are not counted now.
-#[derive(Serialize)]
+#[derive(Serialize, ToSchema)]
 struct Dropping {
+    /// Time of the first of them.
     since: Option<Timestamp>,
+    /// The reason, as in `lookdown_count_reports_skipped_total`.
     reason: &'static str,
 }
 
@@ -115,6 +122,12 @@ impl CameraRow {
     }
 }
 
+/// List counted cameras
+#[utoipa::path(
+    get, path = "/counts", tag = "counts", operation_id = "list_counted_cameras",
+    security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
+    responses((status = OK, description = "By name.", body = Vec<CameraRow>))
+)]
 async fn cameras(State(api): State<Shared>) -> Json<Vec<CameraRow>> {
     let engine = api.engine.lock();
     let snapshot = engine.snapshot(now_ms());

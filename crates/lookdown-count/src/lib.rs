@@ -35,6 +35,7 @@ mod store;
 mod sums;
 mod webhooks;
 
+pub use http::openapi_document;
 pub use options::{CountEntry, CountOptions, read_key};
 pub use recording::{Recording, RecordingError};
 pub use run::{CountError, Started, count};

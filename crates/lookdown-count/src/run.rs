@@ -22,7 +22,7 @@ use crate::{
     engine::{CountingOptions, Engine},
     follower::Follower,
     hand_back::hand_back,
-    http::{Api, metrics_router, probes, router},
+    http::{Api, operation_router, probes, router},
     metrics::Metrics,
     options::CountOptions,
     snapshot::Snapshot,
@@ -180,7 +180,7 @@ fn serve_alone(
         (None, None) => Access::OwnMachine,
     };
     let routes = Routes {
-        protected: counts.merge(metrics_router(engine, metrics)),
+        protected: counts.merge(operation_router(engine, metrics)),
         probes: probes(),
     };
     let open = metrics.connections.clone();

@@ -2,7 +2,7 @@
 
 use std::{num::NonZeroUsize, path::PathBuf, sync::Arc, thread::available_parallelism};
 
-use lookdown_lens::{calibration::Calibration, warning::Warning};
+use lookdown_lens::calibration::Calibration;
 use parking_lot::Mutex;
 
 use crate::{
@@ -14,8 +14,7 @@ use crate::{
     metrics::DetectMetrics,
     parameters::DetectParameters,
     pipeline::{
-        DefaultModels, DetectJob, Engine, EngineOptions, JobImage, Person, PipelineError,
-        StageTimings, ViewCounts, ZoneCount,
+        DefaultModels, DetectJob, DetectionReport, Engine, EngineOptions, JobImage, PipelineError,
     },
 };
 
@@ -61,21 +60,6 @@ pub enum DetectorError {
     /// The frame cannot be processed.
     #[error(transparent)]
     Frame(#[from] PipelineError),
-}
-
-/// The persons in a frame.
-#[derive(Debug, Clone)]
-pub struct Detections {
-    /// Persons, highest score first.
-    pub persons: Vec<Person>,
-    /// The number of persons in each zone, in the order of the calibration.
-    pub zones: Vec<ZoneCount>,
-    /// The numbers of views by outcome.
-    pub views: ViewCounts,
-    /// The time spent in each stage.
-    pub timings: StageTimings,
-    /// Circumstances that the caller should consider.
-    pub warnings: Vec<Warning>,
 }
 
 /// Detects persons in frames. Several threads may share it.
@@ -134,18 +118,11 @@ impl Detector {
         frame: Arc<Frame>,
         camera: Option<Arc<Calibration>>,
         parameters: &DetectParameters,
-    ) -> Result<Detections, DetectorError> {
+    ) -> Result<DetectionReport, DetectorError> {
         self.load_models(parameters)?;
         let image = JobImage::Decoded(frame);
         let job = DetectJob::local(String::new(), image, parameters.clone(), camera);
-        let report = self.engine.detect(&job)?.report;
-        Ok(Detections {
-            persons: report.persons,
-            zones: report.zones,
-            views: report.views,
-            timings: report.timings,
-            warnings: report.warnings,
-        })
+        Ok(self.engine.detect(&job)?.report)
     }
 
     /// Loads the models of the parameters that are not loaded yet.

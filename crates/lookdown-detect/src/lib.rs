@@ -14,5 +14,5 @@ pub mod parameters;
 pub mod pipeline;
 
 pub use detector::{
-    DEFAULT_MODELS, DEFAULT_ONNX_RUNTIME, Detections, Detector, DetectorError, DetectorOptions,
+    DEFAULT_MODELS, DEFAULT_ONNX_RUNTIME, Detector, DetectorError, DetectorOptions,
 };

@@ -109,12 +109,17 @@ mod tests {
 
     #[tokio::test]
     async fn a_child_that_grows_beyond_its_memory_fails() {
-        let mut command = command("dd");
-        // A buffer of 1.5 GiB.
+        let mut command = command("sh");
+        // A buffer of 1.5 GiB, which is taken when standard input ends: after the limits are set.
         command
-            .args(["if=/dev/zero", "of=/dev/null", "bs=1610612736", "count=1"])
+            .args([
+                "-c",
+                "read line; exec dd if=/dev/zero of=/dev/null bs=1610612736 count=1",
+            ])
+            .stdin(Stdio::piped())
             .stderr(Stdio::null());
         let mut child = spawn(&mut command, Task::Decode).unwrap();
+        drop(child.stdin.take());
         assert!(!child.wait().await.unwrap().success());
     }
 }

@@ -5,7 +5,7 @@ use lookdown_lens::{
         Calibration, CalibrationFile, FormatError,
         export::{Exported, Target},
         formats::{Camera, Format},
-        native::{NativeCalibration, NativeImage},
+        native::NativeImage,
     },
     geometry::Pixel,
 };
@@ -69,19 +69,8 @@ fn check(refusal: &FormatError) {
 fn write(camera: &Camera, calibration: &Calibration, choice: usize) {
     let target = Target::VARIANTS[choice % Target::VARIANTS.len()];
     let (width, height) = calibration.image_size();
-    let written = target.write(&NativeCalibration {
-        id: calibration.id().to_string(),
-        image: NativeImage { width, height },
-        lens: camera.lens.clone(),
-        mount: camera.mount.clone(),
-        zones: camera.zones.clone(),
-        lines: camera.lines.clone(),
-        masks: camera.masks.clone(),
-        areas: camera.areas.clone(),
-        ignore: camera.ignore.clone(),
-        detect: camera.detect.clone(),
-        sources: camera.sources.clone(),
-    });
+    let id = calibration.id().to_string();
+    let written = target.write(&camera.to_native(id, NativeImage { width, height }));
     let Ok(Exported { content, .. }) = written else {
         return;
     };

@@ -26,29 +26,51 @@ pub enum Access {
     Keys(Arc<AccessKeys>),
 }
 
+/// The holder of the only key in the headers of a request. `None` without a valid one.
+#[derive(Debug, Clone)]
+pub(in crate::api) struct Identity(Option<Holder>);
+
+impl Identity {
+    pub(in crate::api) fn holder(&self) -> Option<&Holder> {
+        self.0.as_ref()
+    }
+}
+
 impl Access {
-    /// Checks that the keys allow `wanted` to the request with these headers. Returns the holder of
-    /// its key, if there are keys.
+    /// Compares the key in the headers with all known keys, if there is exactly one.
+    pub(in crate::api) fn identify(&self, headers: &HeaderMap) -> Identity {
+        let key = only_key(presented(headers)).ok();
+        Identity(key.and_then(|key| self.holder_of(key)))
+    }
+
+    /// Checks that the keys allow `wanted` to the request with these headers and this identity.
     pub(in crate::api) fn check(
         &self,
         headers: &HeaderMap,
+        identity: &Identity,
         wanted: Scope,
-    ) -> Result<Option<Holder>, Problem> {
-        self.check_with(headers, None, wanted)
+    ) -> Result<(), Problem> {
+        self.check_with(headers, identity, None, wanted).map(drop)
     }
 
-    /// Like [`Self::check`], for a request whose key may be in a form.
+    /// Like [`Self::check`], for a request whose key may be in a form. Returns the holder of its
+    /// key, if there are keys.
     pub(in crate::api) fn check_with(
         &self,
         headers: &HeaderMap,
+        identity: &Identity,
         in_form: Option<&str>,
         wanted: Scope,
     ) -> Result<Option<Holder>, Problem> {
-        let Self::Keys(keys) = self else {
+        if !self.needs_keys() {
             return Ok(None);
-        };
+        }
         let key = only_key(presented(headers).chain(in_form.map(str::as_bytes)))?;
-        let holder = keys.holder_of(key).ok_or_else(|| {
+        let holder = match in_form {
+            Some(_) => self.holder_of(key),
+            None => identity.0.clone(),
+        };
+        let holder = holder.ok_or_else(|| {
             let detail = "the key is not valid: it was mistyped, or the server's operator \
                           has removed it";
             Problem::new(ProblemKind::KeyRequired, detail)
@@ -90,11 +112,10 @@ impl Access {
         matches!(self, Self::Keys(_))
     }
 
-    /// Returns the holder of the request's key, if the key is valid.
-    pub(in crate::api) fn holder(&self, headers: &HeaderMap) -> Option<Holder> {
+    fn holder_of(&self, key: &[u8]) -> Option<Holder> {
         match self {
             Self::Open { .. } => None,
-            Self::Keys(keys) => keys.holder_of(only_key(presented(headers)).ok()?),
+            Self::Keys(keys) => keys.holder_of(key),
         }
     }
 
@@ -103,6 +124,7 @@ impl Access {
     pub(in crate::api) fn check_of_its_own(
         &self,
         headers: &HeaderMap,
+        identity: &Identity,
         wanted: Scope,
     ) -> Result<(), Problem> {
         match self {
@@ -113,7 +135,7 @@ impl Access {
                               and read: set access.keys_file and send a key with the scope admin";
                 Err(Problem::new(ProblemKind::Forbidden, detail))
             }
-            _ => self.check(headers, wanted).map(drop),
+            _ => self.check(headers, identity, wanted),
         }
     }
 }

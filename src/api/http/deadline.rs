@@ -1,11 +1,7 @@
 //! The deadline of a request. All work for the request ends there.
 
-use std::{convert::Infallible, future::Future, time::Duration};
+use std::{future::Future, time::Duration};
 
-use axum::{
-    extract::{FromRef, FromRequestParts},
-    http::request::Parts,
-};
 use lookdown_detect::pipeline::PipelineError;
 use tokio::{
     task::spawn_blocking,
@@ -14,37 +10,38 @@ use tokio::{
 
 use super::problem::{Problem, ProblemKind};
 
-/// The longest duration of a request, from its first byte to its response.
-#[derive(Debug, Clone, Copy)]
-pub(in crate::api) struct RequestTimeout(pub(in crate::api) Duration);
+/// The setting of the limit.
+const REQUEST_TIMEOUT: &str = "server.request_timeout_millis";
 
 /// The time at which a response must be complete.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::api) struct Deadline {
     began: Instant,
     limit: Duration,
+    /// The setting or parameter that raises the limit.
+    set_by: &'static str,
 }
 
 impl Deadline {
     /// Returns the deadline `limit` from now.
     pub(in crate::api) fn begin(limit: Duration) -> Self {
-        let began = Instant::now();
-        Self { began, limit }
+        Self {
+            began: Instant::now(),
+            limit,
+            set_by: REQUEST_TIMEOUT,
+        }
     }
 
-    /// Returns the deadline of the request with this head, set when the request arrived.
-    pub(in crate::api) fn of<S>(parts: &Parts, state: &S) -> Self
-    where
-        RequestTimeout: FromRef<S>,
-    {
-        let begun = parts.extensions.get().copied();
-        begun.unwrap_or_else(|| Self::begin(RequestTimeout::from_ref(state).0))
-    }
-
-    /// Returns this deadline, but at most `limit` after the request arrived.
-    pub(in crate::api) fn within(self, limit: Duration) -> Self {
-        let limit = limit.min(self.limit);
-        Self { limit, ..self }
+    /// Returns this deadline, or that of the request's parameter if it is earlier.
+    pub(in crate::api) fn within(self, own: Option<Duration>, parameter: &'static str) -> Self {
+        match own {
+            Some(limit) if limit < self.limit => Self {
+                limit,
+                set_by: parameter,
+                ..self
+            },
+            _ => self,
+        }
     }
 
     /// Returns the time at which the request arrived.
@@ -62,18 +59,17 @@ impl Deadline {
     }
 
     /// Waits for work that holds a permit of the frame queue. Work that has not begun at the
-    /// deadline never begins. `undone` is the start of the error sentence.
+    /// deadline never begins. `undone` is the start of the error sentence, and `remedy` its advice.
     pub(in crate::api) async fn wait<T>(
         self,
         undone: &str,
+        remedy: &str,
         work: impl Future<Output = Result<T, PipelineError>>,
     ) -> Result<T, Problem> {
         let done = timeout_at(self.at(), work).await;
         let done = done.map_err(|_| {
-            let seconds = self.limit_seconds();
-            let detail = format!(
-                "{undone} within {seconds} s: send fewer requests, or raise server.request_timeout_millis"
-            );
+            let (seconds, set_by) = (self.limit_seconds(), self.set_by);
+            let detail = format!("{undone} within {seconds} s: {remedy}, or raise {set_by}");
             Problem::new(ProblemKind::Timeout, detail)
         })?;
         Ok(done?)
@@ -95,23 +91,12 @@ impl Deadline {
         let done = done.map_err(|_| {
             let detail = format!(
                 "this is not done within {} s, and goes on: look later whether it has succeeded, \
-                 or raise server.request_timeout_millis",
-                self.limit_seconds()
+                 or raise {}",
+                self.limit_seconds(),
+                self.set_by
             );
             Problem::new(ProblemKind::Timeout, detail)
         })?;
         done.map_err(Problem::internal)?.map_err(Into::into)
-    }
-}
-
-impl<S> FromRequestParts<S> for Deadline
-where
-    S: Sync,
-    RequestTimeout: FromRef<S>,
-{
-    type Rejection = Infallible;
-
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Infallible> {
-        Ok(Self::of(parts, state))
     }
 }

@@ -6,7 +6,6 @@ use std::{
     num::NonZeroU64,
     pin::Pin,
     task::{Context, Poll},
-    time::Duration,
 };
 
 use axum::{
@@ -17,13 +16,14 @@ use axum::{
         header::{CONNECTION, EXPECT},
     },
     middleware::Next,
-    response::Response,
+    response::{IntoResponse, Response},
 };
 use bytes::Bytes;
 use http_body::{Frame, SizeHint};
 use tokio::{sync::oneshot, time::timeout_at};
 
 use super::{
+    context::RequestContext,
     deadline::Deadline,
     request_body::{MinimumUploadRate, next_chunk},
 };
@@ -34,23 +34,23 @@ const DISCARDED_LIMITS: usize = 4;
 /// The limits of request bodies.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::api) struct BodyLimits {
-    /// Longest duration of a request, from its first byte to its response.
-    pub(in crate::api) request_timeout: Duration,
     /// Largest request body, bytes.
     pub(in crate::api) max_body_bytes: usize,
     /// Least upload rate; `None` for no limit.
     pub(in crate::api) min_upload_bytes_per_second: Option<NonZeroU64>,
 }
 
-/// Sets the deadline of the request, and drains the body that the handler left unread.
+/// Drains the body that the handler left unread.
 pub(in crate::api) async fn discard(
     State(limits): State<BodyLimits>,
     request: Request,
     next: Next,
 ) -> Response {
-    let (mut parts, body) = request.into_parts();
-    let deadline = Deadline::begin(limits.request_timeout);
-    parts.extensions.insert(deadline);
+    let (parts, body) = request.into_parts();
+    let deadline = match RequestContext::of(&parts.extensions) {
+        Ok(context) => context.deadline,
+        Err(problem) => return problem.into_response(),
+    };
     if body.is_end_stream() || parts.version >= Version::HTTP_2 {
         // An HTTP/2 client receives the response while it sends.
         return next.run(Request::from_parts(parts, body)).await;

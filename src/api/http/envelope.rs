@@ -17,24 +17,21 @@ use tracing::Instrument;
 use uuid::Uuid;
 
 use super::{
-    incoming_trace,
+    context::ContextSource,
     problem::{Problem, ProblemKind},
 };
-use crate::{
-    metrics::Metrics,
-    telemetry::{RequestTrace, Tracer},
-};
+use crate::{metrics::Metrics, telemetry::RequestTrace};
 
 /// The route label of requests that match no route.
 const UNMATCHED: &str = "unmatched";
 /// The log target of the access log, for `log.filter`.
 const ACCESS_LOG: &str = "lookdown::access";
 
-/// The state of this layer: metrics and traces.
+/// The state of this layer.
 #[derive(Clone)]
-pub(in crate::api) struct Surroundings {
+pub(in crate::api) struct Envelope {
     pub(in crate::api) metrics: Arc<Metrics>,
-    pub(in crate::api) tracer: Tracer,
+    pub(in crate::api) contexts: ContextSource,
 }
 
 /// The problem of a failed request, for the log.
@@ -50,21 +47,22 @@ pub(in crate::api) fn of_panic(_: Box<dyn Any + Send>) -> Response {
     Problem::fault().into_response()
 }
 
-/// Adds the request ID, the access log line, the metrics and the problem document.
+/// Adds the context of the request, the request ID, the access log line, the metrics and the problem
+/// document.
 pub(in crate::api) async fn wrap(
-    State(Surroundings { metrics, tracer }): State<Surroundings>,
-    mut request: Request,
+    State(Envelope { metrics, contexts }): State<Envelope>,
+    request: Request,
     next: Next,
 ) -> Response {
     let started = Instant::now();
-    let request_id = RequestId::of(request.headers());
-    let method = method_label(request.method());
-    let path = request.uri().path().to_owned();
-    let route = request.extensions().get::<MatchedPath>().cloned();
+    let (mut parts, body) = request.into_parts();
+    let method = method_label(&parts.method);
+    let path = parts.uri.path().to_owned();
+    let route = parts.extensions.get::<MatchedPath>().cloned();
     let route = route.as_ref().map_or(UNMATCHED, MatchedPath::as_str);
-    request.extensions_mut().insert(request_id.clone());
-    let trace = incoming_trace::begin(&tracer, || format!("{method} {route}"), request.headers());
-    request.extensions_mut().insert(trace.clone());
+    let context = contexts.begin(&mut parts, || format!("{method} {route}"));
+    let (request_id, trace) = (&context.id, &context.trace);
+    let request = Request::from_parts(parts, body);
 
     // The span has the highest level, so no filter removes the request ID from a line.
     let span = tracing::error_span!(
@@ -84,7 +82,7 @@ pub(in crate::api) async fn wrap(
         if let Some(cause) = problem.cause() {
             tracing::error!(instance = %occurrence, "{cause:#}");
         }
-        response = write_problem(response, problem, &occurrence, &request_id);
+        response = write_problem(response, problem, &occurrence, request_id);
     }
     let status = response.status();
     let class = status_class(status);
@@ -103,7 +101,7 @@ pub(in crate::api) async fn wrap(
     trace.note("http.response.status_code", i64::from(status.as_u16()));
     trace.note("url.path", path);
     trace.note("lookdown.request_id", request_id.as_str().to_owned());
-    end(&trace, status, failure.map(|failure| failure.reason));
+    end(trace, status, failure.map(|failure| failure.reason));
     let headers = response.headers_mut();
     headers.insert(request_id::HEADER, request_id.header_value());
     page_headers::complete(headers);
@@ -179,12 +177,15 @@ fn status_class(status: StatusCode) -> &'static str {
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use axum::{Router, body::Body, middleware::from_fn_with_state, routing::get};
     use http_body_util::BodyExt;
     use tower::ServiceExt;
     use tower_http::catch_panic::CatchPanicLayer;
 
     use super::*;
+    use crate::{api::http::access::Access, telemetry::Tracer};
 
     #[tokio::test]
     async fn a_panicking_handler_costs_one_request_and_reveals_nothing() {
@@ -192,15 +193,21 @@ mod tests {
             panic!("the secret cause")
         }
         let metrics = Arc::<Metrics>::default();
-        let surroundings = Surroundings {
+        let envelope = Envelope {
             metrics: Arc::clone(&metrics),
-            tracer: Tracer::default(),
+            contexts: ContextSource {
+                tracer: Tracer::default(),
+                access: Access::Open {
+                    own_machine_only: true,
+                },
+                request_timeout: Duration::from_secs(1),
+            },
         };
         let router = Router::new()
             .route("/panics", get(panics))
             .route("/works", get(async || "fine"))
             .layer(CatchPanicLayer::custom(of_panic))
-            .layer(from_fn_with_state(surroundings, wrap));
+            .layer(from_fn_with_state(envelope, wrap));
 
         let get = |path| Request::get(path).body(Body::empty()).unwrap();
         let response = router.clone().oneshot(get("/panics")).await.unwrap();

@@ -6,7 +6,6 @@
 mod buckets;
 
 use std::{
-    net::SocketAddr,
     num::NonZeroU32,
     sync::Arc,
     time::{Duration, Instant},
@@ -23,7 +22,7 @@ use parking_lot::Mutex;
 
 use self::buckets::{Buckets, Standing};
 use super::{
-    access::Access,
+    context::RequestContext,
     problem::{Problem, ProblemKind},
 };
 
@@ -53,34 +52,20 @@ impl RequestRate {
 /// The token buckets of all clients. Clones share them.
 #[derive(Clone)]
 pub(in crate::api) struct RateLimiter {
-    access: Access,
     buckets: Arc<Mutex<Buckets>>,
     policy: HeaderValue,
 }
 
 impl RateLimiter {
     /// Creates full buckets.
-    pub(in crate::api) fn new(rate: RequestRate, access: &Access) -> Self {
+    pub(in crate::api) fn new(rate: RequestRate) -> Self {
         let (interval, burst) = (rate.interval(), rate.burst.get());
         let window = whole_seconds(interval * burst);
         // Digits are visible ASCII.
         let policy = format!("\"default\";q={burst};w={window}").parse();
         Self {
-            access: access.clone(),
             buckets: Arc::new(Mutex::new(Buckets::new(interval, burst))),
             policy: policy.unwrap_or(HeaderValue::from_static("\"default\"")),
-        }
-    }
-
-    /// Returns the client whose bucket the request uses.
-    fn client_of(&self, request: &Request) -> Client {
-        let address = || {
-            let address = request.extensions().get::<SocketAddr>();
-            address.map(SocketAddr::ip)
-        };
-        match self.access.holder(request.headers()) {
-            Some(holder) => Client::with_key(holder.name.as_str()),
-            None => address().map_or(Client::Others, Client::at),
         }
     }
 
@@ -121,7 +106,11 @@ pub(in crate::api) async fn apply(
     mut request: Request,
     next: Next,
 ) -> Response {
-    let client = limiter.client_of(&request);
+    let context = match RequestContext::of(request.extensions()) {
+        Ok(context) => context,
+        Err(problem) => return problem.into_response(),
+    };
+    let client = context.caller.rate_limited.clone();
     let standing = limiter.take(client.clone());
     let last = Arc::new(Mutex::new(standing));
     let mut response = if standing.admitted {

@@ -55,7 +55,7 @@ impl IntoParams for AnnotationQuery {
     }
 }
 
-/// The frame and parameters in a form: what `upload::form` reads.
+/// The frame and parameters in a form: what `detect::upload::form` reads.
 pub(in crate::api) struct DetectForm;
 
 impl ToSchema for DetectForm {

@@ -7,8 +7,10 @@ mod failures;
 mod form;
 pub(in crate::api) mod status;
 
+use std::sync::Arc;
+
 use axum::{
-    Extension, Json,
+    Json,
     extract::{Path, State},
 };
 use lookdown_lens::calibration::CalibrationId;
@@ -17,15 +19,12 @@ use self::{
     answer::{DeepStackAnswer, DeepStackModels},
     form::{DeepStackForm, DeepStackUpload},
 };
-use crate::{
-    api::{
-        ApiState,
-        http::problem::{Problem, ProblemKind},
-        openapi::{CalibratedDetectionQuery, DetectionQuery},
-        require_scope::RequireRead,
-        run_detection::run_detection,
-    },
-    telemetry::RequestTrace,
+use crate::api::{
+    ApiState,
+    detect::run::run_detection,
+    http::problem::{Problem, ProblemKind},
+    openapi::{CalibratedDetectionQuery, DetectionQuery},
+    require_scope::RequireRead,
 };
 
 pub(in crate::api) use failures::with_failures;
@@ -46,10 +45,9 @@ pub(in crate::api) use failures::with_failures;
 )]
 pub(in crate::api) async fn detect_as_deepstack(
     State(state): State<ApiState>,
-    Extension(trace): Extension<RequestTrace>,
     upload: DeepStackUpload,
 ) -> Result<Json<DeepStackAnswer>, Problem> {
-    answer(&state, &trace, upload, None).await
+    answer(&state, upload, None).await
 }
 
 /// Detect persons with a calibration (DeepStack)
@@ -71,30 +69,27 @@ pub(in crate::api) async fn detect_as_deepstack(
 pub(in crate::api) async fn detect_as_deepstack_with(
     State(state): State<ApiState>,
     Path(calibration): Path<String>,
-    Extension(trace): Extension<RequestTrace>,
     upload: DeepStackUpload,
 ) -> Result<Json<DeepStackAnswer>, Problem> {
     // A name that is not a valid ID is reported as an unknown model.
     let calibration: CalibrationId = calibration
         .parse()
         .map_err(|error| Problem::new(ProblemKind::UnknownCalibration, format!("{error}")))?;
-    answer(&state, &trace, upload, Some(calibration)).await
+    answer(&state, upload, Some(calibration)).await
 }
 
 async fn answer(
     state: &ApiState,
-    trace: &RequestTrace,
     sent: DeepStackUpload,
     calibration: Option<CalibrationId>,
 ) -> Result<Json<DeepStackAnswer>, Problem> {
-    let (limit, arrived) = (sent.upload.deadline, sent.upload.arrived);
-    trace.stage("upload", limit.began().into_std(), arrived);
+    let context = Arc::clone(&sent.upload.context);
+    context.note_upload(sent.upload.arrived);
     let job = sent.job(state, calibration.as_ref().map(CalibrationId::as_str))?;
-    let written = run_detection(state, trace, limit, job, |found| {
+    let answered = run_detection(state, &context, job, |found| {
         Ok(DeepStackAnswer::from(found.report))
     });
-    let (_, answer) = written.await?;
-    Ok(Json(answer))
+    Ok(Json(answered.await?.answer))
 }
 
 /// List calibrations (DeepStack)

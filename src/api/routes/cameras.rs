@@ -20,9 +20,8 @@ use utoipa::ToSchema;
 use crate::{
     api::{
         ApiState,
-        caller::Caller,
         http::{
-            deadline::Deadline,
+            context::RequestContext,
             problem::{Problem, ProblemKind},
         },
         openapi::RawBytes,
@@ -97,11 +96,10 @@ impl FromRequest<ApiState> for NewCamera {
 
     async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
         let (parts, body) = request.into_parts();
-        let deadline = Deadline::of(&parts, state);
-        let caller = Caller::of(&parts, state);
-        let reader = state.body_reader(&caller.client, MAX_BYTES, "send a camera", deadline);
-        let content = reader.read(&parts.headers, body).await?.into_bytes();
-        serde_json::from_slice(&content).map_err(|error| {
+        let context = RequestContext::of(&parts.extensions)?;
+        let reader = state.body_reader(&context, MAX_BYTES, "send a camera");
+        let bytes = reader.read(&parts.headers, body).await?.into_bytes();
+        serde_json::from_slice(&bytes).map_err(|error| {
             // The value is not repeated: it may hold a password.
             let fault = format!("line {}: not a camera: compare it with /docs", error.line());
             Problem::of_parameter(ProblemKind::InvalidParameter, "body", &fault)

@@ -2,12 +2,7 @@
 
 use std::time::Instant;
 
-use axum::{
-    Json,
-    extract::State,
-    http::{HeaderMap, header::CONTENT_TYPE},
-    response::IntoResponse,
-};
+use axum::{Json, extract::State, http::header::CONTENT_TYPE, response::IntoResponse};
 use lookdown_detect::metrics::gauge_value;
 use utoipa::ToSchema;
 
@@ -124,10 +119,10 @@ pub(in crate::api) async fn livez() -> Json<Health> {
 )]
 pub(in crate::api) async fn readyz(
     State(state): State<ApiState>,
-    headers: HeaderMap,
+    reader: Result<RequireRead, Problem>,
 ) -> Result<Json<Ready>, Problem> {
     state.require_ready()?;
-    let has_details = RequireRead::check(&state, &headers).is_ok();
+    let has_details = reader.is_ok();
     Ok(Json(Ready {
         status: "ready",
         calibrations: CalibrationHealth::new(state.calibrations.health(), has_details),

@@ -136,11 +136,11 @@ pub(in crate::api) fn router() -> Router<ApiState> {
     let asset = async |Path(name): Path<String>, uri: Uri, headers: HeaderMap| {
         answer(&name, &headers, uri.path())
     };
-    let options = async |State(state): State<ApiState>, headers: HeaderMap| {
+    let options = async |State(state): State<ApiState>, admin: Result<RequireAdmin, Problem>| {
         let options = PageOptions {
             has_counts: state.options.companions.has_counts(),
             has_cameras: state.options.companions.cameras().is_some(),
-            can_change: RequireAdmin::check(&state, &headers).is_ok(),
+            can_change: admin.is_ok(),
         };
         let no_store = [(CACHE_CONTROL, HeaderValue::from_static("no-store"))];
         (no_store, Json(options)).into_response()

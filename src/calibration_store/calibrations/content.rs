@@ -68,19 +68,7 @@ fn entry(
     let (width, height) = calibration.image_size();
     let defaults = defaults(&described.detect)?;
     Ok(CalibrationEntry {
-        native: NativeCalibration {
-            id: calibration.id().to_string(),
-            image: NativeImage { width, height },
-            lens: described.lens,
-            mount: described.mount,
-            zones: described.zones,
-            lines: described.lines,
-            masks: described.masks,
-            areas: described.areas,
-            ignore: described.ignore,
-            detect: described.detect,
-            sources: described.sources,
-        },
+        native: described.to_native(calibration.id().to_string(), NativeImage { width, height }),
         defaults,
         notes: described.notes,
         calibration: Arc::new(calibration),

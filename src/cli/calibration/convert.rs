@@ -9,10 +9,7 @@ use std::{
 
 use anyhow::Context;
 use clap::Args;
-use lookdown_lens::calibration::{
-    export::Target,
-    native::{NativeCalibration, NativeImage},
-};
+use lookdown_lens::calibration::{export::Target, native::NativeImage};
 
 use super::source::Source;
 use crate::cli::output::UNWRITABLE;
@@ -48,19 +45,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
             .context("--id")?,
         None => calibration.id().clone(),
     };
-    let exported = arguments.to.write(&NativeCalibration {
-        id: id.to_string(),
-        image: NativeImage { width, height },
-        lens: stated.lens,
-        mount: stated.mount,
-        zones: stated.zones,
-        lines: stated.lines,
-        masks: stated.masks,
-        areas: stated.areas,
-        ignore: stated.ignore,
-        detect: stated.detect,
-        sources: stated.sources,
-    })?;
+    let native = stated.to_native(id.to_string(), NativeImage { width, height });
+    let exported = arguments.to.write(&native)?;
     let notes = stated.notes.iter().map(ToString::to_string);
     for note in notes.chain(exported.lost) {
         eprintln!("lookdown: {path}: {note}");

@@ -18,7 +18,7 @@ use jiff::Timestamp;
 use lookdown_count::Recording;
 use lookdown_detect::{
     parameters::DetectParameters,
-    pipeline::{CalibrationLookup, DetectJob, Detected, Engine, JobImage},
+    pipeline::{CalibrationLookup, DetectJob, DetectedFrame, Engine, JobImage},
 };
 use lookdown_lens::calibration::{Calibration, CalibrationId};
 use lookdown_watch::{VideoFrames, VideoOptions, VideoWriter, video_created_at, video_duration};
@@ -245,7 +245,7 @@ impl Counting<'_> {
         &self,
         name: &str,
         images: Vec<(Timestamp, Bytes)>,
-    ) -> anyhow::Result<Vec<(Timestamp, Detected)>> {
+    ) -> anyhow::Result<Vec<(Timestamp, DetectedFrame)>> {
         thread::scope(|scope| {
             let running = images.into_iter().map(|(at, image)| {
                 let job = DetectJob::local(

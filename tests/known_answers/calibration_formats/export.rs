@@ -145,19 +145,7 @@ fn a_skewed_lens_is_refused_by_formats_without_skew() {
 fn a_native_file_keeps_everything() {
     let content = fixture("calibrations/nvidia_ftheta.json");
     let read_back = camera(&content, 0);
-    let native = NativeCalibration {
-        id: "hall".to_owned(),
-        image: read_back.image.unwrap(),
-        lens: read_back.lens,
-        mount: read_back.mount,
-        zones: read_back.zones,
-        lines: Vec::new(),
-        masks: read_back.masks,
-        areas: read_back.areas,
-        ignore: read_back.ignore,
-        detect: read_back.detect,
-        sources: read_back.sources,
-    };
+    let native = read_back.to_native("hall".to_owned(), read_back.image.unwrap());
     let written = Target::Native.write(&native).unwrap().content;
     let file = CalibrationFile::parse(written.as_bytes()).unwrap();
     assert_eq!(file.cameras[0].name.as_deref(), Some("hall"));

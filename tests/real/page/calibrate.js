@@ -13,12 +13,15 @@ async function start(page, lens = "") {
   await page.locator("#previews canvas").nth(3).waitFor();
 }
 
+const idle = (page) => page.locator("#previews-progress:not([aria-busy])").waitFor({ state: "attached" });
+
 /** Waits until the views are straightened again after `act`. */
 async function straightenedAfter(page, act) {
+  await idle(page);
   const answered = page.waitForResponse((answer) => answer.url().includes("/views?profile=fast"));
   await act();
   const answer = await answered;
-  await page.locator("#previews-progress:not([aria-busy])").waitFor({ state: "attached" });
+  await idle(page);
   return answer;
 }
 
@@ -100,7 +103,7 @@ pageTest("a file without a frame size is read with the size of this frame", "#de
   await page.locator("#import-file").setInputFiles(`${FIXTURES}/py_ocamcalib.json`);
   const saying = page.getByRole("alert");
   await page.waitForResponse((answer) => answer.url().includes("size=960x960"));
-  await page.locator("#previews-progress:not([aria-busy])").waitFor({ state: "attached" });
+  await idle(page);
   assert.equal(await saying.count(), 0, (await saying.allTextContents()).join());
 }, { expected: /status of 422/ });
 

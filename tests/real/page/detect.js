@@ -97,6 +97,16 @@ pageTest("every parameter runs a new detection at once", "#detect", async (page)
   assert.deepEqual([reset.profile, reset.refinement.name, reset.refinement.score_threshold], ["balanced", "fusion", 0.3]);
 });
 
+pageTest("a parameter that was changed just before a frame is opened runs no second detection", "#detect", async (page) => {
+  const asked = [];
+  page.on("request", (request) => request.url().includes("/detect?") && asked.push(request.url()));
+  await page.clock.install();
+  await detectSample(page, "office", "office");
+  await page.clock.runFor(2000);
+  await page.locator("#persons li").first().waitFor();
+  assert.equal(asked.length, 1);
+});
+
 pageTest("persons in the list and in the image are linked", "#detect", async (page) => {
   await detectSample(page, "office");
   await page.mouse.move(0, 0);

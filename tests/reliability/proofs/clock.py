@@ -10,14 +10,13 @@ import tempfile
 import time
 from pathlib import Path
 
+from support.companion import NO_LIBRARY, clock_of, faketime
 from support.effort import Effort
 from support.exchange import Lost, ask, connect, read_answer, request
 from support.lookdown import DETECT, TINY, lookdown
 from support.places import OFFICE, SAMPLES
 from support.row import Row
 
-LIBRARY = "libfaketimeMT.so.1"
-FOLDERS = ("/usr/lib", "/usr/lib64", "/usr/local/lib")
 JUMPS = ("+1h", "-1h", "+3650d", "-3650d")
 LIMIT_SECONDS = 2.0
 SLACK_SECONDS = 1.0
@@ -27,21 +26,16 @@ def prove(effort: Effort) -> list[Row]:
     """Makes all jumps one after the other in one server."""
     del effort
     row = Row("clock jumps", f"{', '.join(JUMPS)}, back to the truth after each")
-    library = next((found for folder in FOLDERS for found in sorted(Path(folder).rglob(LIBRARY))), None)
+    library = faketime()
     if library is None:
-        row.skipped = "needs libfaketime (Debian: apt-get install libfaketime)"
+        row.skipped = NO_LIBRARY
         return [row]
     with tempfile.TemporaryDirectory() as name:
         clock, calibrations = Path(name) / "clock", Path(name) / "calibrations"
         calibrations.mkdir()
         (calibrations / "office.json").write_bytes((SAMPLES / "calibrations" / "office.json").read_bytes())
         clock.write_text("+0", encoding="ascii")
-        environment = {
-            "LD_PRELOAD": str(library),
-            "FAKETIME_TIMESTAMP_FILE": str(clock),
-            "FAKETIME_NO_CACHE": "1",
-            "FAKETIME_DONT_FAKE_MONOTONIC": "1",
-        }
+        environment = clock_of(library, clock)
         settings = TINY | {
             "LOG__FILTER": "error",
             "SERVER__REQUEST_TIMEOUT_MILLIS": str(int(LIMIT_SECONDS * 1000)),

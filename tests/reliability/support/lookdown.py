@@ -24,12 +24,14 @@ def lookdown(
     calibrations: Path = SAMPLES / "calibrations",
     inside: Sequence[str] = (),
     environment: dict[str, str] | None = None,
+    port: int = 0,
 ) -> Iterator[Server]:
     """Starts a server, waits until it is ready, and stops it at the end.
 
-    `inside` is a command that runs it in a separate environment, such as `prlimit`.
+    `inside` is a command that runs it in a separate environment, such as `prlimit`. `port` is that of a server
+    before; without it, the port is a free one.
     """
-    (port,) = free_ports(1)
+    port = port or free_ports(1)[0]
     wanted = {"SERVER__LISTEN": f"127.0.0.1:{port}", "CALIBRATIONS__PATH": str(calibrations), **AT_ONCE, **settings}
     variables = {f"LOOKDOWN__{name}": value for name, value in wanted.items()} | (environment or {})
     # Like `make serve`.

@@ -17,9 +17,13 @@ use axum::{
 use jiff::Timestamp;
 use lookdown_http::problem::Problem;
 use serde::Serialize;
+use utoipa::{
+    ToSchema,
+    openapi::{Object, ObjectBuilder, OneOfBuilder, Ref, RefOr, Schema, Type},
+};
 
 use super::{
-    shared::{Shared, blocking, check_known, query},
+    shared::{Shared, blocking, check_known, stored},
     time::TimeParameters,
 };
 use crate::{
@@ -32,11 +36,15 @@ use crate::{
 pub(crate) const MAX_VALUES: usize = 100_000;
 
 /// The counts of a camera or a site.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, ToSchema)]
 struct Counts {
+    /// The camera; absent for a site.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     camera: Option<String>,
+    /// The site; absent for a camera.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     site: Option<String>,
     from: Timestamp,
     to: Timestamp,
@@ -45,27 +53,33 @@ struct Counts {
 }
 
 /// The counts of a step. Unknown counts are null.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, ToSchema)]
 struct StepCounts {
     from: Timestamp,
     to: Timestamp,
     /// Seconds of the step in which reports arrived.
     known_seconds: f64,
     persons: Option<PersonCounts>,
+    /// Crossings by line and direction; absent for a site.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     lines: Option<BTreeMap<String, BTreeMap<String, Option<u64>>>>,
+    /// Counts by zone; absent for a site.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(schema_with = zones_schema)]
     zones: Option<BTreeMap<String, Option<ZoneCounts>>>,
 }
 
-#[derive(Debug, Serialize)]
+/// Persons of a step.
+#[derive(Debug, Serialize, ToSchema)]
 struct PersonCounts {
     mean: f64,
     max: u64,
 }
 
-#[derive(Debug, Serialize)]
-struct ZoneCounts {
+/// Counts of a zone in a step.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct ZoneCounts {
     entries: u64,
     mean: f64,
     max: u64,
@@ -74,9 +88,28 @@ struct ZoneCounts {
     dwell_seconds: Option<f64>,
 }
 
+/// Describes counts or null by zone, which the derived schema cannot.
+fn zones_schema() -> Object {
+    let counts = OneOfBuilder::new()
+        .item(ObjectBuilder::new().schema_type(Type::Null))
+        .item(Ref::from_schema_name(ZoneCounts::name()));
+    ObjectBuilder::new()
+        .description(Some("Counts by zone; absent for a site."))
+        .additional_properties(Some(RefOr::T(Schema::from(counts))))
+        .build()
+}
+
 /// The lines with their directions, and the zones.
 type Names = (BTreeSet<(String, String)>, BTreeSet<String>);
 
+/// Get the counts of a camera
+#[utoipa::path(
+    get, path = "/counts/{camera}", tag = "counts", operation_id = "get_camera_counts",
+    security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
+    params(("camera" = String, Path, description = "The name of the camera."), TimeParameters),
+    responses((status = OK, description = "Counts per step. Unknown counts are null.",
+        content((Counts = "application/json"), (String = "text/csv"))))
+)]
 pub(super) async fn of_camera(
     State(api): State<Shared>,
     Path(camera): Path<String>,
@@ -86,6 +119,14 @@ pub(super) async fn of_camera(
     answer(&api, Owner::Camera(camera), parameters, &headers).await
 }
 
+/// Get the counts of a site
+#[utoipa::path(
+    get, path = "/sites/{site}", tag = "sites", operation_id = "get_site_counts",
+    security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
+    params(("site" = String, Path, description = "The name of the site."), TimeParameters),
+    responses((status = OK, description = "Counts per step. Unknown counts are null.",
+        content((Counts = "application/json"), (String = "text/csv"))))
+)]
 pub(super) async fn of_site(
     State(api): State<Shared>,
     Path(site): Path<String>,
@@ -118,10 +159,9 @@ async fn answer(
     };
     check_known(api, &owner).await?;
     let names = current_names(api, &owner);
-    let asked = owner.clone();
-    let sums = query(api, move |store| store.steps(&asked, span, MAX_VALUES)).await?;
-    let sums = sums.ok_or_else(too_large)?;
+    let store = api.store.clone();
     blocking(move || {
+        let sums = stored(store.steps(&owner, span, MAX_VALUES))?.ok_or_else(too_large)?;
         let counts = counts(owner, span, &sums, names).ok_or_else(too_large)?;
         if !is_csv {
             return Ok(Json(counts).into_response());

@@ -18,6 +18,13 @@ const AROUND_CAMERA_M: f64 = 4.0;
 /// Farthest from the first camera that is drawn, metres.
 const MAX_EXTENT_M: f64 = 500.0;
 
+/// Draw the floor of a site
+#[utoipa::path(
+    get, path = "/sites/{site}/floor.svg", tag = "sites", operation_id = "draw_site_floor",
+    security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
+    params(("site" = String, Path, description = "The name of the site.")),
+    responses((status = OK, description = "Cameras, lines, zones and persons.", body = String, content_type = "image/svg+xml"))
+)]
 pub(super) async fn svg(
     State(api): State<Shared>,
     Path(site): Path<String>,

@@ -12,12 +12,22 @@ use lookdown_tracking::heat_map::Cell;
 use super::{
     heat_map::{Parameters, colour, image, stored},
     shared::{Shared, blocking, not_found},
+    time::TimeParameters,
 };
 use crate::{definition::CameraDefinition, sums::Owner};
 
 /// Width of the image, pixels. Its height follows from the frame.
 const WIDTH: u32 = 480;
 
+/// Draw a heat map over frames
+///
+/// Covers whole days (UTC). `step` and `format` have no effect.
+#[utoipa::path(
+    get, path = "/counts/{camera}/heatmap-frame.png", tag = "counts", operation_id = "draw_frame_heat_map",
+    security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
+    params(("camera" = String, Path, description = "The name of the camera."), TimeParameters),
+    responses((status = OK, description = "The heat map.", body = Vec<u8>, content_type = "image/png"))
+)]
 pub(super) async fn png(
     State(api): State<Shared>,
     Path(camera): Path<String>,

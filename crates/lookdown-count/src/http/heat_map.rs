@@ -12,6 +12,7 @@ use jiff::Timestamp;
 use lookdown_http::problem::Problem;
 use lookdown_tracking::heat_map::{CELL_M, Cell};
 use serde::Serialize;
+use utoipa::ToSchema;
 
 use super::{
     counts::unknown_parameter,
@@ -26,7 +27,7 @@ const MAX_SIDE: i64 = 400;
 const CELL_PX: usize = 8;
 
 /// Presence on the floor.
-#[derive(Serialize)]
+#[derive(Serialize, ToSchema)]
 struct HeatMap {
     /// First and last day are whole days (UTC).
     from: Timestamp,
@@ -40,6 +41,15 @@ struct HeatMap {
 
 pub(super) type Parameters = Result<Query<TimeParameters>, QueryRejection>;
 
+/// Get a camera's heat map
+///
+/// Covers whole days (UTC). `step` and `format` have no effect.
+#[utoipa::path(
+    get, path = "/counts/{camera}/heatmap.json", tag = "counts", operation_id = "get_camera_heat_map",
+    security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
+    params(("camera" = String, Path, description = "The name of the camera."), TimeParameters),
+    responses((status = OK, description = "Seconds of presence on the floor.", body = HeatMap))
+)]
 pub(super) async fn json_of_camera(
     State(api): State<Shared>,
     Path(camera): Path<String>,
@@ -50,6 +60,15 @@ pub(super) async fn json_of_camera(
         .map(Json)
 }
 
+/// Get a site's heat map
+///
+/// Covers whole days (UTC). `step` and `format` have no effect.
+#[utoipa::path(
+    get, path = "/sites/{site}/heatmap.json", tag = "sites", operation_id = "get_site_heat_map",
+    security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
+    params(("site" = String, Path, description = "The name of the site."), TimeParameters),
+    responses((status = OK, description = "Seconds of presence on the floor.", body = HeatMap))
+)]
 pub(super) async fn json_of_site(
     State(api): State<Shared>,
     Path(site): Path<String>,
@@ -60,6 +79,15 @@ pub(super) async fn json_of_site(
         .map(Json)
 }
 
+/// Draw a camera's heat map
+///
+/// Covers whole days (UTC). `step` and `format` have no effect.
+#[utoipa::path(
+    get, path = "/counts/{camera}/heatmap.png", tag = "counts", operation_id = "draw_camera_heat_map",
+    security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
+    params(("camera" = String, Path, description = "The name of the camera."), TimeParameters),
+    responses((status = OK, description = "The heat map.", body = Vec<u8>, content_type = "image/png"))
+)]
 pub(super) async fn png_of_camera(
     State(api): State<Shared>,
     Path(camera): Path<String>,
@@ -68,6 +96,15 @@ pub(super) async fn png_of_camera(
     png(heat_map(&api, Owner::Camera(camera), parameters).await?).await
 }
 
+/// Draw a site's heat map
+///
+/// Covers whole days (UTC). `step` and `format` have no effect.
+#[utoipa::path(
+    get, path = "/sites/{site}/heatmap.png", tag = "sites", operation_id = "draw_site_heat_map",
+    security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
+    params(("site" = String, Path, description = "The name of the site."), TimeParameters),
+    responses((status = OK, description = "The heat map.", body = Vec<u8>, content_type = "image/png"))
+)]
 pub(super) async fn png_of_site(
     State(api): State<Shared>,
     Path(site): Path<String>,

@@ -6,12 +6,18 @@ use jiff::Timestamp;
 use lookdown_common::text::one_line;
 use lookdown_http::problem::{Kind, Problem};
 use parking_lot::Mutex;
+use tokio::sync::Semaphore;
 
 use crate::{
     engine::Engine,
     store::{Store, StoreError},
     sums::Owner,
 };
+
+/// Most requests that read or draw at a time: a response is several times larger while it is made.
+const MAX_CONCURRENT: usize = 4;
+
+static PERMITS: Semaphore = Semaphore::const_new(MAX_CONCURRENT);
 
 /// Everything that requests read.
 pub(crate) struct Api {
@@ -31,19 +37,23 @@ pub(super) async fn query<T: Send + 'static>(
     query: impl FnOnce(&Store) -> Result<T, StoreError> + Send + 'static,
 ) -> Result<T, Problem> {
     let store = api.store.clone();
-    blocking(move || {
-        query(&store).map_err(|problem| {
-            tracing::error!("{problem}");
-            Problem::internal()
-        })
-    })
-    .await
+    blocking(move || stored(query(&store))).await
 }
 
-/// Runs work that takes time without blocking the runtime.
+/// Returns what the store returned. Only the log has the reason of a failure.
+pub(super) fn stored<T>(result: Result<T, StoreError>) -> Result<T, Problem> {
+    result.map_err(|problem| {
+        tracing::error!("{problem}");
+        Problem::internal()
+    })
+}
+
+/// Runs work that takes time and memory without blocking the runtime, a few requests at a time.
 pub(super) async fn blocking<T: Send + 'static>(
     work: impl FnOnce() -> Result<T, Problem> + Send + 'static,
 ) -> Result<T, Problem> {
+    // The permits are never closed.
+    let _permit = PERMITS.acquire().await;
     let done = tokio::task::spawn_blocking(work).await;
     // A task that panicked is logged by the panic hook.
     done.unwrap_or_else(|_| Err(Problem::internal()))

@@ -3,6 +3,7 @@
 use jiff::{SignedDuration, Timestamp, ToSpan, Zoned, tz::TimeZone};
 use lookdown_http::problem::Problem;
 use serde::Deserialize;
+use utoipa::IntoParams;
 
 use super::shared::now_ms;
 use crate::{store::Span, sums::MINUTE_MS};
@@ -16,14 +17,24 @@ const DEFAULT_SPAN: i64 = 24 * 60;
 const DEFAULT_STEP: i64 = 15;
 
 /// The parameters as they are sent.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
 pub(super) struct TimeParameters {
+    /// The begin, in whole minutes, or `today`, `yesterday` or `week`; a day before `to` if absent.
+    #[param(nullable = false)]
     from: Option<String>,
+    /// The end; now if absent.
+    #[param(format = DateTime, nullable = false)]
     to: Option<String>,
+    /// A duration of whole minutes, up to a week, such as `1h`; `15m` if absent.
+    #[param(nullable = false)]
     step: Option<String>,
-    /// The time zone of named days.
+    /// The time zone of `today`, `yesterday` and `week`, such as `Europe/Berlin`; that of this machine if absent.
+    #[param(nullable = false)]
     time_zone: Option<String>,
+    /// `json` or `csv`; `Accept: text/csv` if absent.
+    #[param(nullable = false, pattern = "^(json|csv)$")]
     pub(super) format: Option<String>,
 }
 
@@ -124,22 +135,22 @@ fn step(text: &str) -> Result<i64, Problem> {
 mod tests {
     use super::*;
 
-    fn milliseconds(text: &str) -> Option<i64> {
-        Some(text.parse::<Timestamp>().unwrap().as_millisecond())
+    fn milliseconds(text: &str) -> i64 {
+        text.parse::<Timestamp>().unwrap().as_millisecond()
     }
 
     #[test]
     fn named_days_begin_at_midnight_of_the_zone() {
         // The clocks went back by an hour on this Sunday.
         let now: Zoned = "2026-10-25T12:00[Europe/Berlin]".parse().unwrap();
-        let today = milliseconds("2026-10-24T22:00:00Z");
+        let today = Some(milliseconds("2026-10-24T22:00:00Z"));
         assert_eq!(named("today", &now), (today, None));
-        let yesterday = milliseconds("2026-10-23T22:00:00Z");
+        let yesterday = Some(milliseconds("2026-10-23T22:00:00Z"));
         assert_eq!(named("yesterday", &now), (yesterday, today));
-        let monday = milliseconds("2026-10-18T22:00:00Z");
+        let monday = Some(milliseconds("2026-10-18T22:00:00Z"));
         assert_eq!(named("week", &now), (monday, None));
         let later: Zoned = "2026-10-26T12:00[Europe/Berlin]".parse().unwrap();
-        let day = (today, milliseconds("2026-10-25T23:00:00Z"));
+        let day = (today, Some(milliseconds("2026-10-25T23:00:00Z")));
         assert_eq!(named("yesterday", &later), day, "25 hours");
     }
 }

@@ -10,7 +10,7 @@ use jiff::Timestamp;
 use lookdown_http::problem::Problem;
 use lookdown_tracking::{Plane, TailPoint, Track};
 use serde::Serialize;
-use serde_json::{Value, json};
+use utoipa::ToSchema;
 
 use super::shared::{Shared, check_known, now_ms};
 use crate::{
@@ -27,7 +27,7 @@ const TAIL_S: f64 = 5.0;
 const OUTLINE_SEGMENTS: u32 = 16;
 
 /// The current tracks of a camera or a site.
-#[derive(Serialize)]
+#[derive(Serialize, ToSchema)]
 #[expect(clippy::struct_field_names, reason = "names of the answer")]
 pub(super) struct Tracks {
     /// Time of the last frame; null before the first.
@@ -37,30 +37,63 @@ pub(super) struct Tracks {
     tracks: Vec<TrackRow>,
     /// The lines and zones of the camera with their counts.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    lines: Vec<Value>,
+    lines: Vec<LineRow>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    zones: Vec<Value>,
+    zones: Vec<ZoneRow>,
+}
+
+/// A line of a camera.
+#[derive(Serialize, ToSchema)]
+struct LineRow {
+    line: String,
+    directions: [String; 2],
+    /// Crossings by direction since the store was created.
+    crossings: BTreeMap<String, u64>,
+    /// In the frame.
+    outline_px: Vec<[f64; 2]>,
+}
+
+/// A zone of a camera.
+#[derive(Serialize, ToSchema)]
+struct ZoneRow {
+    zone: String,
+    /// Persons now; null while unknown.
+    persons: Option<u64>,
+    entries: u64,
+    /// In the frame.
+    outline_px: Option<Vec<[f64; 2]>>,
 }
 
 /// A track. Places are on the floor in metres, or in frame pixels of the camera.
-#[derive(Serialize)]
+#[derive(Serialize, ToSchema)]
 struct TrackRow {
     id: u64,
     first_seen: Option<Timestamp>,
     last_seen: Option<Timestamp>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     floor_m: Option<[f64; 2]>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     velocity_m_s: Option<[f64; 2]>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     frame_px: Option<[f64; 2]>,
     /// On the floor, or in the frame without the camera's height.
     tail: Vec<[f64; 2]>,
     /// In the frame; absent for a site.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     tail_px: Option<Vec<[f64; 2]>>,
 }
 
+/// Get the tracks of a camera
+#[utoipa::path(
+    get, path = "/counts/{camera}/tracks", tag = "counts", operation_id = "get_camera_tracks",
+    security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
+    params(("camera" = String, Path, description = "The name of the camera.")),
+    responses((status = OK, description = "The current tracks.", body = Tracks))
+)]
 pub(super) async fn of_camera(
     State(api): State<Shared>,
     Path(camera): Path<String>,
@@ -73,6 +106,13 @@ pub(super) async fn of_camera(
     Ok(Json(answer.unwrap_or_else(Tracks::none)))
 }
 
+/// Get the tracks of a site
+#[utoipa::path(
+    get, path = "/sites/{site}/tracks", tag = "sites", operation_id = "get_site_tracks",
+    security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
+    params(("site" = String, Path, description = "The name of the site.")),
+    responses((status = OK, description = "The current tracks.", body = Tracks))
+)]
 pub(super) async fn of_site(
     State(api): State<Shared>,
     Path(site): Path<String>,
@@ -130,7 +170,7 @@ impl Tracks {
 }
 
 /// Returns the lines with their totals and their places in the frame.
-fn line_rows(camera: &SceneCamera, totals: &[LineSnapshot]) -> Vec<Value> {
+fn line_rows(camera: &SceneCamera, totals: &[LineSnapshot]) -> Vec<LineRow> {
     let geometry = camera.definition.geometry.as_ref();
     let lines = geometry.into_iter().flat_map(|geometry| {
         let lines = geometry.areas.lines.iter();
@@ -143,21 +183,23 @@ fn line_rows(camera: &SceneCamera, totals: &[LineSnapshot]) -> Vec<Value> {
     });
     let rows = lines.map(|(line, outline)| {
         let of_line = totals.iter().filter(|total| total.line == line.name);
-        let crossings: BTreeMap<_, _> = of_line
-            .map(|total| (total.direction.as_str(), total.crossings))
+        let crossings = of_line
+            .map(|total| (total.direction.clone(), total.crossings))
             .collect();
         let outline = outline.into_iter().flatten();
         let outline: Vec<_> = outline.map(|point| rounded([point.x, point.y])).collect();
-        json!({
-            "line": line.name, "directions": line.directions, "crossings": crossings,
-            "outline_px": outline,
-        })
+        LineRow {
+            line: line.name.clone(),
+            directions: line.directions.clone(),
+            crossings,
+            outline_px: outline,
+        }
     });
     rows.collect()
 }
 
 /// Returns the zones with their persons and their outlines in the frame.
-fn zone_rows(camera: &SceneCamera, current: &[ZoneSnapshot]) -> Vec<Value> {
+fn zone_rows(camera: &SceneCamera, current: &[ZoneSnapshot]) -> Vec<ZoneRow> {
     let Some(geometry) = &camera.definition.geometry else {
         return Vec::new();
     };
@@ -170,10 +212,12 @@ fn zone_rows(camera: &SceneCamera, current: &[ZoneSnapshot]) -> Vec<Value> {
             seen.map(|point| rounded([point.x, point.y]))
                 .collect::<Vec<_>>()
         });
-        json!({
-            "zone": zone.zone, "persons": zone.persons, "entries": zone.entries,
-            "outline_px": outline,
-        })
+        ZoneRow {
+            zone: zone.zone.clone(),
+            persons: zone.persons,
+            entries: zone.entries,
+            outline_px: outline,
+        }
     });
     rows.collect()
 }

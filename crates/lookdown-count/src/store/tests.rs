@@ -4,7 +4,7 @@ use super::*;
 use crate::{
     batch::Batch,
     message::Message,
-    sums::{LineDirection, Owner, PresenceSum, Sums, Totals, ZoneOf, ZoneSum},
+    sums::{DAY_MS, LineDirection, MINUTE_MS, Owner, PresenceSum, Sums, Totals, ZoneOf, ZoneSum},
 };
 
 fn batch(minute: i64, last_event: u64) -> Batch {
@@ -113,6 +113,35 @@ fn old_sums_expire_and_totals_stay() {
             .sum::<u64>(),
         4
     );
+}
+
+#[test]
+fn a_clock_that_is_ahead_removes_one_day_at_most() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(&folder.path().join("counts.sqlite")).unwrap();
+    let day = DAY_MS / MINUTE_MS;
+    for (event, minute) in [(0, 10), (1, 100), (2, day + 100), (3, 3 * day)] {
+        store.commit(&batch(minute, event), &[], None).unwrap();
+    }
+    let hall = Owner::Camera("hall".to_owned());
+    let known_days = || {
+        let span = Span {
+            from: 0,
+            to: 4 * day,
+            step: day,
+        };
+        let steps = store.steps(&hall, span, 100).unwrap().unwrap();
+        let known = steps
+            .into_iter()
+            .filter(|(_, step)| step.presence.known_ms > 0);
+        known.map(|(number, _)| number).collect::<Vec<_>>()
+    };
+    assert_eq!(known_days(), [0, 1, 3]);
+    let ten_years_later = 3650 * DAY_MS;
+    store.expire(ten_years_later).unwrap();
+    assert_eq!(known_days(), [1, 3]);
+    store.expire(ten_years_later).unwrap();
+    assert_eq!(known_days(), [3]);
 }
 
 #[test]

@@ -101,16 +101,25 @@ impl Store {
         Ok(())
     }
 
-    /// Removes sums of minutes and days that ended before this time. Blocks.
+    /// Removes sums of minutes and days that ended before this time: those of the oldest day at most,
+    /// so that a clock that is ahead for a while does not remove all of them. Blocks.
     pub(crate) fn expire(&self, before_ms: i64) -> Result<(), StoreError> {
+        const MINUTES_OF_A_DAY: i64 = DAY_MS / MINUTE_MS;
+        let minute = before_ms.div_euclid(MINUTE_MS);
+        let day = before_ms.div_euclid(DAY_MS);
         let mut connection = self.writer.lock();
         let transaction = connection.transaction()?;
-        let minute = before_ms.div_euclid(MINUTE_MS);
-        for table in ["presence", "crossings", "zones"] {
-            transaction.execute(&format!("DELETE FROM {table} WHERE minute < ?"), [minute])?;
+        for (table, column, before, at_most) in [
+            ("presence", "minute", minute, MINUTES_OF_A_DAY),
+            ("crossings", "minute", minute, MINUTES_OF_A_DAY),
+            ("zones", "minute", minute, MINUTES_OF_A_DAY),
+            ("cells", "day", day, 1),
+        ] {
+            let statement = format!(
+                "DELETE FROM {table} WHERE {column} < min(?, (SELECT min({column}) FROM {table}) + ?)"
+            );
+            transaction.execute(&statement, [before, at_most])?;
         }
-        let day = before_ms.div_euclid(DAY_MS);
-        transaction.execute("DELETE FROM cells WHERE day < ?", [day])?;
         Ok(transaction.commit()?)
     }
 }

@@ -12,7 +12,7 @@ use super::{InferenceError, heads::Head};
 pub use input::{Layout, ManifestInput};
 
 /// The manifest's name in a model's folder.
-pub(super) const FILE_NAME: &str = "model.toml";
+pub const FILE_NAME: &str = "model.toml";
 /// Longest manifest, bytes.
 const MAX_BYTES: u64 = 1 << 20;
 
@@ -88,6 +88,12 @@ impl ModelManifest {
             path: path.clone(),
             problem,
         };
+        if let (false, Some(file)) = (path.exists(), own_model(folder)) {
+            return Err(unusable(format!(
+                "there is no such file: write it with `lookdown model check --write-manifest {}`",
+                file.display()
+            )));
+        }
         let text =
             files::read_text(&path, MAX_BYTES).map_err(|error| unreadable(error.to_string()))?;
         let manifest: Self =
@@ -116,6 +122,13 @@ impl ModelManifest {
     }
 }
 
+/// Returns an ONNX file of a folder.
+fn own_model(folder: &Path) -> Option<PathBuf> {
+    let entries = std::fs::read_dir(folder).ok()?;
+    let mut paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
+    paths.find(|path| path.extension().is_some_and(|ending| ending == "onnx"))
+}
+
 /// Longest name of a model, characters.
 const MAX_NAME: usize = 64;
 
@@ -126,7 +139,8 @@ pub(super) fn is_name(name: &str) -> bool {
 }
 
 /// Makes a valid name from a file name.
-fn name_from(stem: &str) -> String {
+#[must_use]
+pub fn name_from(stem: &str) -> String {
     let usable = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-');
     let name: String = stem
         .chars()

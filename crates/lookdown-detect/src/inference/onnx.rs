@@ -128,6 +128,31 @@ impl OnnxDetector {
         Ok((detector(session), others))
     }
 
+    /// Returns the inputs and outputs of an ONNX file, which needs no manifest.
+    ///
+    /// # Errors
+    /// [`InferenceError`] when the library, the device or the file cannot be used.
+    pub fn tensors(
+        library: &Path,
+        file: &Path,
+        options: &OnnxOptions,
+    ) -> Result<(Vec<OnnxTensor>, Vec<OnnxTensor>), InferenceError> {
+        let environment = environment::load(library)?;
+        let path = || file.to_owned();
+        let unusable = |problem| InferenceError::Unusable {
+            path: path(),
+            problem,
+        };
+        let bytes = onnx_file::read(file).map_err(|detail| InferenceError::Unreadable {
+            path: path(),
+            detail,
+        })?;
+        onnx_file::check(&bytes).map_err(unusable)?;
+        let session = provider::builder(environment, library, options)?.commit(&bytes);
+        let session = session.map_err(|error| unusable(first_line(&error)))?;
+        Ok(description::tensors(&session))
+    }
+
     /// Description of the model, from its manifest and its ONNX file.
     #[must_use]
     pub fn description(&self) -> &ModelDescription {

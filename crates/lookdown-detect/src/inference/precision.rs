@@ -25,8 +25,8 @@ pub enum Int8Use {
     /// The models of `fast`, of upright crops, and SSDLite: INT8 is faster for them on any CPU, and
     /// as accurate.
     SmallProfiles,
-    /// Those, and the model of `balanced`.
-    AllButQuality,
+    /// All models.
+    All,
 }
 
 impl Int8Use {
@@ -39,7 +39,7 @@ impl Int8Use {
                 "balanced and quality use FP32, the other default models INT8 (this CPU has no \
                  VNNI or dotprod)"
             }
-            Self::AllButQuality => "the default models use INT8, except that of quality",
+            Self::All => "all default models use INT8",
         }
     }
 
@@ -57,7 +57,7 @@ impl Int8Use {
             (Device::Cpu, PrecisionChoice::Auto) if !cpu_has_integer_dot_product() => {
                 Self::SmallProfiles
             }
-            (Device::Cpu, PrecisionChoice::Auto | PrecisionChoice::Int8) => Self::AllButQuality,
+            (Device::Cpu, PrecisionChoice::Auto | PrecisionChoice::Int8) => Self::All,
             (Device::Cpu, PrecisionChoice::Fp32) | (Device::Cuda(_) | Device::TensorRt(_), _) => {
                 Self::None
             }
@@ -84,9 +84,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn auto_uses_int8_for_balanced_with_vnni_only() {
+    fn auto_uses_int8_for_all_profiles_with_vnni_only() {
         let expected = if cpu_has_integer_dot_product() {
-            Int8Use::AllButQuality
+            Int8Use::All
         } else {
             Int8Use::SmallProfiles
         };
@@ -97,7 +97,7 @@ mod tests {
     fn a_requested_precision_is_used_and_gpus_use_fp32() {
         assert_eq!(
             Int8Use::on(Device::Cpu, PrecisionChoice::Int8),
-            Int8Use::AllButQuality
+            Int8Use::All
         );
         assert_eq!(
             Int8Use::on(Device::Cpu, PrecisionChoice::Fp32),

@@ -19,7 +19,7 @@ pub struct ServerMetadata {
     #[schema(required)]
     pub extensions: Vec<String>,
     /// The default models that use 8-bit integers: `none`, `small_profiles` (`fast`, upright crops,
-    /// `paper`, `direct`) or `all_but_quality`. Omitted with a single model for all profiles.
+    /// `paper`, `direct`) or `all`. Omitted with a single model for all profiles.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub int8_models: Option<String>,
 }

@@ -30,10 +30,11 @@ pub enum Profile {
     /// Five wide views and up to 5 upright crops of the frame; on a CPU by a model in INT8.
     Fast,
     /// 18 views, wide around the nadir and narrow at the rim, and up to 12 upright crops of the
-    /// frame; on a CPU the crops by a model in INT8.
+    /// frame; by models in INT8 where the CPU has instructions for them.
     #[default]
     Balanced,
-    /// 24 views and up to 16 upright crops of the frame.
+    /// 24 views and up to 16 upright crops of the frame; by models in INT8 where the CPU has
+    /// instructions for them.
     Quality,
     /// No views: the detector on the fisheye frame itself (the paper's "Omni" row).
     Direct,

@@ -16,7 +16,9 @@ fn preferred(profile: Profile, int8: Int8Use) -> &'static [&'static str] {
         (Profile::Paper | Profile::Direct, Int8Use::None) => &[FALLBACK],
         (Profile::Paper | Profile::Direct, _) => &[SSDLITE_INT8],
         (Profile::Fast, Int8Use::SmallProfiles)
-        | (Profile::Fast | Profile::Balanced, Int8Use::AllButQuality) => &[NANODET_INT8, NANODET],
+        | (Profile::Fast | Profile::Balanced | Profile::Quality, Int8Use::All) => {
+            &[NANODET_INT8, NANODET]
+        }
         (Profile::Fast | Profile::Balanced | Profile::Quality, _) => &[NANODET],
     }
 }
@@ -28,7 +30,7 @@ fn preferred_for_crops(profile: Profile, int8: Int8Use) -> &'static [&'static st
     match (profile, int8) {
         (Profile::Paper | Profile::Direct, _) => &[],
         (_, Int8Use::None) => &[FISHEYE],
-        (_, Int8Use::SmallProfiles | Int8Use::AllButQuality) => &[FISHEYE_INT8],
+        (_, Int8Use::SmallProfiles | Int8Use::All) => &[FISHEYE_INT8],
     }
 }
 
@@ -167,11 +169,11 @@ mod tests {
             (NANODET_INT8, NANODET)
         );
         assert_eq!(cpu.of(Profile::Balanced), gpu.of(Profile::Balanced));
-        let vnni = DefaultModels::per_profile(Int8Use::AllButQuality, |_| true);
+        let vnni = DefaultModels::per_profile(Int8Use::All, |_| true);
         assert_eq!(vnni.of(Profile::Balanced), NANODET_INT8);
+        assert_eq!(vnni.of(Profile::Quality), NANODET_INT8);
         assert_eq!(vnni.crop_model(Profile::Balanced), Some(FISHEYE_INT8));
-        let not_fetched =
-            DefaultModels::per_profile(Int8Use::AllButQuality, |name| name != NANODET_INT8);
+        let not_fetched = DefaultModels::per_profile(Int8Use::All, |name| name != NANODET_INT8);
         assert_eq!(not_fetched.of(Profile::Balanced), NANODET);
     }
 

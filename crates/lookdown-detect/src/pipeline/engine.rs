@@ -22,8 +22,8 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 pub use self::observation::Observation;
 use self::placed::Placed;
 use super::{
-    BatchOptions, CalibrationLookup, DefaultModels, DetectJob, Detected, DetectionReport, JobImage,
-    Person, PipelineError, Stage, StageTimings,
+    BatchOptions, CalibrationLookup, DefaultModels, DetectJob, DetectedFrame, DetectionReport,
+    JobImage, Person, PipelineError, Stage, StageTimings,
     inference_cache::{FrameKey, InferenceCache},
     merge,
     motion_cache::{CameraViews, MotionCache},
@@ -158,7 +158,7 @@ impl Engine {
     ///
     /// # Errors
     /// Returns a [`PipelineError`], which distinguishes client and server faults.
-    pub fn detect(&self, job: &DetectJob) -> Result<Detected, PipelineError> {
+    pub fn detect(&self, job: &DetectJob) -> Result<DetectedFrame, PipelineError> {
         let observation = self.observe(job)?;
         let timeline = &job.ticket.timeline;
         let parameters = &job.parameters;
@@ -208,7 +208,7 @@ impl Engine {
             .map(|pass| pass.rig)
             .collect();
         let has_no_masks = observation.camera.rig.has_no_masks();
-        Ok(Detected {
+        Ok(DetectedFrame {
             withdrawn: job.ticket.withdrawn.clone(),
             report,
             frame: observation.frame,

@@ -118,7 +118,7 @@ pub struct ViewsJob {
 
 /// A report together with its frame.
 #[derive(Debug, Clone)]
-pub struct Detected {
+pub struct DetectedFrame {
     /// The persons with the settings and timings of their detection.
     pub report: DetectionReport,
     /// The decoded frame, EXIF orientation applied.
@@ -132,7 +132,7 @@ pub struct Detected {
     pub(super) rigs: Vec<Arc<CameraRig>>,
 }
 
-impl Detected {
+impl DetectedFrame {
     /// Returns the outlines of the views in corner-origin frame pixels: the plan's views, then the
     /// views of the second pass. Empty if the detector processed the whole frame.
     #[must_use]

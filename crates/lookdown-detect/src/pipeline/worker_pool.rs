@@ -13,7 +13,7 @@ use tokio::sync::oneshot;
 use tokio_util::sync::CancellationToken;
 
 use super::{
-    DetectJob, Detected, Engine, PipelineError, Stage, Stall, Ticket, ViewsJob,
+    DetectJob, DetectedFrame, Engine, PipelineError, Stage, Stall, Ticket, ViewsJob,
     error::internal,
     frame_cost,
     frame_queue::FrameQueue,
@@ -105,7 +105,7 @@ impl WorkerPool {
     /// [`PipelineError::Overloaded`] at once when the queue is full, [`PipelineError::ShareUsed`]
     /// when the client has too many frames in it, [`PipelineError::ShuttingDown`] after [`WorkerPool::shut_down`], otherwise the error of the
     /// engine.
-    pub async fn detect(&self, job: DetectJob) -> Result<Detected, PipelineError> {
+    pub async fn detect(&self, job: DetectJob) -> Result<DetectedFrame, PipelineError> {
         self.detect_and(job, |detected| detected).await
     }
 
@@ -117,7 +117,7 @@ impl WorkerPool {
     pub async fn detect_and<T: Send + 'static>(
         &self,
         job: DetectJob,
-        finish: impl FnOnce(Detected) -> T + Send + 'static,
+        finish: impl FnOnce(DetectedFrame) -> T + Send + 'static,
     ) -> Result<T, PipelineError> {
         let ticket = job.ticket.clone();
         ticket.timeline.enter(Stage::Queue, job.arrived);

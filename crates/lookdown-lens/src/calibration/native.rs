@@ -52,6 +52,26 @@ pub struct NativeCalibration {
     pub sources: BTreeMap<String, NativeSource>,
 }
 
+impl NativeCalibration {
+    /// Creates the calibration of a camera that looks straight down, without areas and defaults.
+    #[must_use]
+    pub fn new(id: String, image: NativeImage, lens: LensModel) -> Self {
+        Self {
+            id,
+            image,
+            lens,
+            mount: NativeMount::default(),
+            zones: Vec::new(),
+            lines: Vec::new(),
+            masks: Vec::new(),
+            areas: Vec::new(),
+            ignore: Vec::new(),
+            detect: BTreeMap::new(),
+            sources: BTreeMap::new(),
+        }
+    }
+}
+
 /// A frame size.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

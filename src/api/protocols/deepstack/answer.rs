@@ -4,7 +4,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::{
-    api::report::{Report, ReportPerson},
+    api::detect::report::{Report, ReportPerson},
     calibration_store::CalibrationRow,
 };
 

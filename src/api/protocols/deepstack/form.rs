@@ -12,13 +12,14 @@ use crate::{
     access::Scope,
     api::{
         ApiState,
-        detect_parameters::detect_parameters,
+        detect::defaults::detect_parameters,
+        detect::upload::{FieldUse, Upload, is_multipart},
         http::{
             access,
+            context::RequestContext,
             problem::{Problem, ProblemKind},
             query::query_parameters,
         },
-        upload::{FieldUse, Upload, is_multipart},
     },
 };
 
@@ -64,7 +65,8 @@ impl FromRequest<ApiState> for DeepStackUpload {
         // up the memory of the others.
         let mut budget = &state.uploads;
         if !is_form || access::shows_key(headers) {
-            known.check(headers, Scope::Detect)?;
+            let context = RequestContext::of(request.extensions())?;
+            known.check(headers, &context.identity, Scope::Detect)?;
         } else if known.needs_keys() {
             budget = &state.unauthenticated_uploads;
         }
@@ -83,7 +85,12 @@ impl FromRequest<ApiState> for DeepStackUpload {
         }
         drop(keys);
         let key = key.as_ref().map(|(_, key)| key.as_str());
-        let holder = known.check_with(&upload.headers, key, Scope::Detect)?;
+        let holder = known.check_with(
+            &upload.headers,
+            &upload.context.identity,
+            key,
+            Scope::Detect,
+        )?;
         upload.caller = upload.caller.with_holder(known, holder.as_ref());
         Ok(Self { upload, query })
     }

@@ -2,7 +2,6 @@
 
 use std::{sync::Arc, time::Instant};
 
-use jiff::Timestamp;
 use lookdown_detect::{
     inference::{HeadOutput, Model},
     open_inference::{Datatype, metadata::ModelMetadata},
@@ -17,14 +16,10 @@ use super::{
     request::InferRequest,
     tensor::{Tensor, Values, misfit},
 };
-use crate::{
-    api::{
-        ApiState,
-        caller::Caller,
-        http::{deadline::Deadline, problem::Problem, query::pairs, request_body::Held},
-        limit::Limit,
-    },
-    telemetry::RequestTrace,
+use crate::api::{
+    ApiState,
+    detect::run::wait_for_workers,
+    http::{context::RequestContext, problem::Problem, query::pairs, request_body::Held},
 };
 
 const INPUT: &str = "views";
@@ -49,15 +44,15 @@ pub(super) fn metadata(model: &Model) -> ModelMetadata {
 
 pub(super) async fn infer(
     state: &ApiState,
-    caller: &Caller,
-    trace: &RequestTrace,
-    (model, mut request): (Arc<Model>, InferRequest),
-    (deadline, _, arrived): (Deadline, Timestamp, Instant),
+    context: &RequestContext,
+    model: Arc<Model>,
+    mut request: InferRequest,
+    arrived: Instant,
 ) -> Result<InferAnswer, Problem> {
     request.wanted.check(&OUTPUTS)?;
     let pixels = Box::new(pixels(request.only_input(INPUT)?, &model)?);
     let parameters = view_parameters(&request)?;
-    let ticket = caller.ticket_at(parameters.priority)?;
+    let ticket = context.caller.ticket_at(parameters.priority)?;
     let timeline = ticket.timeline.clone();
     let job = ViewsJob {
         arrived,
@@ -73,8 +68,7 @@ pub(super) async fn infer(
         };
         InferAnswer::write(&answerer, &outputs(&found), &request.wanted)
     });
-    let limit = Limit::of(deadline, parameters.timeout);
-    limit.wait(trace, &timeline, work).await?
+    wait_for_workers(context, parameters.timeout, &timeline, work).await?
 }
 
 /// Returns the pixels of views of the model's input size.

@@ -1,23 +1,20 @@
 //! Inference requests.
 
-use axum::{Extension, extract::State, response::IntoResponse};
+use axum::{extract::State, response::IntoResponse};
 
 use super::{
     content_encoding::decompressed,
     detector,
     document::{InferRequestBody, InferResponseBody},
-    persons,
+    persons::{self, ArrivalTimes},
     request::InferRequest,
     requested_model::{ModelAddress, RequestedModel},
 };
-use crate::{
-    api::{
-        ApiState,
-        http::{problem::Problem, rate_limit::RequestTokens},
-        openapi::RawBytes,
-        upload::ReceivedRequest,
-    },
-    telemetry::RequestTrace,
+use crate::api::{
+    ApiState,
+    detect::upload::ReceivedRequest,
+    http::{problem::Problem, rate_limit::RequestTokens},
+    openapi::RawBytes,
 };
 
 /// Run inference
@@ -50,33 +47,29 @@ use crate::{
 )]
 pub(in crate::api) async fn infer(
     State(state): State<ApiState>,
-    Extension(trace): Extension<RequestTrace>,
     address: ModelAddress,
     arrival: ReceivedRequest,
 ) -> Result<impl IntoResponse, Problem> {
     let model = RequestedModel::find(&state, &address)?;
-    trace.stage(
-        "upload",
-        arrival.deadline.began().into_std(),
-        arrival.arrived,
-    );
+    let context = arrival.context;
+    context.note_upload(arrival.arrived);
     let tokens = arrival.parts.extensions.get::<RequestTokens>().cloned();
     let (headers, body) = (arrival.parts.headers, arrival.body.into_bytes());
-    let caller = arrival.caller;
-    let budget = state.uploads.of(&caller.client);
+    let budget = state.uploads.of(&context.caller.client);
     let max_bytes = state.options.max_body_bytes;
     let read = move || {
         let body = decompressed(&headers, body, max_bytes, &budget)?;
         InferRequest::read(&headers, &body, &budget)
     };
-    let read = arrival.deadline.blocking(read).await?;
-    let times = (arrival.deadline, arrival.received_at, arrival.arrived);
+    let read = context.deadline.blocking(read).await?;
+    let times = ArrivalTimes {
+        received_at: arrival.received_at,
+        arrived: arrival.arrived,
+    };
     match model {
-        RequestedModel::Frames => {
-            persons::infer(&state, &caller, &trace, read, times, tokens).await
-        }
+        RequestedModel::Frames => persons::infer(&state, &context, read, times, tokens).await,
         RequestedModel::Views(model) => {
-            detector::infer(&state, &caller, &trace, (model, read), times).await
+            detector::infer(&state, &context, model, read, times.arrived).await
         }
     }
 }
@@ -105,9 +98,8 @@ pub(in crate::api) async fn infer(
 )]
 pub(in crate::api) async fn infer_version(
     state: State<ApiState>,
-    trace: Extension<RequestTrace>,
     address: ModelAddress,
     arrival: ReceivedRequest,
 ) -> Result<impl IntoResponse, Problem> {
-    infer(state, trace, address, arrival).await
+    infer(state, address, arrival).await
 }

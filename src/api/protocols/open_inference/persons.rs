@@ -7,7 +7,7 @@ use bytes::Bytes;
 use jiff::Timestamp;
 use lookdown_detect::{
     open_inference::{Datatype, metadata::ModelMetadata},
-    pipeline::{DetectJob, DetectionReport},
+    pipeline::DetectJob,
 };
 
 use super::{
@@ -17,17 +17,13 @@ use super::{
     request::InferRequest,
     tensor::{Values, misfit},
 };
-use crate::{
-    api::{
-        ApiState,
-        caller::Caller,
-        detect_parameters::detect_parameters,
-        http::{deadline::Deadline, problem::Problem, query::pairs, rate_limit::RequestTokens},
-        report::ReportPerson,
-        report_headers::{PERSON_COUNT, report_headers},
-        run_detection::{DetectionOutcome, run_detection},
-    },
-    telemetry::RequestTrace,
+use crate::api::{
+    ApiState,
+    detect::defaults::detect_parameters,
+    detect::headers::{PERSON_COUNT, report_headers},
+    detect::report::ReportPerson,
+    detect::run::{AnswerInput, Answered, run_detection},
+    http::{context::RequestContext, problem::Problem, query::pairs, rate_limit::RequestTokens},
 };
 
 /// The model that detects persons in frames.
@@ -63,14 +59,22 @@ pub(super) fn metadata() -> ModelMetadata {
     }
 }
 
+/// The times of the arrival of a frame.
+#[derive(Clone, Copy)]
+pub(super) struct ArrivalTimes {
+    /// Time at which the request of the frame arrived.
+    pub(super) received_at: Timestamp,
+    /// Time at which the frame was in memory.
+    pub(super) arrived: Instant,
+}
+
 /// Detects the persons in each frame of a request, one after another. A frame after the first is
 /// admitted like a request of its own. The first failure ends the request.
 pub(super) async fn infer(
     state: &ApiState,
-    caller: &Caller,
-    trace: &RequestTrace,
+    context: &RequestContext,
     mut request: InferRequest,
-    (deadline, mut received_at, mut arrived): (Deadline, Timestamp, Instant),
+    mut times: ArrivalTimes,
     tokens: Option<RequestTokens>,
 ) -> Result<InferAnswer, Problem> {
     request.wanted.check(&OUTPUTS)?;
@@ -87,20 +91,27 @@ pub(super) async fn infer(
     let mut found = FrameOutputs::default();
     let mut headers = Vec::new();
     for (index, frame) in frames.into_iter().enumerate() {
-        let ticket = caller.ticket_at(parameters.priority)?;
+        let ticket = context.caller.ticket_at(parameters.priority)?;
+        let ArrivalTimes {
+            received_at,
+            arrived,
+        } = times;
         let job = DetectJob::sent(frame, parameters.clone(), ticket, received_at, arrived);
         let tokens = tokens.as_ref().filter(|_| index > 0);
-        let done = detect(state, trace, deadline, job, tokens).await;
-        let (report, of_frame) = done.map_err(|problem| {
+        let done = detect(state, context, job, tokens).await;
+        let answered = done.map_err(|problem| {
             if is_batch {
                 problem.of_element(INPUT, index)
             } else {
                 problem
             }
         })?;
-        headers = report_headers(&report).into();
-        found.append(of_frame);
-        (received_at, arrived) = (Timestamp::now(), Instant::now());
+        headers = report_headers(&answered.report).into();
+        found.append(answered.answer);
+        times = ArrivalTimes {
+            received_at: Timestamp::now(),
+            arrived: Instant::now(),
+        };
     }
     if is_batch {
         headers = vec![(PERSON_COUNT, HeaderValue::from(found.scores.len()))];
@@ -113,7 +124,7 @@ pub(super) async fn infer(
         };
         InferAnswer::write(&answerer, &found.into_outputs(), &request.wanted)
     };
-    let mut answer = deadline.blocking(write).await?;
+    let mut answer = context.deadline.blocking(write).await?;
     answer.report_headers = headers;
     Ok(answer)
 }
@@ -121,18 +132,16 @@ pub(super) async fn infer(
 /// Detects the persons in a frame, which takes one of the `tokens` of a rate limit.
 async fn detect(
     state: &ApiState,
-    trace: &RequestTrace,
-    deadline: Deadline,
+    context: &RequestContext,
     job: DetectJob,
     tokens: Option<&RequestTokens>,
-) -> Result<(DetectionReport, FrameOutputs), Problem> {
+) -> Result<Answered<FrameOutputs>, Problem> {
     if let Some(tokens) = tokens {
         tokens.take()?;
     }
-    let write = |found: DetectionOutcome<'_>| {
-        Ok(FrameOutputs::of(&found.report.persons, found.json.clone()))
-    };
-    run_detection(state, trace, deadline, job, write).await
+    let write =
+        |found: AnswerInput<'_>| Ok(FrameOutputs::of(&found.report.persons, found.json.clone()));
+    run_detection(state, context, job, write).await
 }
 
 /// The outputs for the persons of one frame or several.

@@ -19,9 +19,9 @@ use super::address::NewCalibrationAddress;
 use crate::{
     api::{
         ApiState,
+        detect::upload::Upload,
         http::problem::{Problem, ProblemKind},
         openapi::RawBytes,
-        upload::Upload,
     },
     room_calibration::{room_calibration, tilt_deg},
     rounding::{degrees, pixels, share},
@@ -76,12 +76,13 @@ pub(in crate::api) async fn fit(
             fault,
         ));
     }
-    let (image, deadline) = (upload.image, upload.deadline);
+    let (image, deadline) = (upload.image, upload.context.deadline);
     let limits = state.workers.engine().options().decode_limits;
     let fitting = state.workers.run(upload.caller.ticket(), move |_| {
         fitted(&limits, &id, &image)
     });
-    let fitted = deadline.wait("the camera was not fitted", fitting).await?;
+    let remedy = "send fewer requests at a time, use a smaller frame";
+    let fitted = deadline.wait("no fit", remedy, fitting).await?;
     Ok(Json(fitted?))
 }
 

@@ -4,7 +4,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::{
-    api::report::ReportWarning,
+    api::detect::report::ReportWarning,
     calibration_store::{CalibrationEntry, CalibrationRow},
 };
 

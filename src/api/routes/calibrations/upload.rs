@@ -10,9 +10,8 @@ use lookdown_lens::calibration::{CalibrationFile, native::NotAFrameSize};
 use crate::{
     api::{
         ApiState,
-        caller::Caller,
         http::{
-            deadline::Deadline,
+            context::RequestContext,
             problem::{Problem, ProblemKind},
             query::parameters_named,
         },
@@ -78,11 +77,10 @@ impl CalibrationUpload {
 
 async fn content(request: Request, state: &ApiState) -> Result<(Bytes, Uri), Problem> {
     let (parts, body) = request.into_parts();
-    let deadline = Deadline::of(&parts, state);
+    let context = RequestContext::of(&parts.extensions)?;
     let remedy = "send a calibration file";
-    let caller = Caller::of(&parts, state);
     let max_bytes = CalibrationFile::MAX_BYTES;
-    let reader = state.body_reader(&caller.client, max_bytes, remedy, deadline);
-    let content = reader.read(&parts.headers, body).await?;
-    Ok((content.into_bytes(), parts.uri))
+    let reader = state.body_reader(&context, max_bytes, remedy);
+    let bytes = reader.read(&parts.headers, body).await?;
+    Ok((bytes.into_bytes(), parts.uri))
 }

@@ -23,8 +23,7 @@ use super::{
 use crate::{
     api::{
         ApiState,
-        caller::Caller,
-        http::{deadline::Deadline, problem::Problem, query::parameters_named},
+        http::{caller::Caller, deadline::Deadline, problem::Problem, query::parameters_named},
         openapi::RawBytes,
         require_scope::RequireRead,
     },
@@ -197,7 +196,11 @@ async fn answered(
         serde_json::to_vec(&plan).map_err(Problem::internal)
     });
     let json = deadline
-        .wait("the view plan was not finished", planning)
+        .wait(
+            "the view plan was not finished",
+            "send fewer requests",
+            planning,
+        )
         .await??;
     Ok(([(CONTENT_TYPE, "application/json")], json).into_response())
 }

@@ -15,7 +15,11 @@ use tokio::time::sleep;
 
 use super::{address::CameraAddress, feed::Feed};
 use crate::{
-    api::{ApiState, caller::Caller, http::problem::Problem, require_scope::RequireRead},
+    api::{
+        ApiState,
+        http::{caller::Caller, problem::Problem},
+        require_scope::RequireRead,
+    },
     results::Cameras,
 };
 
@@ -103,7 +107,7 @@ async fn stream(
             () = key_removed(&state, &headers) => return None,
         };
         // A stream must not outlive its key.
-        RequireRead::check(&state, &headers).ok()?;
+        RequireRead::check_again(&state, &headers).ok()?;
         Some((Ok::<_, Infallible>(event), (feed, state, headers)))
     });
     let events = Sse::new(events).keep_alive(KeepAlive::new().interval(KEEP_ALIVE));
@@ -116,7 +120,7 @@ async fn key_removed(state: &ApiState, headers: &HeaderMap) {
     if !state.options.access.needs_keys() {
         return pending().await;
     }
-    while RequireRead::check(state, headers).is_ok() {
+    while RequireRead::check_again(state, headers).is_ok() {
         sleep(KEY_CHECK).await;
     }
 }

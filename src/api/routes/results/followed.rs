@@ -12,9 +12,8 @@ use super::{address::CameraAddress, unknown};
 use crate::{
     api::{
         ApiState,
-        caller::Caller,
         http::{
-            deadline::Deadline,
+            context::RequestContext,
             problem::{Problem, ProblemKind},
         },
         require_scope::RequireDetect,
@@ -41,12 +40,11 @@ impl FromRequest<ApiState> for FollowedPersons {
 
     async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
         let (parts, body) = request.into_parts();
-        let deadline = Deadline::of(&parts, state);
-        let caller = Caller::of(&parts, state);
+        let context = RequestContext::of(&parts.extensions)?;
         let remedy = "send an object such as {\"persons\": 5}";
-        let reader = state.body_reader(&caller.client, MAX_BYTES, remedy, deadline);
-        let content = reader.read(&parts.headers, body).await?.into_bytes();
-        let sent: Self = serde_json::from_slice(&content).map_err(|error| {
+        let reader = state.body_reader(&context, MAX_BYTES, remedy);
+        let bytes = reader.read(&parts.headers, body).await?.into_bytes();
+        let sent: Self = serde_json::from_slice(&bytes).map_err(|error| {
             Problem::new(
                 ProblemKind::InvalidParameter,
                 format!("the body: {error}: {remedy}"),

@@ -19,8 +19,8 @@ use super::{NO_CACHE, address::CameraAddress, unknown};
 use crate::{
     api::{
         ApiState,
+        detect::report::Report,
         http::{problem::Problem, query::parameters_named},
-        report::Report,
         require_scope::RequireRead,
     },
     results::{Cameras, ReportId, StoredReport, medians},

@@ -17,14 +17,14 @@ use super::{NO_CACHE, address::CameraAddress, unknown};
 use crate::{
     api::{
         ApiState,
-        caller::Caller,
+        detect::report::Report,
         http::{
+            caller::Caller,
             deadline::Deadline,
             entity_tags::{entity_tag, is_unmodified},
             problem::Problem,
             query::parameters_named,
         },
-        report::Report,
         require_scope::RequireRead,
     },
     results::{Cameras, StoredReport},
@@ -74,10 +74,10 @@ pub(in crate::api) async fn get_latest(
     let report = if wait.is_zero() {
         state.results.latest(&camera).await?
     } else {
-        let limit = deadline.within(wait);
+        let limit = deadline.within(Some(wait), "wait");
         let report = wait_for_newer(&state, &caller, &camera, &headers, limit).await?;
         // The key may have been removed during the wait.
-        RequireRead::check(&state, &headers)?;
+        RequireRead::check_again(&state, &headers)?;
         report
     };
     let report = report.ok_or_else(|| unknown(&camera))?;

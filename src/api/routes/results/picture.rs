@@ -16,8 +16,8 @@ use crate::{
     annotated_image::{AnnotationOptions, StoredFrame, StoredFrameError},
     api::{
         ApiState,
-        caller::Caller,
         http::{
+            caller::Caller,
             deadline::Deadline,
             entity_tags::{entity_tag, is_unmodified},
             problem::{Problem, ProblemKind},
@@ -81,7 +81,9 @@ pub(in crate::api) async fn get_picture(
     let drawing = state.workers.run(caller.ticket(), move |withdrawn| {
         frame.annotated(&options, &|| withdrawn.is_cancelled())
     });
-    let drawn = deadline.wait("the image was not drawn", drawing).await?;
+    let drawn = deadline
+        .wait("the image was not drawn", "send fewer requests", drawing)
+        .await?;
     let picture = Bytes::from(drawn.map_err(|error| undrawn(&camera, error))?);
     Ok((about(&id), [(CONTENT_TYPE, "image/jpeg")], picture).into_response())
 }

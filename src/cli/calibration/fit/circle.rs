@@ -102,20 +102,12 @@ fn calibration(
     let radius_in_focal_lengths = rim.x - of_one_pixel.principal_point().x;
     let lens = lens(thousandths(circle.radius / radius_in_focal_lengths));
     Ok(NativeCalibration {
-        id: arguments.id.to_string(),
-        image,
-        lens,
         mount: NativeMount {
             height_m: arguments.height,
             ..NativeMount::default()
         },
-        zones: Vec::new(),
-        lines: Vec::new(),
-        masks: Vec::new(),
-        areas: Vec::new(),
-        ignore: Vec::new(),
-        detect: BTreeMap::new(),
         sources: sources(arguments, agreed),
+        ..NativeCalibration::new(arguments.id.to_string(), image, lens)
     })
 }
 

@@ -5,7 +5,13 @@ use crate::pipeline::test_support::{BlobDetector, calibration, engine, frame_wit
 
 /// Runs detection on a frame with a disc of 20 pixels at `center`. The frame is `scale` times as
 /// large as the calibration's image; the disc is in pixels of the calibration's image.
-fn detected(engine: &Engine, areas: &str, profile: &str, scale: u32, center: [f64; 2]) -> Detected {
+fn detected(
+    engine: &Engine,
+    areas: &str,
+    profile: &str,
+    scale: u32,
+    center: [f64; 2],
+) -> DetectedFrame {
     let factor = f64::from(scale);
     let image = frame_with_disc(600 * scale, center.map(|at| at * factor), 20.0 * factor);
     let mut job = job(image, &[("profile", profile)]);

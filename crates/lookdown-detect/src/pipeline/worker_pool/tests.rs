@@ -31,7 +31,7 @@ fn direct_job() -> DetectJob {
     )
 }
 
-fn spawn(pool: &Arc<WorkerPool>) -> tokio::task::JoinHandle<Result<Detected, PipelineError>> {
+fn spawn(pool: &Arc<WorkerPool>) -> tokio::task::JoinHandle<Result<DetectedFrame, PipelineError>> {
     let pool = Arc::clone(pool);
     tokio::spawn(async move { pool.detect(direct_job()).await })
 }

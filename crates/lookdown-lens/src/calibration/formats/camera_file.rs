@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use super::{Format, FormatError};
 use crate::{
     calibration::native::{
-        NativeImage, NativeLine, NativeMask, NativeMount, NativePlace, NativeSource, NativeValue,
-        NativeZone,
+        NativeCalibration, NativeImage, NativeLine, NativeMask, NativeMount, NativePlace,
+        NativeSource, NativeValue, NativeZone,
     },
     geometry::lens::LensModel,
     warning::Warning,
@@ -71,6 +71,24 @@ impl Camera {
             detect: BTreeMap::new(),
             sources: BTreeMap::new(),
             notes: Vec::new(),
+        }
+    }
+
+    /// Returns the camera as the content of a native file.
+    #[must_use]
+    pub fn to_native(&self, id: String, image: NativeImage) -> NativeCalibration {
+        NativeCalibration {
+            id,
+            image,
+            lens: self.lens.clone(),
+            mount: self.mount.clone(),
+            zones: self.zones.clone(),
+            lines: self.lines.clone(),
+            masks: self.masks.clone(),
+            areas: self.areas.clone(),
+            ignore: self.ignore.clone(),
+            detect: self.detect.clone(),
+            sources: self.sources.clone(),
         }
     }
 }

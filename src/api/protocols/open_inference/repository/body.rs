@@ -7,9 +7,8 @@ use utoipa::ToSchema;
 
 use crate::api::{
     ApiState,
-    caller::Caller,
     http::{
-        deadline::Deadline,
+        context::RequestContext,
         problem::{Problem, ProblemKind},
     },
 };
@@ -55,10 +54,9 @@ impl<T: DeserializeOwned + Default> FromRequest<ApiState> for SmallBody<T> {
 
     async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
         let (parts, body) = request.into_parts();
-        let deadline = Deadline::of(&parts, state);
-        let caller = Caller::of(&parts, state);
+        let context = RequestContext::of(&parts.extensions)?;
         let remedy = "send a shorter body";
-        let reader = state.body_reader(&caller.client, MAX_BYTES, remedy, deadline);
+        let reader = state.body_reader(&context, MAX_BYTES, remedy);
         let bytes = reader.read(&parts.headers, body).await?.into_bytes();
         if bytes.is_empty() {
             return Ok(Self(T::default()));

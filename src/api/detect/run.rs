@@ -1,0 +1,197 @@
+//! Detection for all routes: waits for the report until the deadline, and counts, traces and stores
+//! it.
+
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use bytes::Bytes;
+use lookdown_detect::{
+    imaging::annotate::Concealment,
+    pipeline::{DetectJob, DetectedFrame, DetectionReport, PipelineError, Timeline},
+};
+
+use crate::{
+    annotated_image::StoredFrame,
+    api::{
+        ApiState,
+        detect::report::Report,
+        http::{context::RequestContext, problem::Problem},
+    },
+    metrics::Metrics,
+    results::{NewPicture, NewReport},
+    telemetry::RequestTrace,
+};
+
+/// The input of a response.
+pub(in crate::api) struct AnswerInput<'a> {
+    /// The frame and its detections.
+    pub(in crate::api) frame: DetectedFrame,
+    /// The report.
+    pub(in crate::api) report: &'a Report,
+    /// The report as stored JSON.
+    pub(in crate::api) json: &'a Bytes,
+}
+
+/// An answered request.
+pub(in crate::api) struct Answered<T> {
+    /// The report.
+    pub(in crate::api) report: DetectionReport,
+    /// The response of the writer.
+    pub(in crate::api) answer: T,
+}
+
+/// The report as stored JSON, and the response of the writer.
+struct Written<T> {
+    json: Bytes,
+    answer: T,
+}
+
+/// The results of the work on a worker thread.
+struct Finished<T> {
+    report: DetectionReport,
+    picture: Option<NewPicture>,
+    written: Result<Written<T>, Problem>,
+}
+
+/// Detects the persons in a frame. `write` builds the response while the frame still holds its
+/// permit.
+pub(in crate::api) async fn run_detection<T: Send + 'static>(
+    state: &ApiState,
+    context: &RequestContext,
+    job: DetectJob,
+    write: impl FnOnce(AnswerInput<'_>) -> Result<T, Problem> + Send + 'static,
+) -> Result<Answered<T>, Problem> {
+    let timeout = job.parameters.timeout;
+    let timeline = job.ticket.timeline.clone();
+    let is_stored = job.parameters.store;
+    let concealment = state.options.conceal_pictures;
+    let pictures_of = Arc::clone(&state.options.pictures_of);
+    let work = state.workers.detect_and(job, move |detected| {
+        // Drawing needs the frame after the report has been taken.
+        let report = detected.report.clone();
+        let is_kept = is_stored && pictures_of.include(&report.camera);
+        let picture = is_kept.then(|| picture(&detected, concealment)).flatten();
+        Finished {
+            report,
+            picture,
+            written: written(detected, write),
+        }
+    });
+    let finished = wait_for_workers(context, timeout, &timeline, work).await?;
+    let report = finished.report;
+    describe(&context.trace, &report);
+    record(&state.metrics, &report);
+    let Written { json, answer } = finished.written?;
+    if is_stored {
+        let kept = NewReport {
+            camera: report.camera.clone(),
+            received_at: report.received_at,
+            persons: report.persons.len(),
+            json,
+        };
+        state.results.publish(kept, finished.picture);
+        record_zones(state, &report);
+    }
+    Ok(Answered { report, answer })
+}
+
+/// Waits for work of the worker threads until the deadline, or until the timeout of the request
+/// itself. Adds the stages of the work to the trace.
+pub(in crate::api) async fn wait_for_workers<T>(
+    context: &RequestContext,
+    timeout: Option<Duration>,
+    timeline: &Timeline,
+    work: impl Future<Output = Result<T, PipelineError>>,
+) -> Result<T, Problem> {
+    let remedy = "send fewer frames or views at a time, use a faster profile for frames";
+    let deadline = context.deadline.within(timeout, "timeout_millis");
+    let done = deadline.wait("no result", remedy, work).await;
+    for span in timeline.spans(Instant::now()) {
+        context
+            .trace
+            .stage(span.stage.name(), span.began, span.ended);
+    }
+    done
+}
+
+/// Serialises the report for the result store and the response.
+fn written<T>(
+    detected: DetectedFrame,
+    write: impl FnOnce(AnswerInput<'_>) -> Result<T, Problem>,
+) -> Result<Written<T>, Problem> {
+    let report = Report::from(&detected.report);
+    let json = serde_json::to_vec(&report).map_err(Problem::internal)?;
+    let json = Bytes::from(json);
+    let answer = write(AnswerInput {
+        frame: detected,
+        report: &report,
+        json: &json,
+    })?;
+    Ok(Written { json, answer })
+}
+
+/// Returns the image to store with the report. A failure here does not fail the request.
+fn picture(detected: &DetectedFrame, concealment: Option<Concealment>) -> Option<NewPicture> {
+    match StoredFrame::of(detected, concealment) {
+        Ok(kept) => Some(NewPicture {
+            frame: kept.jpeg,
+            sketch: kept.sketch,
+        }),
+        Err(error) => {
+            tracing::warn!("the image of this frame is not stored: {error}");
+            None
+        }
+    }
+}
+
+/// Adds attributes that may explain the duration to the span.
+fn describe(trace: &RequestTrace, report: &DetectionReport) {
+    trace.note("lookdown.camera", report.camera.clone());
+    trace.note("lookdown.calibration", report.calibration.id.clone());
+    trace.note("lookdown.model", report.model.name.clone());
+    trace.note("lookdown.profile", report.profile.name());
+    for (key, count) in [
+        ("lookdown.views", report.views.inferred),
+        ("lookdown.batches", report.batch_count),
+        ("lookdown.persons", report.persons.len()),
+    ] {
+        trace.note(key, i64::try_from(count).unwrap_or(i64::MAX));
+    }
+}
+
+/// Sets the metrics of the camera's zones.
+fn record_zones(state: &ApiState, report: &DetectionReport) {
+    if state.options.zone_metrics {
+        let zones = report.zones.iter();
+        let zones = zones.map(|zone| (zone.name.as_str(), zone.persons));
+        state.metrics.set_zones(&report.camera, zones);
+    }
+}
+
+fn record(metrics: &Metrics, report: &DetectionReport) {
+    let labels = [report.model.name.as_str(), report.profile.name()];
+    let timings = &report.timings;
+    for (histogram, span) in [
+        (&metrics.request_duration, timings.total),
+        (&metrics.queue_duration, timings.queue),
+        (
+            &metrics.compute_input_duration,
+            timings.decode + timings.calibrate + timings.remap,
+        ),
+        (&metrics.compute_infer_duration, timings.inference),
+        (&metrics.compute_output_duration, timings.refine),
+    ] {
+        histogram
+            .with_label_values(&labels)
+            .observe(span.as_secs_f64());
+    }
+    metrics.views.inc_by(report.views.inferred as u64);
+    metrics
+        .unchanged_views
+        .inc_by(report.views.unchanged as u64);
+    metrics.batches.inc_by(report.batch_count as u64);
+    metrics.non_finite.inc_by(report.non_finite as u64);
+    metrics.persons.inc_by(report.persons.len() as u64);
+}

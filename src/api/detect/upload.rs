@@ -1,0 +1,135 @@
+//! A frame and its parameters: `multipart/form-data`, or the frame as the body with the parameters
+//! in the query.
+//!
+//! The whole body is read first, within limits.
+
+mod form;
+mod names;
+mod received_request;
+
+use std::{sync::Arc, time::Instant};
+
+use axum::{
+    extract::{FromRequest, Request},
+    http::{HeaderMap, header::CONTENT_TYPE},
+};
+use bytes::Bytes;
+use jiff::Timestamp;
+use lookdown_detect::{parameters::DetectParameters, pipeline::DetectJob};
+
+pub(in crate::api) use received_request::ReceivedRequest;
+
+use names::{is_parameter, unknown_parameter};
+
+pub(in crate::api) use form::FieldUse;
+
+use crate::{
+    access::Scope,
+    api::{
+        ApiState,
+        http::{
+            caller::Caller, context::RequestContext, problem::Problem, query::query_parameters,
+            request_body::UploadBudget,
+        },
+    },
+};
+
+/// A frame in memory with the parameters of its request.
+pub(in crate::api) struct Upload {
+    /// The encoded frame.
+    pub(in crate::api) image: Bytes,
+    /// The name of its file, if it was sent.
+    pub(in crate::api) file_name: Option<String>,
+    /// The headers of the request, such as `Accept`.
+    pub(in crate::api) headers: HeaderMap,
+    /// The context of the request.
+    pub(in crate::api) context: Arc<RequestContext>,
+    /// The caller, by a key in the headers or in the form.
+    pub(in crate::api) caller: Caller,
+    /// Parameters by name. The names are checked, the values are not.
+    pub(in crate::api) parameters: Vec<(String, String)>,
+    /// Time at which the request arrived.
+    pub(in crate::api) received_at: Timestamp,
+    /// Time at which the whole body was in memory.
+    pub(in crate::api) arrived: Instant,
+}
+
+impl FromRequest<ApiState> for Upload {
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
+        let context = RequestContext::of(request.extensions())?;
+        let access = &state.options.access;
+        access.check(request.headers(), &context.identity, Scope::Detect)?;
+        let uri = request.uri().clone();
+        let mut upload = Self::receive(request, state, &state.uploads, names::use_of).await?;
+        let mut parameters = query_parameters(&uri)?;
+        if let Some((name, _)) = parameters.iter().find(|(name, _)| !is_parameter(name)) {
+            return Err(unknown_parameter(name));
+        }
+        parameters.append(&mut upload.parameters);
+        upload.parameters = parameters;
+        Ok(upload)
+    }
+}
+
+impl Upload {
+    /// Returns the detection job with the parsed parameters.
+    ///
+    /// # Errors
+    /// [`Problem`] if the caller may not use the priority.
+    pub(in crate::api) fn job(self, parameters: DetectParameters) -> Result<DetectJob, Problem> {
+        let ticket = self.caller.ticket_at(parameters.priority)?;
+        let (received_at, arrived) = (self.received_at, self.arrived);
+        Ok(DetectJob::sent(
+            self.image,
+            parameters,
+            ticket,
+            received_at,
+            arrived,
+        ))
+    }
+
+    /// Reads a frame, alone or in a form whose fields `use_of` classifies by name. The body uses
+    /// memory of `budget`. The key is not checked here.
+    pub(in crate::api) async fn receive(
+        request: Request,
+        state: &ApiState,
+        budget: &UploadBudget,
+        use_of: fn(&str) -> Result<FieldUse, Problem>,
+    ) -> Result<Self, Problem> {
+        let ReceivedRequest {
+            parts,
+            context,
+            body: held,
+            received_at,
+            arrived,
+        } = ReceivedRequest::receive(request, state, budget).await?;
+        let headers = parts.headers.clone();
+        let (image, file_name, parameters) = if is_multipart(&headers) {
+            let form = form::parse(parts, held.bytes(), use_of).await?;
+            (held.with_bytes(form.image), form.file_name, form.parameters)
+        } else {
+            (held, None, Vec::new())
+        };
+        Ok(Self {
+            image: image.into_bytes(),
+            file_name,
+            headers,
+            caller: context.caller.clone(),
+            context,
+            parameters,
+            received_at,
+            arrived,
+        })
+    }
+}
+
+/// Returns `true` if the body is a multipart form.
+pub(in crate::api) fn is_multipart(headers: &HeaderMap) -> bool {
+    let content_type = headers.get(CONTENT_TYPE);
+    content_type.is_some_and(|value| {
+        let value = value.as_bytes();
+        value.len() >= 10 && value[..10].eq_ignore_ascii_case(b"multipart/")
+    })
+}

@@ -1,0 +1,95 @@
+//! The context of a request: its ID, trace, deadline and caller. The outermost layer determines it
+//! once from the head of the request, and everything else reads it.
+
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use axum::{
+    extract::FromRequestParts,
+    http::{Extensions, request::Parts},
+};
+use lookdown_http::request_id::RequestId;
+
+use super::{
+    access::{Access, Identity},
+    caller::Caller,
+    deadline::Deadline,
+    incoming_trace,
+    problem::Problem,
+};
+use crate::telemetry::{RequestTrace, Tracer};
+
+/// The settings of the contexts.
+#[derive(Clone)]
+pub(in crate::api) struct ContextSource {
+    pub(in crate::api) tracer: Tracer,
+    pub(in crate::api) access: Access,
+    /// The longest duration of a request, from its first byte to its response.
+    pub(in crate::api) request_timeout: Duration,
+}
+
+/// The facts that follow from the head of a request.
+pub(in crate::api) struct RequestContext {
+    pub(in crate::api) id: RequestId,
+    pub(in crate::api) trace: RequestTrace,
+    /// The deadline of the response.
+    pub(in crate::api) deadline: Deadline,
+    /// The holder of the key in the headers: keys are compared here, once for each request.
+    pub(in crate::api) identity: Identity,
+    pub(in crate::api) caller: Caller,
+}
+
+impl ContextSource {
+    /// Determines the context of a request, and adds it to the request. `name` is that of its span.
+    pub(in crate::api) fn begin(
+        &self,
+        parts: &mut Parts,
+        name: impl FnOnce() -> String,
+    ) -> Arc<RequestContext> {
+        let id = RequestId::of(&parts.headers);
+        let identity = self.access.identify(&parts.headers);
+        let context = Arc::new(RequestContext {
+            trace: incoming_trace::begin(&self.tracer, name, &parts.headers),
+            deadline: Deadline::begin(self.request_timeout),
+            caller: Caller::of(&self.access, &identity, &id, parts),
+            identity,
+            id,
+        });
+        parts.extensions.insert(Arc::clone(&context));
+        context
+    }
+}
+
+impl RequestContext {
+    /// Returns the context of the request with these extensions.
+    ///
+    /// # Errors
+    /// [`Problem`] if the route is outside of the layer that determines it.
+    pub(in crate::api) fn of(extensions: &Extensions) -> Result<Arc<Self>, Problem> {
+        extensions.get().cloned().ok_or_else(Problem::fault)
+    }
+
+    /// Adds the upload to the trace: the time until the whole body was in memory.
+    pub(in crate::api) fn note_upload(&self, arrived: Instant) {
+        let began = self.deadline.began().into_std();
+        self.trace.stage("upload", began, arrived);
+    }
+}
+
+impl<S: Sync> FromRequestParts<S> for Deadline {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Problem> {
+        Ok(RequestContext::of(&parts.extensions)?.deadline)
+    }
+}
+
+impl<S: Sync> FromRequestParts<S> for Caller {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Problem> {
+        Ok(RequestContext::of(&parts.extensions)?.caller.clone())
+    }
+}
