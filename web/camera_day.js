@@ -28,7 +28,7 @@ function drawn({ from, steps }) {
     element("li", {}, element("span", { class: "count-of" }, line), element("span", {}, [...directions].map(([direction, count]) => `${count} ${direction}`).join(", "))),
   );
   const text = steps.some(({ persons }) => persons) ? `Today: at most ${plural(most, "person")} at once` : "Today: nothing is counted yet";
-  return [element("h3", {}, text), bars(Date.parse(from), steps, most), element("ul", { class: "count-rows of-day" }, ...rows)];
+  return [element("h2", {}, text), bars(Date.parse(from), steps, most), element("ul", { class: "count-rows of-day" }, ...rows)];
 }
 
 /** The crossings of the day by line and direction. */

@@ -11,7 +11,6 @@ use axum::{
     },
     response::{IntoResponse, Response},
 };
-use lookdown_watch::Frame;
 use secrecy::SecretString;
 use serde::{Deserialize, Serialize};
 use tokio::task::spawn_blocking;
@@ -230,7 +229,7 @@ pub(in crate::api) async fn test(
     cameras(&state)?;
     let (camera, password) = camera.separate();
     let frame = Cameras::test(&camera, password).await.map_err(refused)?;
-    Ok(answer(frame))
+    Ok(answer(frame.format.media_type(), frame.image))
 }
 
 /// Get the present frame
@@ -249,15 +248,13 @@ pub(in crate::api) async fn get_frame(
 ) -> Result<Response, Problem> {
     let camera = change(&state, move |cameras| Ok(cameras.get(&name)?)).await?;
     let camera = camera.ok_or_else(unknown)?;
-    Ok(answer(Cameras::frame(&camera).await.map_err(refused)?))
+    let frame = Cameras::frame(&camera).await.map_err(refused)?;
+    Ok(answer(frame.format.media_type(), frame.image))
 }
 
-fn answer(frame: Frame) -> Response {
-    let headers = [
-        (CONTENT_TYPE, frame.format.media_type()),
-        (CACHE_CONTROL, "no-store"),
-    ];
-    (headers, frame.image).into_response()
+fn answer(media_type: &'static str, image: impl IntoResponse) -> Response {
+    let headers = [(CONTENT_TYPE, media_type), (CACHE_CONTROL, "no-store")];
+    (headers, image).into_response()
 }
 
 /// Returns the cameras of this process.

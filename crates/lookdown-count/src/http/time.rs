@@ -44,7 +44,8 @@ impl TimeParameters {
     pub(super) fn span(&self) -> Result<Span, Problem> {
         let (from, until) = match self.from.as_deref() {
             Some(name @ ("today" | "yesterday" | "week")) => {
-                named(name, &Timestamp::now().to_zoned(self.zone()?))
+                let now = Timestamp::from_millisecond(now_ms()).unwrap_or(Timestamp::MAX);
+                named(name, &now.to_zoned(self.zone()?))
             }
             from => (timestamp("from", from)?, None),
         };
