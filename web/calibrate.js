@@ -39,13 +39,14 @@ function begin() {
   find("#calibrate-content").hidden = !frame;
   if (!frame) return;
   const picture = find("#calibrate-picture");
-  if (picture.src !== frame.url) {
-    Object.assign(picture, { src: frame.url, width: frame.width, height: frame.height });
-    [circle, opened, imported] = [null, null, null];
-    if (frame.camera) shown(ofCamera)(frame);
-  }
   const { width, height } = frame;
+  const isNew = picture.src !== frame.url;
+  if (isNew) {
+    Object.assign(picture, { src: frame.url, width, height });
+    [circle, opened, imported] = [null, null, null];
+  }
   if (!circle) setCircle(assumedCircle(report ?? { image: { width, height } }));
+  if (isNew && frame.camera) shown(ofCamera)(frame);
   if (isVisible) previewShown();
 }
 
