@@ -60,7 +60,7 @@ pub(super) struct Arguments {
 
 /// Serves, watches and counts until a stop is requested.
 pub(super) fn run(arguments: &Arguments, commit: Option<&str>) -> anyhow::Result<ExitCode> {
-    let (file, source) = separate(arguments.source.as_deref());
+    let (file, source) = separate(arguments.source.as_deref())?;
     let flags = given(&[
         ("server.listen", arguments.listen.as_deref()),
         ("counts.path", arguments.store.as_deref()),

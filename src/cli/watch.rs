@@ -1,6 +1,6 @@
 //! `lookdown watch`
 
-use std::{net::SocketAddr, process::ExitCode, sync::Arc};
+use std::{net::SocketAddr, path::Path, process::ExitCode, sync::Arc};
 
 use anyhow::{Context, bail};
 use clap::Args;
@@ -44,7 +44,7 @@ pub(super) struct Arguments {
 
 /// Watches cameras until a stop is requested, or until the frames of a single source end.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
-    let (file, source) = separate(arguments.source.as_deref());
+    let (file, source) = separate(arguments.source.as_deref())?;
     let settings = arguments
         .settings_file
         .source(file, &arguments.server.settings())?;
@@ -90,11 +90,25 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
 }
 
 /// Separates a settings file from a source.
-pub(super) fn separate(argument: Option<&str>) -> (Option<&str>, Option<&str>) {
+///
+/// # Errors
+/// A file of settings in another format.
+pub(super) fn separate(argument: Option<&str>) -> anyhow::Result<(Option<&str>, Option<&str>)> {
     match argument {
-        Some(file) if is_settings_file(file) => (Some(file), None),
-        source => (None, source),
+        Some(file) if is_settings_file(file) => Ok((Some(file), None)),
+        Some(file) if is_of_another_format(file) => bail!(
+            "{file}: it is no source of frames: give a settings file that ends with .toml \
+             (docs/watch.md), or a source"
+        ),
+        source => Ok((None, source)),
     }
+}
+
+/// Returns true for the name of a file of a format in which other programs have settings.
+fn is_of_another_format(argument: &str) -> bool {
+    let ending = Path::new(argument).extension();
+    !argument.contains("://")
+        && ending.is_some_and(|ending| ["json", "yaml", "yml"].iter().any(|other| ending == *other))
 }
 
 /// Serves the metrics until the value is dropped.

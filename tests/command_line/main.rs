@@ -4,6 +4,7 @@
 mod calibration;
 mod evaluate;
 mod evaluation;
+mod examples;
 mod health;
 mod keys;
 mod models;

@@ -10,7 +10,7 @@ use std::{
 
 const LOOKDOWN: &str = env!("CARGO_BIN_EXE_lookdown");
 const FREE_ADDRESS: (&str, &str) = ("LOOKDOWN__SERVER__LISTEN", "127.0.0.1:0");
-const NO_GRACE: (&str, &str) = ("LOOKDOWN__SHUTDOWN__GRACE_MILLIS", "0");
+pub(super) const NO_GRACE: (&str, &str) = ("LOOKDOWN__SHUTDOWN__GRACE_MILLIS", "0");
 const LONG_GRACE: (&str, &str) = ("LOOKDOWN__SHUTDOWN__GRACE_MILLIS", "600000");
 
 fn run(arguments: &[&str], environment: &[(&str, &str)]) -> Output {
@@ -241,7 +241,7 @@ fn a_silent_calibration_store_does_not_delay_livez() {
 }
 
 /// A running server.
-struct Server {
+pub(super) struct Server {
     process: Child,
     log: Lines<BufReader<ChildStderr>>,
     port: String,
@@ -251,7 +251,7 @@ struct Server {
 
 impl Server {
     /// Starts a server by a shell after `preparation`, and waits until it is ready.
-    fn start(preparation: &str, environment: &[(&str, &str)]) -> Self {
+    pub(super) fn start(preparation: &str, environment: &[(&str, &str)]) -> Self {
         let mut server = Self::listening(preparation, environment);
         server.becomes_ready();
         server
@@ -294,6 +294,11 @@ impl Server {
         line.unwrap_or_else(|| panic!("the log does not say {part:?}"))
     }
 
+    /// The address for clients.
+    pub(super) fn address(&self) -> String {
+        format!("http://127.0.0.1:{}", self.port)
+    }
+
     fn connect(&self) -> TcpStream {
         TcpStream::connect(format!("127.0.0.1:{}", self.port)).unwrap()
     }
@@ -313,14 +318,14 @@ impl Server {
         answer
     }
 
-    fn signal(&self, name: &str) {
+    pub(super) fn signal(&self, name: &str) {
         let kill = format!("kill -{name} {}", self.process.id());
         let sent = Command::new("sh").args(["-c", &kill]).status();
         assert!(sent.unwrap().success());
     }
 
     /// Waits for a successful exit, and returns the rest of the log.
-    fn has_ended(mut self) -> Vec<String> {
+    pub(super) fn has_ended(mut self) -> Vec<String> {
         let rest = self.log.by_ref().map(Result::unwrap).collect();
         assert!(self.process.wait().unwrap().success());
         rest

@@ -41,6 +41,16 @@ class GeneratedClients(unittest.TestCase):
         self.assertEqual(answer["refused"], "/problems/unknown-calibration")
         self.assertIn("office", answer["calibrations"])
 
+    def test_the_example_in_typescript_compiles_and_prints_persons(self) -> None:
+        (self.folder / "node_modules").symlink_to(MODULES)
+        (self.folder / "package.json").write_text('{"type": "module"}', encoding="utf-8")
+        example = shutil.copy(ROOT / "examples" / "detect.ts", self.folder)
+        strict = [option for option in STRICT if option != "--noEmit"]
+        self.succeeds(MODULES / ".bin/tsc", *strict, "--types", "node", example)
+        with lookdown({}) as server:
+            lines = self.succeeds("node", self.folder / "detect.js", OFFICE, f"http://{server.address}").splitlines()
+        self.assertGreater(len(lines), 3)
+
     def test_typescript_fetch_of_openapi_generator_compiles(self) -> None:
         sources = self.generated("typescript-fetch")
         self.assertIn("img: Blob;", (sources / "apis" / "DetectionApi.ts").read_text(encoding="utf-8"))

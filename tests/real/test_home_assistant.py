@@ -3,6 +3,7 @@
 import contextlib
 import json
 import os
+import re
 import signal
 import subprocess
 import tempfile
@@ -18,6 +19,7 @@ from waiting import wait_until
 
 HERE = Path(__file__).resolve().parent
 PYTHON = ROOT / ".setup" / "real" / "home_assistant" / "bin" / "python"
+CARD = ROOT / "examples" / "home_assistant_card.yaml"
 OFFICE = (SAMPLES / "office.jpg").read_bytes()
 DETECT = "/detect?calibration=office&profile=fast"
 NO_PERSONS = f"{DETECT}&score_threshold=1"
@@ -124,6 +126,10 @@ class Entities(unittest.TestCase):
             self.until_found(server)
             entities = self.home.entities()
             self.assertEqual(set(entities), ENTITIES)
+            # The example is for the camera "lobby" with the zone "entrance".
+            shown = set(re.findall(r"entity: (\S+)", CARD.read_text(encoding="utf-8")))
+            shown = {name.replace("lobby", "office").replace("entrance", "left") for name in shown}
+            self.assertEqual(shown - {entity["entity"] for entity in entities.values()}, set())
             print("\n" + json.dumps(entities, indent=1))
             version = server.get("/openapi.json")
             for entity in entities.values():

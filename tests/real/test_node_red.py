@@ -1,4 +1,4 @@
-"""The flow of docs/recipes/node-red.json in Node-RED: it sends snapshots of a camera and counts the persons."""
+"""The flow of examples/node-red.json in Node-RED: it sends snapshots of a camera and counts the persons."""
 
 import contextlib
 import http.server
@@ -18,7 +18,7 @@ from support.lookdown import lookdown
 from waiting import wait_until
 
 HERE = Path(__file__).resolve().parent / "node_red"
-RECIPE = ROOT / "docs" / "recipes" / "node-red.json"
+RECIPE = ROOT / "examples" / "node-red.json"
 OFFICE = SAMPLES / "office.jpg"
 COUNT = re.compile(r"\[debug:show\] (\d+)")
 PROBLEM = re.compile(r"\[debug:problem\]")

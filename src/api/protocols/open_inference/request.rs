@@ -120,6 +120,10 @@ fn read_input(
     behind: &mut Bytes,
     budget: &UploadBudget,
 ) -> Result<Tensor, Problem> {
+    if input.name.is_empty() {
+        let wrong = "an input has no name: send the name that the metadata of the model have";
+        return Err(misfit("inputs", wrong));
+    }
     let size = binary_size(&input.name, &mut input.parameters)?;
     let sent = TensorData::take(input.data, size, behind);
     let sent = sent.map_err(|wrong| misfit(&input.name, &wrong))?;

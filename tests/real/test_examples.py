@@ -1,0 +1,96 @@
+"""The examples of the folder `examples` that need no further programs, as users run them."""
+
+import csv
+import http.client
+import json
+import re
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+from harness.places import ROOT, SAMPLES
+from harness.processes import free_ports
+from support.lookdown import lookdown
+from test_count import OTHER_SECRET, SECRET, CountedCamera
+from waiting import wait_until
+
+EXAMPLES = ROOT / "examples"
+OFFICE = SAMPLES / "office.jpg"
+METRIC = re.compile(r"\blookdown_\w+")
+SERIES = "# TYPE "
+
+
+def run(*command: object) -> str:
+    """The output of an example that succeeds."""
+    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False, timeout=60)
+    if done.returncode:
+        raise AssertionError(f"{command}: {done.stdout}{done.stderr}")
+    return done.stdout
+
+
+class Detect(unittest.TestCase):
+    """Examples that send a frame."""
+
+    def test_the_shell_prints_the_report(self) -> None:
+        with lookdown({}) as server:
+            report = json.loads(run(EXAMPLES / "detect.sh", OFFICE, f"http://{server.address}", "calibration=office"))
+        self.assertEqual(report["calibration"]["id"], "office")
+        self.assertGreater(len(report["persons"]), 3)
+
+    def test_python_prints_the_persons(self) -> None:
+        with lookdown({}) as server:
+            lines = run(sys.executable, EXAMPLES / "detect.py", OFFICE, f"http://{server.address}").splitlines()
+        self.assertGreater(len(lines), 3)
+
+
+class Counts(CountedCamera):
+    """Examples that use counts."""
+
+    def test_counts_are_a_table_and_their_metrics_are_those_of_the_examples(self) -> None:
+        with self.counting() as count:
+            wait_until(lambda: count.get("/counts") is not None, "lookdown count answers")
+            self.send_frames()
+            wait_until(lambda: (count.get("/counts/office/tracks") or {}).get("tracks"), "there are tracks")
+            table = list(csv.DictReader(run(EXAMPLES / "counts_to_csv.sh", "office", count.url).splitlines()))
+            self.assertTrue(any(float(row["known_seconds"]) > 0 for row in table), table)
+            scrape = http.client.HTTPConnection("127.0.0.1", self.port, timeout=5)
+            scrape.request("GET", "/metrics")
+            metrics = scrape.getresponse().read().decode()
+        queries = (EXAMPLES / "counts.promql").read_text(encoding="utf-8").split("\n\n")
+        panel = json.loads((EXAMPLES / "grafana_panel.json").read_text(encoding="utf-8"))
+        queries += [target["expr"] for target in panel["targets"]]
+        known = {line.split()[2] for line in metrics.splitlines() if line.startswith(SERIES)}
+        self.assertEqual({name for query in queries for name in METRIC.findall(query)} - known, set())
+        rules = [{"record": f"example:{number}", "expr": query} for number, query in enumerate(queries)]
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "rules.json"
+            file.write_text(json.dumps({"groups": [{"name": "examples", "rules": rules}]}), encoding="utf-8")
+            run("promtool", "check", "rules", file)
+
+    def test_the_receiver_prints_webhooks_with_the_right_signature_only(self) -> None:
+        (port,) = free_ports(1)
+        secret, wrong = self.folder / "hook.secret", self.folder / "wrong.secret"
+        secret.write_text(SECRET + "\n", encoding="utf-8")
+        wrong.write_text(OTHER_SECRET + "\n", encoding="utf-8")
+        hook = '[[webhooks]]\nurl = "http://127.0.0.1:{}/"\nsecret_file = "{}"\non = "occupancy"\n'
+        with open(self.settings, "a", encoding="utf-8") as settings:
+            settings.write(hook.format(port, secret) + hook.format(port, wrong))
+        printed, log = self.folder / "printed", self.folder / "receiver.log"
+        with printed.open("wb") as output, log.open("wb") as errors:
+            command = [sys.executable, EXAMPLES / "webhook_receiver.py", secret, str(port)]
+            receiver = subprocess.Popen(command, stdout=output, stderr=errors)
+            self.addCleanup(receiver.wait, 20)
+            self.addCleanup(receiver.kill)
+            with self.counting() as count:
+                wait_until(lambda: count.get("/counts") is not None, "lookdown count answers")
+                self.send_frames()
+                wait_until(lambda: b'" 401 ' in log.read_bytes(), "a wrong signature is refused")
+                wait_until(lambda: b'" 204 ' in log.read_bytes(), "a right signature is accepted")
+        messages = [json.loads(line) for line in printed.read_text(encoding="utf-8").splitlines()]
+        self.assertEqual({message["type"] for message in messages}, {"occupancy.reached"})
+
+
+if __name__ == "__main__":
+    unittest.main()
