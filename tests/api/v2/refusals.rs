@@ -28,6 +28,10 @@ async fn unusable_tensors_are_refused_in_one_sentence() {
             json!([input(json!([2]), json!([image]))]),
             "1 elements, but its shape needs 2",
         ),
+        (
+            json!([{ "name": "", "datatype": "BYTES", "shape": [1], "data": [image] }]),
+            "inputs: an input has no name",
+        ),
         (json!([input(json!([0]), json!([]))]), "[1] to [16]"),
         (
             json!([input(json!([17]), json!(vec!["AA=="; 17]))]),
