@@ -8,7 +8,9 @@ use std::{
 
 use anyhow::{Context, bail};
 use clap::Args;
-use lookdown_detect::inference::{ModelManifest, ModelSource, fetch_weights, model_names};
+use lookdown_detect::inference::{
+    ModelManifest, ModelSource, Sha256Sum, fetch_upstream, fetch_weights, model_names,
+};
 
 use crate::{
     cli::{complete, output::UNWRITABLE, settings_file::SettingsFile},
@@ -24,9 +26,13 @@ pub(in super::super) struct Arguments {
     #[arg(value_name = "NAME", add = complete::of_model())]
     name: String,
     /// Place of converted models: NAME/model.onnx below a folder or an address. `make models`
-    /// converts models
+    /// converts models. For a model with `[upstream]` in its model.toml, a mirror of the published
+    /// file: NAME/FILE [default: the address in `[upstream]`]
     #[arg(long, value_name = "URL|FOLDER")]
-    from: ModelSource,
+    from: Option<ModelSource>,
+    /// SHA-256 of the published file that you trust, for a model whose model.toml has none
+    #[arg(long, value_name = "SUM")]
+    accept_sha256: Option<Sha256Sum>,
     #[command(flatten)]
     settings_file: SettingsFile,
 }
@@ -54,9 +60,31 @@ pub(super) fn list(settings_file: &SettingsFile) -> anyhow::Result<ExitCode> {
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let settings = arguments.settings_file.load()?;
     let manifest = manifest(&settings, &arguments.name)?;
-    let bytes = fetch_weights(&manifest, &arguments.from)?;
     let (name, file) = (&manifest.name, manifest.onnx.display());
-    writeln!(io::stdout(), "{name}: {bytes} bytes in {file}").context(UNWRITABLE)?;
+    let (from, accepted) = (arguments.from.as_ref(), arguments.accept_sha256.as_ref());
+    let installed = match (&manifest.upstream, from, accepted) {
+        (Some(upstream), ..) => {
+            let installed = fetch_upstream(&manifest, upstream, from, accepted)?;
+            let cut = if installed.is_cut { ", cut" } else { "" };
+            let sum = installed.published_sha256;
+            format!(
+                "{} bytes in {file} (SHA-256 of the published file: {sum}{cut})",
+                installed.bytes
+            )
+        }
+        (None, _, Some(_)) => bail!(
+            "--accept-sha256: the model.toml of {name} has no [upstream]: enter the sum as sha256 \
+             in that file"
+        ),
+        (None, Some(from), None) => {
+            format!("{} bytes in {file}", fetch_weights(&manifest, from)?)
+        }
+        (None, None, None) => bail!(
+            "the model.toml of {name} has no [upstream]: give a place of converted models with \
+             --from, or run `make models`"
+        ),
+    };
+    writeln!(io::stdout(), "{name}: {installed}").context(UNWRITABLE)?;
     Ok(ExitCode::SUCCESS)
 }
 

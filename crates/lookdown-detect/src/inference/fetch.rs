@@ -1,4 +1,7 @@
-//! Fetches the weights of a model whose manifest pins their SHA-256, from a folder or over HTTP.
+//! Fetches the weights of a model and verifies their SHA-256: converted weights, or the file that
+//! the authors of the network publish.
+
+mod upstream;
 
 use std::{
     fs::{self, File},
@@ -18,6 +21,8 @@ use sha2::{Digest, Sha256};
 use url::Url;
 
 use super::ModelManifest;
+
+pub use self::upstream::{Installed, Sha256Sum, fetch_upstream};
 
 /// Largest file of weights, bytes: the limit of an ONNX file in one part.
 const MAX_BYTES: u64 = 2 << 30;
@@ -84,6 +89,45 @@ pub enum FetchError {
         found: String,
         /// The pinned sum.
         wanted: String,
+    },
+    /// No sum of the published file is known, and none was accepted.
+    #[error(
+        "{place} has the SHA-256 {found}, and the model's model.toml has no sum to compare with: \
+         if you trust this file, add --accept-sha256 {found}"
+    )]
+    UnknownSum {
+        /// The file or address.
+        place: String,
+        /// The sum of the file.
+        found: String,
+    },
+    /// The file is not the accepted one.
+    #[error("{place} has the SHA-256 {found}, not {accepted} as in --accept-sha256")]
+    NotAccepted {
+        /// The file or address.
+        place: String,
+        /// The sum of the file.
+        found: String,
+        /// The accepted sum.
+        accepted: String,
+    },
+    /// The archive does not have the ONNX file.
+    #[error(
+        "{place} is not a usable archive: {problem}; correct upstream in the model's model.toml"
+    )]
+    Archive {
+        /// The file or address.
+        place: String,
+        /// The cause.
+        problem: String,
+    },
+    /// The published file is not a usable network.
+    #[error("{place} cannot be installed: {problem}")]
+    Unusable {
+        /// The file or address.
+        place: String,
+        /// The mismatch.
+        problem: String,
     },
     /// The file is too large.
     #[error("{place} has more than {MAX_BYTES} bytes: check --from")]
@@ -169,6 +213,17 @@ fn copy(reader: impl Read, place: &str, to: &Path, wanted: &str) -> Result<u64, 
     Ok(bytes)
 }
 
+/// Follows a redirection to HTTPS only. The sum of the file is checked.
+fn within_https(attempt: Attempt<'_>) -> Action {
+    if attempt.previous().len() > MAX_REDIRECTIONS {
+        attempt.error("there are too many redirections")
+    } else if attempt.url().scheme() == "https" {
+        attempt.follow()
+    } else {
+        attempt.error("it redirects to an address without https://")
+    }
+}
+
 /// Follows a redirection on the same host only, and not from HTTPS to HTTP.
 fn within_host(attempt: Attempt<'_>) -> Action {
     let first = attempt.previous().first();
@@ -209,22 +264,26 @@ fn open(
         ModelSource::Address(address) => {
             let base = address.as_str().trim_end_matches('/');
             let place = format!("{base}/{name}/{}", file.display());
-            let unreadable = |problem: String| FetchError::Unreadable {
-                place: place.clone(),
-                problem,
-            };
-            // Fails when there is one already, which is as good.
-            let _ = rustls::crypto::ring::default_provider().install_default();
-            let client = Client::builder()
-                // For the connection and for each read, not for the whole file.
-                .timeout(PATIENCE)
-                .redirect(Policy::custom(within_host))
-                .build();
-            let client = client.map_err(|error| unreadable(error.to_string()))?;
-            let answer = client.get(&place).send();
-            let answer = answer.and_then(reqwest::blocking::Response::error_for_status);
-            let answer = answer.map_err(|error| unreadable(error.without_url().to_string()))?;
-            Ok((place.clone(), Box::new(answer)))
+            get(place, Policy::custom(within_host))
         }
+    }
+}
+
+/// Sends a GET request.
+fn get(place: String, redirect: Policy) -> Result<(String, Box<dyn Read>), FetchError> {
+    // Fails when there is one already, which is as good.
+    let _ = rustls::crypto::ring::default_provider().install_default();
+    let client = Client::builder()
+        // For the connection and for each read, not for the whole file.
+        .timeout(PATIENCE)
+        .redirect(redirect)
+        .build();
+    let response = client.and_then(|client| client.get(&place).send());
+    match response.and_then(reqwest::blocking::Response::error_for_status) {
+        Ok(response) => Ok((place, Box::new(response))),
+        Err(error) => Err(FetchError::Unreadable {
+            place,
+            problem: error.without_url().to_string(),
+        }),
     }
 }

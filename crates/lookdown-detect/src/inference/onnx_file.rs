@@ -5,6 +5,7 @@
 //! resolves such paths even for models passed as bytes, so the graph is checked here first. The
 //! field numbers are those of `onnx.proto`, which are stable.
 
+mod cut;
 mod protobuf;
 
 use std::path::Path;
@@ -12,6 +13,8 @@ use std::path::Path;
 use lookdown_common::files;
 
 use self::protobuf::{Field, Value, fields};
+
+pub(super) use self::cut::cut;
 
 /// Largest ONNX file, bytes. Protocol buffers are limited to 2 GiB.
 pub(super) const MAX_BYTES: u64 = 1 << 30;
@@ -90,7 +93,7 @@ impl Message {
             return check_tensor(bytes);
         }
         for field in fields(bytes) {
-            let Field { number, value } = field.map_err(|()| no_model())?;
+            let Field { number, value, .. } = field.map_err(|()| no_model())?;
             match (self, number, value) {
                 (Self::Node, 4, Value::Bytes(ENGINE)) => {
                     return Err("it contains a compiled engine: save the original model".into());
@@ -111,7 +114,7 @@ impl Message {
 fn check_tensor(bytes: &[u8]) -> Result<(), String> {
     let mut values: u64 = 1;
     for field in fields(bytes) {
-        let Field { number, value } = field.map_err(|()| no_model())?;
+        let Field { number, value, .. } = field.map_err(|()| no_model())?;
         match (number, value) {
             (13, _) | (14, Value::Varint(1..)) => {
                 return Err(
