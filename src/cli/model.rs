@@ -22,7 +22,11 @@ use lookdown_detect::{
 use self::sample::detect;
 use super::{SettingsFile, annotate};
 use crate::cli::output::UNWRITABLE;
-use crate::{annotated_image::AnnotationOptions, app::onnx_options, settings::find_installed};
+use crate::{
+    annotated_image::AnnotationOptions,
+    app::onnx_options,
+    settings::{Settings, find_installed},
+};
 
 /// The default sample image: a fisheye frame.
 const SAMPLE: &str = "samples/office.jpg";
@@ -38,7 +42,7 @@ pub(super) enum Command {
     Check(Arguments),
     /// List the models of the repository: name, size of the weights or `missing`, licence
     List(SettingsFile),
-    /// Fetch the weights of a model of the repository, whose `model.toml` has their SHA-256
+    /// Fetch, verify and install the weights of a model of the repository
     Fetch(fetch::Arguments),
 }
 
@@ -72,15 +76,27 @@ pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
 }
 
 fn check(arguments: &Arguments) -> anyhow::Result<ExitCode> {
-    let mut settings = arguments.settings_file.load()?;
-    let library = settings.inference.find_library()?;
+    let settings = arguments.settings_file.load()?;
+    let sample = arguments.sample.as_deref();
     if arguments.write_manifest {
-        let sample = arguments.sample.clone();
+        let sample = sample.map(Path::to_owned);
         let sample = sample.or_else(|| find_installed(Path::new(SAMPLE)));
         manifest::write(&arguments.model, sample.as_deref(), &settings)?;
     }
+    let annotated = arguments.annotate.as_deref();
+    check_model(settings, &arguments.model, sample, annotated)
+}
+
+/// Prints the properties of a model and its detections on a sample.
+fn check_model(
+    mut settings: Settings,
+    model: &Path,
+    sample: Option<&Path>,
+    annotated: Option<&Path>,
+) -> anyhow::Result<ExitCode> {
+    let library = settings.inference.find_library()?;
     let loading = Instant::now();
-    let mut detector = OnnxDetector::load(&library, &arguments.model, &onnx_options(&settings))?;
+    let mut detector = OnnxDetector::load(&library, model, &onnx_options(&settings))?;
     let loaded = loading.elapsed();
     let mut out = io::stdout().lock();
     write!(out, "{}", description::Lines(detector.description())).context(UNWRITABLE)?;
@@ -97,9 +113,8 @@ fn check(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     .context(UNWRITABLE)?;
     drop(detector);
 
-    settings.model.path = Some(arguments.model.clone());
-    let given = arguments.sample.as_deref();
-    let Some((sample, profile)) = given
+    settings.model.path = Some(model.to_owned());
+    let Some((sample, profile)) = sample
         .map(|path| (path.to_owned(), "direct"))
         .or_else(|| Some((find_installed(Path::new(SAMPLE))?, "fast")))
     else {
@@ -126,7 +141,7 @@ fn check(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         )
         .context(UNWRITABLE)?;
     }
-    if let Some(path) = &arguments.annotate {
+    if let Some(path) = annotated {
         annotate::write(detected, &AnnotationOptions::parse([])?, path)?;
     }
     Ok(ExitCode::SUCCESS)

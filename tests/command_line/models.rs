@@ -202,10 +202,12 @@ fn published_archive_is_cut_and_loads() {
     let sum = format!("{:x}", Sha256::digest(published()));
     let content = archive(&["2023/README", "2023/rtmdet/end2end.onnx"]);
     let (repository, mirror) = with_upstream(Some(&sum), &content);
+    assert!(listed(repository.path()).contains("missing  -  (lookdown model fetch rtmdet)"));
     let output = fetch(repository.path(), "rtmdet", mirror.path().to_str().unwrap());
     assert!(output.status.success(), "{output:?}");
     let printed = String::from_utf8(output.stdout).unwrap();
     assert!(printed.contains(&sum), "{printed}");
+    assert!(printed.contains("office.jpg: "), "{printed}");
     let checked = check(&repository);
     assert!(checked.status.success(), "{checked:?}");
     let description = String::from_utf8(checked.stdout).unwrap();

@@ -47,7 +47,13 @@ pub(super) fn list(settings_file: &SettingsFile) -> anyhow::Result<ExitCode> {
         let line = match &manifest {
             Ok(manifest) => {
                 let licence = manifest.licence.as_deref().unwrap_or("-");
-                format!("{:>10}  {licence}", size(&manifest.onnx))
+                let size = size(&manifest.onnx);
+                let command = match (&manifest.upstream, &size) {
+                    (Some(_), None) => format!("  (lookdown model fetch {name})"),
+                    _ => String::new(),
+                };
+                let size = size.as_deref().unwrap_or("missing");
+                format!("{size:>10}  {licence}{command}")
             }
             Err(error) => format!("{:>10}  {error}", "invalid"),
         };
@@ -56,7 +62,7 @@ pub(super) fn list(settings_file: &SettingsFile) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Fetches the weights of a model.
+/// Fetches the weights of a model. Checks a model from its published file on a sample.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let settings = arguments.settings_file.load()?;
     let manifest = manifest(&settings, &arguments.name)?;
@@ -85,7 +91,11 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         ),
     };
     writeln!(io::stdout(), "{name}: {installed}").context(UNWRITABLE)?;
-    Ok(ExitCode::SUCCESS)
+    if manifest.upstream.is_none() {
+        return Ok(ExitCode::SUCCESS);
+    }
+    super::check_model(settings, &manifest.onnx, None, None)
+        .with_context(|| format!("{name} is installed, but its check fails"))
 }
 
 fn manifest(settings: &Settings, name: &str) -> anyhow::Result<ModelManifest> {
@@ -98,12 +108,10 @@ fn manifest(settings: &Settings, name: &str) -> anyhow::Result<ModelManifest> {
     Ok(ModelManifest::locate(&folder.join(name))?)
 }
 
-/// The size of a file, or `missing`.
-fn size(file: &Path) -> String {
+/// The size of a file. `None` if it is missing.
+fn size(file: &Path) -> Option<String> {
     #[expect(clippy::cast_precision_loss, reason = "far below 2^52 bytes")]
     let mebibytes = |bytes: u64| bytes as f64 / MEBIBYTE;
-    file.metadata().map_or_else(
-        |_| "missing".to_owned(),
-        |metadata| format!("{:.1} MiB", mebibytes(metadata.len())),
-    )
+    let metadata = file.metadata().ok()?;
+    Some(format!("{:.1} MiB", mebibytes(metadata.len())))
 }
