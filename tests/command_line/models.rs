@@ -151,7 +151,7 @@ fn folder_without_a_manifest_names_the_command_that_writes_it() {
     assert_fails_with(&output, &["model.toml", &command]);
 }
 
-/// A network in the layout of the published RTMDet, with suppression of overlaps inside.
+/// A network in the layout of the published `RTMDet`, with suppression of overlaps inside.
 fn published() -> Vec<u8> {
     let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/models");
     fs::read(fixtures.join("rtmdet_end2end/model.onnx")).unwrap()

@@ -12,6 +12,7 @@ use lookdown_detect::inference::{
     ModelManifest, ModelSource, Sha256Sum, fetch_upstream, fetch_weights, model_names,
 };
 
+use super::check::check_model;
 use crate::{
     cli::{complete, output::UNWRITABLE, settings_file::SettingsFile},
     settings::Settings,
@@ -94,7 +95,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     if manifest.upstream.is_none() {
         return Ok(ExitCode::SUCCESS);
     }
-    super::check_model(settings, &manifest.onnx, None, None)
+    check_model(settings, &manifest.onnx, None, None)
         .with_context(|| format!("{name} is installed, but its check fails"))
 }
 

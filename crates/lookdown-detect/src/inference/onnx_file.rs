@@ -12,7 +12,7 @@ use std::path::Path;
 
 use lookdown_common::files;
 
-use self::protobuf::{Field, Value, fields};
+use self::protobuf::{Field, MAX_DEPTH, Value, fields, no_model};
 
 pub(super) use self::cut::cut;
 
@@ -20,8 +20,6 @@ pub(super) use self::cut::cut;
 pub(super) const MAX_BYTES: u64 = 1 << 30;
 /// Most values of one tensor in a file.
 const MAX_VALUES: u64 = 1 << 29;
-/// Deepest nesting of graphs within graphs.
-const MAX_DEPTH: usize = 64;
 /// The operator for an execution provider's compiled engine, which is mostly in another file.
 const ENGINE: &[u8] = b"EPContext";
 
@@ -47,10 +45,6 @@ pub(super) fn check(bytes: &[u8]) -> Result<(), String> {
         return Err(no_model());
     }
     Message::Model.check(bytes, 0)
-}
-
-fn no_model() -> String {
-    "it is not an ONNX model, or is cut off".to_owned()
 }
 
 /// The messages of `onnx.proto` on the way to a tensor.

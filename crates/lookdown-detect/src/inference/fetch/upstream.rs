@@ -12,7 +12,10 @@ use lookdown_lens::revision::sha256_of;
 use reqwest::redirect::Policy;
 use zip::ZipArchive;
 
-use super::{FetchError, ModelSource, get, open, within_https};
+use super::{
+    error::FetchError,
+    source::{ModelSource, get, open, within_https},
+};
 use crate::inference::{
     ModelManifest,
     heads::Head,
@@ -127,9 +130,10 @@ fn bounded(reader: impl Read, place: &str) -> Result<Vec<u8>, FetchError> {
         .take(onnx_file::MAX_BYTES + 1)
         .read_to_end(&mut bytes);
     match read {
-        Ok(length) if length as u64 > onnx_file::MAX_BYTES => {
-            Err(FetchError::TooLarge { place: place() })
-        }
+        Ok(length) if length as u64 > onnx_file::MAX_BYTES => Err(FetchError::TooLarge {
+            place: place(),
+            limit: onnx_file::MAX_BYTES,
+        }),
         Ok(_) => Ok(bytes),
         Err(error) => Err(FetchError::Unreadable {
             place: place(),

@@ -5,10 +5,7 @@
 
 use std::collections::HashSet;
 
-use super::{
-    no_model,
-    protobuf::{Field, Value, fields, push_bytes},
-};
+use super::protobuf::{Field, MAX_DEPTH, Value, fields, no_model, push_bytes};
 
 /// A tensor of 32-bit floats with an open shape: field 1 of `TypeProto` with field 1 of `Tensor`.
 const FLOAT_TENSOR: &[u8] = &[0x0a, 0x02, 0x08, 0x01];
@@ -92,14 +89,13 @@ fn cut_graph(graph: &[u8], outputs: &[&str]) -> Result<Vec<u8>, String> {
     }
     for name in outputs {
         let known = shapes.iter().find(|(shaped, _)| *shaped == name.as_bytes());
-        match known {
-            Some((_, content)) => push_bytes(&mut result, 12, content),
-            None => {
-                let mut content = Vec::new();
-                push_bytes(&mut content, 1, name.as_bytes());
-                push_bytes(&mut content, 2, FLOAT_TENSOR);
-                push_bytes(&mut result, 12, &content);
-            }
+        if let Some((_, content)) = known {
+            push_bytes(&mut result, 12, content);
+        } else {
+            let mut content = Vec::new();
+            push_bytes(&mut content, 1, name.as_bytes());
+            push_bytes(&mut content, 2, FLOAT_TENSOR);
+            push_bytes(&mut result, 12, &content);
         }
     }
     Ok(result)
@@ -129,7 +125,7 @@ fn add_inputs<'a>(
     needed: &mut HashSet<&'a [u8]>,
     depth: usize,
 ) -> Result<(), String> {
-    if depth > super::MAX_DEPTH {
+    if depth > MAX_DEPTH {
         return Err(no_model());
     }
     // The name of an input that is left out is empty.

@@ -2,6 +2,14 @@
 //!
 //! Source: "Encoding", protocol buffers documentation.
 
+/// Deepest nesting of graphs within graphs.
+pub(super) const MAX_DEPTH: usize = 64;
+
+/// The message about bytes that are not a complete model.
+pub(super) fn no_model() -> String {
+    "it is not an ONNX model, or is cut off".to_owned()
+}
+
 /// A field of a message.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Field<'a> {

@@ -81,12 +81,11 @@ proptest! {
 /// A node with these inputs and outputs, and a graph in an attribute.
 fn node(inputs: &[&str], outputs: &[&str], branch: &[u8]) -> Vec<u8> {
     let mut node = Vec::new();
-    inputs
-        .iter()
-        .for_each(|name| node.extend(field(1, name.as_bytes())));
-    outputs
-        .iter()
-        .for_each(|name| node.extend(field(2, name.as_bytes())));
+    for (number, names) in [(1, inputs), (2, outputs)] {
+        for name in names {
+            node.extend(field(number, name.as_bytes()));
+        }
+    }
     node.extend(field(5, &field(6, branch)));
     field(1, &node)
 }
