@@ -63,12 +63,15 @@ def files_of(root: Path, pins: Pins, cpu: str, runtime: Path) -> Iterator[tuple[
 
 
 def default_model_files(root: Path, pins: Pins) -> Iterator[tuple[Path, str]]:
-    """The default models with their manifests and licences, and their names below the folder of a package."""
+    """The default models, the manifests of models that `lookdown model fetch` installs, and their names in a package."""
     for model in pins.models + pins.derived:
         if model.default:
             folder = root / "models" / model.name
             for file in (folder / "model.toml", folder / "model.onnx", *sorted(folder.glob("LICENSE-*"))):
                 yield file, f"models/{model.name}/{file.name}"
+    for manifest in sorted((root / "models").glob("*/model.toml")):
+        if "upstream" in tomllib.loads(manifest.read_text(encoding="utf-8")):
+            yield manifest, f"models/{manifest.parent.name}/{manifest.name}"
 
 
 def copy_files(folder: Path, binary: Path, files: Iterator[tuple[Path, str]]) -> None:

@@ -1,161 +1,33 @@
 //! `lookdown model`
 
+mod check;
 mod description;
 mod fetch;
 mod manifest;
 mod sample;
 
-use std::{
-    io::{self, Write},
-    path::{Path, PathBuf},
-    process::ExitCode,
-    time::{Duration, Instant},
-};
+use std::process::ExitCode;
 
-use anyhow::Context;
-use clap::{Args, Subcommand};
-use lookdown_detect::{
-    imaging::ViewBatch,
-    inference::{Detector, InferenceError, OnnxDetector},
-};
+use clap::Subcommand;
 
-use self::sample::detect;
-use super::{SettingsFile, annotate};
-use crate::cli::output::UNWRITABLE;
-use crate::{annotated_image::AnnotationOptions, app::onnx_options, settings::find_installed};
-
-/// The default sample image: a fisheye frame.
-const SAMPLE: &str = "samples/office.jpg";
-/// Views in a run that is timed beside that of one view.
-const BATCH_VIEWS: usize = 8;
-/// Timed runs of the network. The median is printed.
-const RUNS: usize = 5;
+use super::SettingsFile;
 
 /// The subcommands for models.
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
     /// Show the properties of a model, run it on a sample and draw the detections
-    Check(Arguments),
+    Check(check::Arguments),
     /// List the models of the repository: name, size of the weights or `missing`, licence
     List(SettingsFile),
-    /// Fetch the weights of a model of the repository, whose `model.toml` has their SHA-256
+    /// Fetch, verify and install the weights of a model of the repository
     Fetch(fetch::Arguments),
-}
-
-/// Arguments of `lookdown model check`.
-#[derive(Debug, Args)]
-pub(super) struct Arguments {
-    /// A model folder (with a model.toml) or an ONNX file
-    #[arg(value_name = "FILE|FOLDER")]
-    model: PathBuf,
-    /// Test image, used without views [default: a fisheye sample, seen through views]
-    #[arg(long, value_name = "IMAGE")]
-    sample: Option<PathBuf>,
-    /// Draw the detected persons into the sample
-    #[arg(long, value_name = "OUT.jpg")]
-    annotate: Option<PathBuf>,
-    /// First write a `model.toml` beside the ONNX file: guess the head from the outputs, and the
-    /// input from the persons in the sample
-    #[arg(long)]
-    write_manifest: bool,
-    #[command(flatten)]
-    settings_file: SettingsFile,
 }
 
 /// Runs the subcommand.
 pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
     match command {
-        Command::Check(arguments) => check(arguments),
+        Command::Check(arguments) => check::run(arguments),
         Command::List(settings_file) => fetch::list(settings_file),
         Command::Fetch(arguments) => fetch::run(arguments),
     }
-}
-
-fn check(arguments: &Arguments) -> anyhow::Result<ExitCode> {
-    let mut settings = arguments.settings_file.load()?;
-    let library = settings.inference.find_library()?;
-    if arguments.write_manifest {
-        let sample = arguments.sample.clone();
-        let sample = sample.or_else(|| find_installed(Path::new(SAMPLE)));
-        manifest::write(&arguments.model, sample.as_deref(), &settings)?;
-    }
-    let loading = Instant::now();
-    let mut detector = OnnxDetector::load(&library, &arguments.model, &onnx_options(&settings))?;
-    let loaded = loading.elapsed();
-    let mut out = io::stdout().lock();
-    write!(out, "{}", description::Lines(detector.description())).context(UNWRITABLE)?;
-    writeln!(out, "loaded in    {}", millis(loaded)).context(UNWRITABLE)?;
-    let most = settings.threads.batch_views.get().max(BATCH_VIEWS);
-    let one_view = millis(time(&mut detector, 1)?);
-    let most_views = millis(time(&mut detector, most)?);
-    let (device, threads) = (settings.inference.device, settings.threads.per_session);
-    writeln!(
-        out,
-        "runs in      {one_view} with 1 view, {most_views} with {most} (on {device}, {})",
-        count(threads.get(), "thread")
-    )
-    .context(UNWRITABLE)?;
-    drop(detector);
-
-    settings.model.path = Some(arguments.model.clone());
-    let given = arguments.sample.as_deref();
-    let Some((sample, profile)) = given
-        .map(|path| (path.to_owned(), "direct"))
-        .or_else(|| Some((find_installed(Path::new(SAMPLE))?, "fast")))
-    else {
-        writeln!(out, "sample       none: give one with --sample").context(UNWRITABLE)?;
-        return Ok(ExitCode::SUCCESS);
-    };
-    let detected = detect(&settings, &sample, profile)?;
-    let persons = &detected.report.persons;
-    let views = detected.report.views.inferred;
-    writeln!(
-        out,
-        "sample       {}: {} in {}",
-        sample.display(),
-        count(persons.len(), "person"),
-        count(views, "view")
-    )
-    .context(UNWRITABLE)?;
-    for person in persons {
-        let [x_min, y_min, x_max, y_max] = person.bbox.corners().map(f64::round);
-        writeln!(
-            out,
-            "  {:.2}         {x_min}, {y_min} to {x_max}, {y_max}",
-            person.score
-        )
-        .context(UNWRITABLE)?;
-    }
-    if let Some(path) = &arguments.annotate {
-        annotate::write(detected, &AnnotationOptions::parse([])?, path)?;
-    }
-    Ok(ExitCode::SUCCESS)
-}
-
-fn count(number: usize, thing: &str) -> String {
-    match number {
-        1 => format!("1 {thing}"),
-        _ => format!("{number} {thing}s"),
-    }
-}
-
-fn millis(time: Duration) -> String {
-    format!("{:.1} ms", time.as_secs_f64() * 1e3)
-}
-
-/// The median time of a run on blank views, without the first run.
-fn time(detector: &mut OnnxDetector, views: usize) -> Result<Duration, InferenceError> {
-    let mut batch = ViewBatch::default();
-    for slot in batch.prepare(views, detector.input()) {
-        slot.fill(0.0);
-    }
-    detector.detect(&batch)?;
-    let mut times = Vec::with_capacity(RUNS);
-    for _ in 0..RUNS {
-        let started = Instant::now();
-        detector.detect(&batch)?;
-        times.push(started.elapsed());
-    }
-    times.sort_unstable();
-    Ok(times[RUNS / 2])
 }

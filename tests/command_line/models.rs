@@ -2,7 +2,7 @@
 
 use std::{
     fs,
-    io::{Read, Write},
+    io::{Cursor, Read, Write},
     net::TcpListener,
     path::Path,
     thread,
@@ -10,6 +10,7 @@ use std::{
 
 use sha2::{Digest, Sha256};
 use tempfile::{TempDir, tempdir};
+use zip::{ZipWriter, write::SimpleFileOptions};
 
 use crate::{assert_fails_with, lookdown};
 
@@ -148,4 +149,131 @@ fn folder_without_a_manifest_names_the_command_that_writes_it() {
     let model = folder.path().join("yolox_s.onnx");
     let command = format!("lookdown model check --write-manifest {}", model.display());
     assert_fails_with(&output, &["model.toml", &command]);
+}
+
+/// A network in the layout of the published `RTMDet`, with suppression of overlaps inside.
+fn published() -> Vec<u8> {
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/models");
+    fs::read(fixtures.join("rtmdet_end2end/model.onnx")).unwrap()
+}
+
+/// An archive with the published network, and `members` of the same name.
+fn archive(members: &[&str]) -> Vec<u8> {
+    let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+    for member in members {
+        let options = SimpleFileOptions::default();
+        archive.start_file(*member, options).unwrap();
+        archive.write_all(&published()).unwrap();
+    }
+    archive.finish().unwrap().into_inner()
+}
+
+/// A repository with the manifest of `rtmdet`, and a mirror with the content of its archive.
+fn with_upstream(sum: Option<&str>, content: &[u8]) -> (TempDir, TempDir) {
+    let (repository, mirror) = (tempdir().unwrap(), tempdir().unwrap());
+    fs::create_dir(repository.path().join("rtmdet")).unwrap();
+    fs::create_dir(mirror.path().join("rtmdet")).unwrap();
+    let sum = sum.map_or_else(String::new, |sum| format!("sha256 = \"{sum}\"\n"));
+    let manifest = format!(
+        "name = \"rtmdet\"\nonnx = \"model.onnx\"\n[output]\nhead = \"boxes_scores\"\nboxes = \
+         \"1442\"\nscores = \"1415\"\n[upstream]\nurl = \"https://127.0.0.1:9/files/net.zip\"\n\
+         member = \"end2end.onnx\"\ncut = true\n{sum}"
+    );
+    fs::write(repository.path().join("rtmdet/model.toml"), manifest).unwrap();
+    fs::write(mirror.path().join("rtmdet/net.zip"), content).unwrap();
+    (repository, mirror)
+}
+
+fn files_of(repository: &TempDir) -> Vec<std::ffi::OsString> {
+    let files = fs::read_dir(repository.path().join("rtmdet")).unwrap();
+    let mut files: Vec<_> = files.map(|file| file.unwrap().file_name()).collect();
+    files.sort();
+    files
+}
+
+/// Runs `model check` on the installed model.
+fn check(repository: &TempDir) -> std::process::Output {
+    let folder = repository.path().join("rtmdet");
+    lookdown(&["model", "check", folder.to_str().unwrap()], &[])
+}
+
+#[test]
+fn published_archive_is_cut_and_loads() {
+    let sum = format!("{:x}", Sha256::digest(published()));
+    let content = archive(&["2023/README", "2023/rtmdet/end2end.onnx"]);
+    let (repository, mirror) = with_upstream(Some(&sum), &content);
+    assert!(listed(repository.path()).contains("missing  -  (lookdown model fetch rtmdet)"));
+    let output = fetch(repository.path(), "rtmdet", mirror.path().to_str().unwrap());
+    assert!(output.status.success(), "{output:?}");
+    let printed = String::from_utf8(output.stdout).unwrap();
+    assert!(printed.contains(&sum), "{printed}");
+    assert!(printed.contains("office.jpg: "), "{printed}");
+    let checked = check(&repository);
+    assert!(checked.status.success(), "{checked:?}");
+    let description = String::from_utf8(checked.stdout).unwrap();
+    assert!(description.contains("1442"), "{description}");
+    assert!(!description.contains("dets"), "{description}");
+}
+
+#[test]
+fn changed_file_of_an_installed_model_is_refused() {
+    let sum = format!("{:x}", Sha256::digest(published()));
+    let (repository, mirror) = with_upstream(Some(&sum), &archive(&["end2end.onnx"]));
+    let output = fetch(repository.path(), "rtmdet", mirror.path().to_str().unwrap());
+    assert!(output.status.success(), "{output:?}");
+    fs::write(repository.path().join("rtmdet/model.onnx"), published()).unwrap();
+    assert_fails_with(&check(&repository), &["SHA-256", &sum]);
+}
+
+#[test]
+fn published_file_without_a_known_sum_needs_the_accepted_one() {
+    let sum = format!("{:x}", Sha256::digest(published()));
+    let (repository, mirror) = with_upstream(None, &archive(&["end2end.onnx"]));
+    let from = mirror.path().to_str().unwrap();
+    let refused = fetch(repository.path(), "rtmdet", from);
+    assert_fails_with(&refused, &[&format!("--accept-sha256 {sum}")]);
+    assert_eq!(files_of(&repository), ["model.toml"]);
+    let accept = |sum: &str| {
+        let arguments = ["model", "fetch", "rtmdet", "--from", from];
+        let arguments = [&arguments[..], &["--accept-sha256", sum]].concat();
+        let repository = repository.path().to_str().unwrap();
+        lookdown(&arguments, &[("LOOKDOWN__MODEL__REPOSITORY", repository)])
+    };
+    assert_fails_with(&accept(&"0".repeat(64)), &["--accept-sha256", &sum]);
+    let accepted = accept(&sum);
+    assert!(accepted.status.success(), "{accepted:?}");
+    assert_eq!(
+        files_of(&repository),
+        ["model.onnx", "model.onnx.sha256", "model.toml"]
+    );
+}
+
+#[test]
+fn unusable_published_file_is_refused_and_changes_nothing() {
+    let sum = format!("{:x}", Sha256::digest(published()));
+    let ambiguous = archive(&["a/end2end.onnx", "b/end2end.onnx"]);
+    let other_sum = "0".repeat(64);
+    for (content, wanted, causes) in [
+        (ambiguous, &sum, ["end2end.onnx", "upstream"]),
+        (published(), &sum, ["archive", "upstream"]),
+        (
+            archive(&["end2end.onnx"]),
+            &other_sum,
+            ["SHA-256", &other_sum],
+        ),
+    ] {
+        let (repository, mirror) = with_upstream(Some(wanted), &content);
+        let from = mirror.path().to_str().unwrap();
+        assert_fails_with(&fetch(repository.path(), "rtmdet", from), &causes);
+        assert_eq!(files_of(&repository), ["model.toml"]);
+    }
+}
+
+#[test]
+fn fetch_without_a_place_uses_the_address_of_the_manifest() {
+    let (repository, _mirror) = with_upstream(None, b"");
+    let folder = repository.path().to_str().unwrap();
+    let environment = [("LOOKDOWN__MODEL__REPOSITORY", folder)];
+    let output = lookdown(&["model", "fetch", "rtmdet"], &environment);
+    assert_fails_with(&output, &["https://127.0.0.1:9/files/net.zip"]);
 }

@@ -21,11 +21,13 @@ mod staging;
 pub use detector::Detector;
 pub use device::{Device, UnknownDevice};
 pub use error::InferenceError;
-pub use fetch::{FetchError, ModelSource, fetch_weights};
+pub use fetch::{FetchError, Installed, ModelSource, Sha256Sum, fetch_upstream, fetch_weights};
 pub use guess::{GuessedHead, INPUTS, guess_head, guess_size};
 pub use head_output::{HeadOutput, ViewDetection};
 pub use heads::CandidateOptions;
-pub use manifest::{FILE_NAME as MANIFEST, Layout, ManifestInput, ModelManifest, name_from};
+pub use manifest::{
+    FILE_NAME as MANIFEST, Layout, ManifestInput, ModelManifest, Upstream, name_from,
+};
 pub use model::Model;
 pub use onnx::{ModelDescription, OnnxDetector, OnnxOptions, OnnxTensor, onnx_loader};
 pub use precision::{Int8Use, PrecisionChoice, cpu_has_integer_dot_product};

@@ -8,8 +8,11 @@ use std::{
 
 use anyhow::{Context, bail};
 use clap::Args;
-use lookdown_detect::inference::{ModelManifest, ModelSource, fetch_weights, model_names};
+use lookdown_detect::inference::{
+    ModelManifest, ModelSource, Sha256Sum, fetch_upstream, fetch_weights, model_names,
+};
 
+use super::check::check_model;
 use crate::{
     cli::{complete, output::UNWRITABLE, settings_file::SettingsFile},
     settings::Settings,
@@ -24,9 +27,13 @@ pub(in super::super) struct Arguments {
     #[arg(value_name = "NAME", add = complete::of_model())]
     name: String,
     /// Place of converted models: NAME/model.onnx below a folder or an address. `make models`
-    /// converts models
+    /// converts models. For a model with `[upstream]` in its model.toml, a mirror of the published
+    /// file: NAME/FILE [default: the address in `[upstream]`]
     #[arg(long, value_name = "URL|FOLDER")]
-    from: ModelSource,
+    from: Option<ModelSource>,
+    /// SHA-256 of the published file that you trust, for a model whose model.toml has none
+    #[arg(long, value_name = "SUM")]
+    accept_sha256: Option<Sha256Sum>,
     #[command(flatten)]
     settings_file: SettingsFile,
 }
@@ -41,7 +48,13 @@ pub(super) fn list(settings_file: &SettingsFile) -> anyhow::Result<ExitCode> {
         let line = match &manifest {
             Ok(manifest) => {
                 let licence = manifest.licence.as_deref().unwrap_or("-");
-                format!("{:>10}  {licence}", size(&manifest.onnx))
+                let size = size(&manifest.onnx);
+                let command = match (&manifest.upstream, &size) {
+                    (Some(_), None) => format!("  (lookdown model fetch {name})"),
+                    _ => String::new(),
+                };
+                let size = size.as_deref().unwrap_or("missing");
+                format!("{size:>10}  {licence}{command}")
             }
             Err(error) => format!("{:>10}  {error}", "invalid"),
         };
@@ -50,14 +63,40 @@ pub(super) fn list(settings_file: &SettingsFile) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Fetches the weights of a model.
+/// Fetches the weights of a model. Checks a model from its published file on a sample.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let settings = arguments.settings_file.load()?;
     let manifest = manifest(&settings, &arguments.name)?;
-    let bytes = fetch_weights(&manifest, &arguments.from)?;
     let (name, file) = (&manifest.name, manifest.onnx.display());
-    writeln!(io::stdout(), "{name}: {bytes} bytes in {file}").context(UNWRITABLE)?;
-    Ok(ExitCode::SUCCESS)
+    let (from, accepted) = (arguments.from.as_ref(), arguments.accept_sha256.as_ref());
+    let installed = match (&manifest.upstream, from, accepted) {
+        (Some(upstream), ..) => {
+            let installed = fetch_upstream(&manifest, upstream, from, accepted)?;
+            let cut = if installed.is_cut { ", cut" } else { "" };
+            let sum = installed.published_sha256;
+            format!(
+                "{} bytes in {file} (SHA-256 of the published file: {sum}{cut})",
+                installed.bytes
+            )
+        }
+        (None, _, Some(_)) => bail!(
+            "--accept-sha256: the model.toml of {name} has no [upstream]: enter the sum as sha256 \
+             in that file"
+        ),
+        (None, Some(from), None) => {
+            format!("{} bytes in {file}", fetch_weights(&manifest, from)?)
+        }
+        (None, None, None) => bail!(
+            "the model.toml of {name} has no [upstream]: give a place of converted models with \
+             --from, or run `make models`"
+        ),
+    };
+    writeln!(io::stdout(), "{name}: {installed}").context(UNWRITABLE)?;
+    if manifest.upstream.is_none() {
+        return Ok(ExitCode::SUCCESS);
+    }
+    check_model(settings, &manifest.onnx, None, None)
+        .with_context(|| format!("{name} is installed, but its check fails"))
 }
 
 fn manifest(settings: &Settings, name: &str) -> anyhow::Result<ModelManifest> {
@@ -70,12 +109,10 @@ fn manifest(settings: &Settings, name: &str) -> anyhow::Result<ModelManifest> {
     Ok(ModelManifest::locate(&folder.join(name))?)
 }
 
-/// The size of a file, or `missing`.
-fn size(file: &Path) -> String {
+/// The size of a file. `None` if it is missing.
+fn size(file: &Path) -> Option<String> {
     #[expect(clippy::cast_precision_loss, reason = "far below 2^52 bytes")]
     let mebibytes = |bytes: u64| bytes as f64 / MEBIBYTE;
-    file.metadata().map_or_else(
-        |_| "missing".to_owned(),
-        |metadata| format!("{:.1} MiB", mebibytes(metadata.len())),
-    )
+    let metadata = file.metadata().ok()?;
+    Some(format!("{:.1} MiB", mebibytes(metadata.len())))
 }

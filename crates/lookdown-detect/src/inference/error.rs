@@ -42,8 +42,8 @@ pub enum InferenceError {
     },
     /// The model file or its manifest cannot be read.
     #[error(
-        "model: {path} cannot be read: {detail}; `make setup` fetches the default models and \
-         `make models` the others"
+        "model: {path} cannot be read: {detail}; `make setup` fetches the default models, \
+         `make models` or `lookdown model fetch` the others"
     )]
     Unreadable {
         /// Path of the file.

@@ -5,20 +5,21 @@
 //! resolves such paths even for models passed as bytes, so the graph is checked here first. The
 //! field numbers are those of `onnx.proto`, which are stable.
 
+mod cut;
 mod protobuf;
 
 use std::path::Path;
 
 use lookdown_common::files;
 
-use self::protobuf::{Field, Value, fields};
+use self::protobuf::{Field, MAX_DEPTH, Value, fields, no_model};
+
+pub(super) use self::cut::cut;
 
 /// Largest ONNX file, bytes. Protocol buffers are limited to 2 GiB.
 pub(super) const MAX_BYTES: u64 = 1 << 30;
 /// Most values of one tensor in a file.
 const MAX_VALUES: u64 = 1 << 29;
-/// Deepest nesting of graphs within graphs.
-const MAX_DEPTH: usize = 64;
 /// The operator for an execution provider's compiled engine, which is mostly in another file.
 const ENGINE: &[u8] = b"EPContext";
 
@@ -44,10 +45,6 @@ pub(super) fn check(bytes: &[u8]) -> Result<(), String> {
         return Err(no_model());
     }
     Message::Model.check(bytes, 0)
-}
-
-fn no_model() -> String {
-    "it is not an ONNX model, or is cut off".to_owned()
 }
 
 /// The messages of `onnx.proto` on the way to a tensor.
@@ -90,7 +87,7 @@ impl Message {
             return check_tensor(bytes);
         }
         for field in fields(bytes) {
-            let Field { number, value } = field.map_err(|()| no_model())?;
+            let Field { number, value, .. } = field.map_err(|()| no_model())?;
             match (self, number, value) {
                 (Self::Node, 4, Value::Bytes(ENGINE)) => {
                     return Err("it contains a compiled engine: save the original model".into());
@@ -111,7 +108,7 @@ impl Message {
 fn check_tensor(bytes: &[u8]) -> Result<(), String> {
     let mut values: u64 = 1;
     for field in fields(bytes) {
-        let Field { number, value } = field.map_err(|()| no_model())?;
+        let Field { number, value, .. } = field.map_err(|()| no_model())?;
         match (number, value) {
             (13, _) | (14, Value::Varint(1..)) => {
                 return Err(

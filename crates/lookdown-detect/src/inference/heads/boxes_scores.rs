@@ -12,7 +12,7 @@ use super::{
 };
 
 /// Boxes `[views, candidates, 4]` (`x_min, y_min, x_max, y_max`, view pixels) and scores
-/// `[views, candidates]` of being a person, 0 to 1.
+/// `[views, candidates]` or `[views, candidates, 1]` of being a person, 0 to 1.
 ///
 /// ```toml
 /// [output]              # optional
@@ -43,9 +43,16 @@ impl BoxesScoresHead {
         let boxes = named(outputs, &self.boxes)?;
         let scores = named(outputs, &self.scores)?;
         let candidates = Axis::AtLeast(0, "candidates");
+        let one_class = [Axis::Views, candidates, Axis::Exactly(1)];
+        let has_classes = scores.dimensions().len() == one_class.len();
+        let scores_axes = if has_classes {
+            &one_class[..]
+        } else {
+            &one_class[..2]
+        };
         batch.require(&[
             (boxes, &[Axis::Views, candidates, Axis::Exactly(4)]),
-            (scores, &[Axis::Views, candidates]),
+            (scores, scores_axes),
         ])?;
         Ok([boxes, scores])
     }

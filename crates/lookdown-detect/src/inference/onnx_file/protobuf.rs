@@ -1,12 +1,22 @@
-//! The wire format of protocol buffers, as far as the check of ONNX files needs it.
+//! The wire format of protocol buffers, as far as ONNX files need it.
 //!
 //! Source: "Encoding", protocol buffers documentation.
+
+/// Deepest nesting of graphs within graphs.
+pub(super) const MAX_DEPTH: usize = 64;
+
+/// The message about bytes that are not a complete model.
+pub(super) fn no_model() -> String {
+    "it is not an ONNX model, or is cut off".to_owned()
+}
 
 /// A field of a message.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Field<'a> {
     pub(super) number: u64,
     pub(super) value: Value<'a>,
+    /// The whole field with its tag.
+    pub(super) raw: &'a [u8],
 }
 
 /// Value of a field.
@@ -54,6 +64,7 @@ pub(super) fn fields(mut bytes: &[u8]) -> impl Iterator<Item = Result<Field<'_>,
 }
 
 fn field<'a>(bytes: &mut &'a [u8]) -> Option<Field<'a>> {
+    let start = *bytes;
     let tag = varint(bytes)?;
     let value = match tag & 7 {
         0 => Value::Varint(varint(bytes)?),
@@ -66,7 +77,8 @@ fn field<'a>(bytes: &mut &'a [u8]) -> Option<Field<'a>> {
         _ => return None,
     };
     let number = tag >> 3;
-    (number > 0).then_some(Field { number, value })
+    let raw = &start[..start.len() - bytes.len()];
+    (number > 0).then_some(Field { number, value, raw })
 }
 
 fn take<'a>(bytes: &mut &'a [u8], len: usize) -> Option<&'a [u8]> {
@@ -87,4 +99,24 @@ fn varint(bytes: &mut &[u8]) -> Option<u64> {
         }
     }
     None
+}
+
+/// Appends a varint.
+fn push_varint(bytes: &mut Vec<u8>, mut number: u64) {
+    loop {
+        let [low, ..] = number.to_le_bytes();
+        number >>= 7;
+        if number == 0 {
+            bytes.push(low & 0x7f);
+            return;
+        }
+        bytes.push(low | 0x80);
+    }
+}
+
+/// Appends a field with a string or a message.
+pub(super) fn push_bytes(bytes: &mut Vec<u8>, number: u64, content: &[u8]) {
+    push_varint(bytes, number << 3 | 2);
+    push_varint(bytes, content.len() as u64);
+    bytes.extend_from_slice(content);
 }

@@ -59,7 +59,7 @@ impl ModelFolder {
         if self.find(name).is_ok_and(|path| is_fetched(&path)) {
             format!("it is not loaded: load it with POST /v2/repository/models/{name}/load")
         } else {
-            "its ONNX file is missing: run `make models`".to_owned()
+            format!("its ONNX file is missing: run `make models` or `lookdown model fetch {name}`")
         }
     }
 }

@@ -1,7 +1,10 @@
 //! Models and manifests that do not fit, and their error messages.
 
 use super::{decode, head};
-use crate::inference::heads::{Head, OutputShape};
+use crate::{
+    imaging::NetworkInput,
+    inference::heads::{Head, OutputShape, TensorView},
+};
 
 fn refusal(manifest: &str, outputs: &[(&str, &[i64])]) -> String {
     let outputs: Vec<OutputShape<'_>> = outputs
@@ -83,6 +86,37 @@ fn a_map_that_does_not_divide_the_input_is_refused() {
             )
         );
     }
+}
+
+#[test]
+fn outputs_of_unknown_axes_are_accepted_until_a_run() {
+    let head = head("head = 'boxes_scores'");
+    let declared = ["boxes", "scores"].map(|name| OutputShape { name, shape: &[] });
+    assert_eq!(head.check(&declared, (64, 64)), Ok(()));
+    let tensors = ["boxes", "scores"].map(|name| TensorView {
+        name,
+        shape: &[],
+        values: &[0.0],
+    });
+    let input = NetworkInput::plain(64, 64);
+    let error = head.decode(&tensors, 1, &input, 0.1).unwrap_err();
+    assert!(error.to_string().contains("\"boxes\" is []"), "{error}");
+}
+
+#[test]
+fn scores_may_have_an_axis_of_one_class() {
+    let head = head("head = 'boxes_scores'");
+    let shapes: [&[i64]; 2] = [&[-1, 10, 1], &[-1, 10, 2]];
+    let [one, two] = shapes.map(|shape| {
+        let boxes = OutputShape {
+            name: "boxes",
+            shape: &[-1, 10, 4],
+        };
+        let name = "scores";
+        head.check(&[boxes, OutputShape { name, shape }], (64, 64))
+    });
+    assert_eq!(one, Ok(()));
+    assert!(two.unwrap_err().contains("[views, 10 candidates, 1]"));
 }
 
 #[test]
