@@ -48,7 +48,7 @@ class Detect(unittest.TestCase):
 class Counts(CountedCamera):
     """Examples that use counts."""
 
-    def test_counts_are_a_table_and_their_metrics_are_those_of_the_examples(self) -> None:
+    def test_counts_are_a_table_and_the_queries_name_their_metrics(self) -> None:
         with self.counting() as count:
             wait_until(lambda: count.get("/counts") is not None, "lookdown count answers")
             self.send_frames()
@@ -69,14 +69,14 @@ class Counts(CountedCamera):
             file.write_text(json.dumps({"groups": [{"name": "examples", "rules": rules}]}), encoding="utf-8")
             run("promtool", "check", "rules", file)
 
-    def test_the_receiver_prints_webhooks_with_the_right_signature_only(self) -> None:
+    def test_the_receiver_prints_webhooks_with_the_right_signature(self) -> None:
         (port,) = free_ports(1)
         secret, wrong = self.folder / "hook.secret", self.folder / "wrong.secret"
         secret.write_text(SECRET + "\n", encoding="utf-8")
         wrong.write_text(OTHER_SECRET + "\n", encoding="utf-8")
-        hook = '[[webhooks]]\nurl = "http://127.0.0.1:{}/"\nsecret_file = "{}"\non = "occupancy"\n'
+        hook = '[[webhooks]]\nurl = "http://127.0.0.1:{}/{}"\nsecret_file = "{}"\non = "occupancy"\n'
         with open(self.settings, "a", encoding="utf-8") as settings:
-            settings.write(hook.format(port, secret) + hook.format(port, wrong))
+            settings.write(hook.format(port, "right", secret) + hook.format(port, "wrong", wrong))
         printed, log = self.folder / "printed", self.folder / "receiver.log"
         with printed.open("wb") as output, log.open("wb") as errors:
             command = [sys.executable, EXAMPLES / "webhook_receiver.py", secret, str(port)]

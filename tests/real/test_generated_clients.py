@@ -46,7 +46,7 @@ class GeneratedClients(unittest.TestCase):
         (self.folder / "package.json").write_text('{"type": "module"}', encoding="utf-8")
         example = shutil.copy(ROOT / "examples" / "detect.ts", self.folder)
         strict = [option for option in STRICT if option != "--noEmit"]
-        self.succeeds(MODULES / ".bin/tsc", *strict, "--types", "node", example)
+        self.succeeds(MODULES / ".bin/tsc", *strict, "--types", "node", "--typeRoots", MODULES / "@types", example)
         with lookdown({}) as server:
             lines = self.succeeds("node", self.folder / "detect.js", OFFICE, f"http://{server.address}").splitlines()
         self.assertGreater(len(lines), 3)
