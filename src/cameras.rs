@@ -2,7 +2,7 @@
 //! password in a file of its own, and the states of all cameras.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     fs, io,
     io::Write,
     os::unix::fs::{DirBuilderExt, OpenOptionsExt},
@@ -17,7 +17,7 @@ use lookdown_watch::{
 };
 use parking_lot::{Mutex, RwLock};
 use secrecy::{ExposeSecret, SecretString};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 /// Longest wait for the frame of a test.
 const TEST_TIMEOUT: Duration = Duration::from_secs(15);
@@ -27,6 +27,8 @@ const TEST: &str = "test";
 const MAX_CAMERAS: usize = 256;
 /// The file of the cameras in the state folder.
 const FILE: &str = "cameras.json";
+/// The file with the names of the cameras of the settings that are paused, in the state folder.
+const PAUSED: &str = "paused.json";
 /// The folder of the passwords in the state folder.
 const PASSWORDS: &str = "passwords";
 
@@ -57,9 +59,14 @@ impl StoredCamera {
     /// Returns the source without its query, which may hold a token.
     #[must_use]
     pub fn shown_source(&self) -> String {
-        let location = Location::parse(&self.url);
-        location.map_or_else(|_| String::new(), |(location, _)| location.to_string())
+        shown_source(&self.url)
     }
+}
+
+/// Returns a source without its credentials and its query, which may hold a token.
+fn shown_source(url: &str) -> String {
+    let location = Location::parse(url);
+    location.map_or_else(|_| String::new(), |(location, _)| location.to_string())
 }
 
 /// A camera that cannot be stored or removed.
@@ -116,7 +123,66 @@ impl Cameras {
         states
     }
 
-    /// Adds the stored cameras that are not paused to those of the settings, which have precedence.
+    /// Returns the paused cameras of the settings with their sources. Blocks.
+    ///
+    /// # Errors
+    /// [`ConfigError`].
+    pub fn paused_of_settings(&self) -> Result<BTreeMap<String, String>, ConfigError> {
+        let paused = self.paused()?;
+        let configured = self.configured.read();
+        let of_settings = configured.iter().filter(|(name, _)| paused.contains(*name));
+        let with_source = of_settings.map(|(name, entry)| {
+            let url = entry.url.as_deref().unwrap_or_default();
+            (name.clone(), shown_source(url))
+        });
+        Ok(with_source.collect())
+    }
+
+    /// Returns all cameras by name, and whether their frames are read. Blocks.
+    ///
+    /// # Errors
+    /// [`ConfigError`].
+    pub fn detection(&self) -> Result<BTreeMap<String, bool>, ConfigError> {
+        let stored = self.stored()?;
+        let mut states: BTreeMap<_, _> = stored
+            .into_iter()
+            .map(|(name, camera)| (name, !camera.paused))
+            .collect();
+        let paused = self.paused()?;
+        for name in self.configured.read().keys() {
+            states.insert(name.clone(), !paused.contains(name));
+        }
+        Ok(states)
+    }
+
+    /// Pauses a camera or resumes it; it stays so after a restart. Does nothing for an unknown
+    /// camera. Blocks.
+    ///
+    /// # Errors
+    /// [`CameraError`].
+    pub fn set_detection(&self, name: &str, is_on: bool) -> Result<(), CameraError> {
+        let _changing = self.changing.lock();
+        let configured: BTreeSet<_> = self.configured.read().keys().cloned().collect();
+        if configured.contains(name) {
+            let mut paused = self.paused()?;
+            // Names that the settings no longer have are dropped, so that the file stays small.
+            paused.retain(|paused| configured.contains(paused) && paused != name);
+            if !is_on {
+                paused.insert(name.to_owned());
+            }
+            let content = serde_json::to_string(&paused).unwrap_or_default();
+            return self.write(&self.folder.join(PAUSED), &content);
+        }
+        let mut stored = self.stored()?;
+        let Some(camera) = stored.get_mut(name) else {
+            return Ok(());
+        };
+        camera.paused = !is_on;
+        self.store(&stored)
+    }
+
+    /// Adds the stored cameras that are not paused to those of the settings, which have precedence,
+    /// and removes those of the settings that are paused.
     ///
     /// # Errors
     /// [`ConfigError`] if the file of the cameras cannot be used. Blocks.
@@ -126,6 +192,11 @@ impl Cameras {
             Some((name, camera.clone()))
         });
         let configured: BTreeMap<_, _> = named.collect();
+        let paused = self.paused()?;
+        cameras.retain(|camera| {
+            let name = camera.name.as_ref().or(camera.calibration.as_ref());
+            name.is_none_or(|name| !paused.contains(name))
+        });
         for (name, camera) in self.stored()? {
             if !camera.paused && !configured.contains_key(&name) {
                 cameras.push(self.entry(&name, &camera));
@@ -140,9 +211,19 @@ impl Cameras {
     /// # Errors
     /// [`ConfigError`].
     pub fn stored(&self) -> Result<Stored, ConfigError> {
-        let path = self.folder.join(FILE);
+        self.read(FILE)
+    }
+
+    /// Returns the names of the paused cameras of the settings, possibly also of earlier settings.
+    fn paused(&self) -> Result<BTreeSet<String>, ConfigError> {
+        self.read(PAUSED)
+    }
+
+    /// Reads a file of the state folder. A missing file is empty.
+    fn read<T: Default + DeserializeOwned>(&self, name: &str) -> Result<T, ConfigError> {
+        let path = self.folder.join(name);
         if !path.exists() {
-            return Ok(Stored::new());
+            return Ok(T::default());
         }
         let content = read_file("state.path", &path)?;
         serde_json::from_slice(&content).map_err(|error| {
