@@ -1,5 +1,6 @@
 //! Publishes the counts of `lookdown count`: totals, occupancy and dwell times.
 
+mod events;
 mod number;
 
 use std::{
@@ -10,11 +11,12 @@ use std::{
     time::Duration,
 };
 
+use lookdown_common::ServerClient;
 use lookdown_count::Snapshot;
 use rumqttc::Publish;
 use serde_json::{Value, json};
 use tokio::{
-    sync::watch,
+    sync::{mpsc, watch},
     time::{Instant, sleep_until},
 };
 
@@ -22,14 +24,21 @@ use super::{
     Broker,
     connector::Connector,
     discovery::{OFFLINE, ONLINE},
-    entity::{self, SENSOR},
+    entity::{self, EVENT, IMAGE, SENSOR},
     message::Message,
     retained::RetainedTopics,
     session::{Session, SessionError},
     topics::{Topics, level},
 };
 use crate::tls::TlsError;
+use events::{EventImage, events, request_images};
 use number::{AVAILABILITY, Number, Owner};
+
+/// The IDs of the entities of events.
+const EVENT_ID: &str = "count_event";
+const EVENT_IMAGE_ID: &str = "count_event_image";
+/// Most images of events that wait. Further ones are not requested.
+const IMAGES: usize = 8;
 
 /// The broker of the counts, and the settings of the messages.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,6 +54,8 @@ pub struct CountsOptions {
     /// Time after the connection until retained topics of unknown cameras, lines, zones and sites
     /// are withdrawn.
     pub unknown_for: Duration,
+    /// Shortest time between two images of events of a camera. `None` publishes none.
+    pub image_every: Option<Duration>,
 }
 
 /// Publishes counts.
@@ -53,6 +64,8 @@ pub struct CountsPublisher {
     options: CountsOptions,
     connector: Connector,
     snapshots: watch::Receiver<Snapshot>,
+    /// The server, which has the images of events.
+    server: ServerClient,
 }
 
 /// The retained messages: payloads by topic.
@@ -66,6 +79,7 @@ impl CountsPublisher {
     pub fn new(
         options: CountsOptions,
         snapshots: watch::Receiver<Snapshot>,
+        server: ServerClient,
     ) -> Result<Self, TlsError> {
         Ok(Self {
             connector: Connector::new(
@@ -76,11 +90,30 @@ impl CountsPublisher {
             topics: Topics::new(&options.topic_prefix, options.discovery_prefix.as_deref()),
             options,
             snapshots,
+            server,
         })
     }
 
     /// Publishes until the counts end, and then publishes the status "offline".
-    pub async fn run(mut self) {
+    pub async fn run(self) {
+        let (wanted, cameras) = mpsc::channel(IMAGES);
+        let (sender, images) = mpsc::channel(1);
+        let (server, every) = (self.server.clone(), self.options.image_every);
+        let requesting = async {
+            if let Some(every) = every {
+                request_images(server, every, cameras, sender).await;
+            }
+        };
+        tokio::join!(self.publish(wanted, images), requesting);
+    }
+
+    /// Publishes in one session after the other. `wanted` receives the cameras of events, and `images`
+    /// has their images.
+    async fn publish(
+        mut self,
+        wanted: mpsc::Sender<String>,
+        mut images: mpsc::Receiver<EventImage>,
+    ) {
         let mut snapshots = self.snapshots.clone();
         let mut stop = pin!(async move { while snapshots.changed().await.is_ok() {} });
         let will = self.status(OFFLINE);
@@ -89,7 +122,8 @@ impl CountsPublisher {
                 session = self.connector.session(&will) => session,
                 () = &mut stop => return,
             };
-            let Err(error) = self.serve(session, stop.as_mut()).await else {
+            let ended = self.serve(session, stop.as_mut(), &wanted, &mut images);
+            let Err(error) = ended.await else {
                 return;
             };
             self.connector.lost(&error);
@@ -105,6 +139,8 @@ impl CountsPublisher {
         &mut self,
         mut session: Session,
         mut stop: Pin<&mut impl Future<Output = ()>>,
+        wanted: &mpsc::Sender<String>,
+        images: &mut mpsc::Receiver<EventImage>,
     ) -> Result<(), SessionError> {
         session.publish([self.status(ONLINE)]).await?;
         let birth = self.topics.birth();
@@ -113,14 +149,23 @@ impl CountsPublisher {
             .subscribe(birth.clone().into_iter().chain(filters))
             .await?;
         let mut published = Retained::new();
+        let mut before = self.snapshots.borrow().clone();
         let mut unknown = RetainedTopics::default();
         let connected = Instant::now();
         let mut withdraw_at = Some(connected + self.options.unknown_for);
         loop {
             let snapshot = self.snapshots.borrow_and_update().clone();
-            let wanted = self.retained(&snapshot);
-            session.publish(changes(&published, &wanted)).await?;
-            published = wanted;
+            let retained = self.retained(&snapshot);
+            session.publish(changes(&published, &retained)).await?;
+            published = retained;
+            for event in events(&before, &snapshot) {
+                let topic = self.event_topic(&event.camera);
+                let body = event.body.to_string().into();
+                session.publish([Message::passing(topic, body)]).await?;
+                // Without room, the event has no image.
+                let _ = wanted.try_send(event.camera);
+            }
+            before = snapshot;
             tokio::select! {
                 message = session.next() => {
                     let message = message?;
@@ -134,6 +179,10 @@ impl CountsPublisher {
                 () = sleep_until(withdraw_at.unwrap_or(connected)), if withdraw_at.is_some() => {
                     withdraw_at = None;
                     session.publish(self.withdrawals(&mut unknown, &published)).await?;
+                }
+                Some(EventImage { camera, jpeg }) = images.recv() => {
+                    let topic = self.event_image_topic(&camera);
+                    session.publish([Message::passing(topic, jpeg.into())]).await?;
                 }
                 Ok(()) = self.snapshots.changed() => {}
                 () = &mut stop => return session.close(self.status(OFFLINE)).await,
@@ -189,6 +238,12 @@ impl CountsPublisher {
                 topics.extend(self.config_topic(owner, number));
             }
             topics.push(self.topics.counts(&first));
+            if let Owner::Camera(name) = owner {
+                let device = self.device(owner, name);
+                let ids = [(EVENT, EVENT_ID), (IMAGE, EVENT_IMAGE_ID)];
+                let config = |(component, id)| self.topics.config(component, &device.entity_id(id));
+                topics.extend(ids.into_iter().filter_map(config));
+            }
         }
         let gone = topics
             .into_iter()
@@ -199,6 +254,41 @@ impl CountsPublisher {
     fn state_topic(&self, owner: Owner<'_>, number: Number<'_>) -> String {
         let topic = format!("{}/{}", owner.path(), number.topic());
         self.topics.counts(&topic)
+    }
+
+    fn event_topic(&self, camera: &str) -> String {
+        self.topics.counts(&format!("events/{}", level(camera)))
+    }
+
+    fn event_image_topic(&self, camera: &str) -> String {
+        self.topics
+            .counts(&format!("event_images/{}", level(camera)))
+    }
+
+    /// The announcements of a camera's events and of their images.
+    fn event_entities(&self, camera: &str) -> Retained {
+        let name = level(camera);
+        let device = self.device(Owner::Camera(&name), camera);
+        let event = json!({
+            "name": "Event",
+            "state_topic": self.event_topic(camera),
+            "event_types": events::TYPES,
+        });
+        let image = json!({
+            "name": "Latest event",
+            "image_topic": self.event_image_topic(camera),
+            "content_type": "image/jpeg",
+        });
+        let image = self
+            .options
+            .image_every
+            .map(|_| (IMAGE, EVENT_IMAGE_ID, image));
+        let entities = [(EVENT, EVENT_ID, event)].into_iter().chain(image);
+        let status = || [self.topics.counts("status")];
+        let announced = entities.filter_map(|(component, id, config)| {
+            device.announcement(&self.topics, component, id, status(), config)
+        });
+        announced.collect()
     }
 
     fn device<'a>(&self, owner: Owner<'_>, name: &'a str) -> entity::Device<'a> {
@@ -219,6 +309,7 @@ impl CountsPublisher {
         for camera in &snapshot.cameras {
             let name = level(&camera.name);
             let owner = Owner::Camera(&name);
+            retained.extend(self.event_entities(&camera.name));
             let mut device = Device::new(self, owner, &camera.name, camera.persons, &mut retained);
             for line in &camera.lines {
                 let (of, direction) = (level(&line.line), level(&line.direction));

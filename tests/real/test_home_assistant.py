@@ -11,13 +11,14 @@ import unittest
 from collections.abc import Iterator
 from pathlib import Path
 
-from cameras import http_camera
 from harness.places import LOOKDOWN, ROOT, SAMPLES
 from harness.processes import free_ports, running
 from mosquitto import PASSWORD, USER, Broker, broker
 from support.lookdown import lookdown
 from test_count import CountedCamera
 from waiting import wait_until
+
+from cameras import http_camera
 
 HERE = Path(__file__).resolve().parent
 PYTHON = ROOT / ".setup" / "real" / "home_assistant" / "bin" / "python"
@@ -221,7 +222,8 @@ class RunEntities(unittest.TestCase):
         return running("run", command, port, "/readyz", environment)
 
     def test_a_camera_has_an_image_a_switch_and_events(self):
-        made = ["ffmpeg", "-v", "error", "-f", "lavfi", "-i", "color=gray:size=960x960", "-frames:v", "1", "-f", "mjpeg", "-"]
+        gray = "color=gray:size=960x960"
+        made = ["ffmpeg", "-v", "error", *("-f", "lavfi", "-i", gray), *("-frames:v", "1", "-f", "mjpeg", "-")]
         empty = subprocess.run(made, capture_output=True, check=True).stdout
         # Half a minute without persons, and half a minute with some.
         with http_camera([empty] * 30 + [OFFICE] * 30, 1.0) as camera:

@@ -12,12 +12,13 @@ import unittest
 from fnmatch import fnmatch
 from pathlib import Path
 
-from cameras import rtsp_camera
 from compose_file import environment, services
 from harness.places import LOOKDOWN, ROOT, SAMPLES
 from harness.processes import free_ports, running
 from image.build import build, remove
 from waiting import wait_until
+
+from cameras import rtsp_camera
 
 LARGEST_BYTES = {"serve": 120_000_000, "run": 420_000_000}
 PACKAGES = ("libc6", "libgcc-s1", "libstdc++6", "ca-certificates")
