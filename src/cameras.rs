@@ -1,23 +1,24 @@
 //! The cameras of `lookdown run` that are added over HTTP: a file in the state folder, with each
 //! password in a file of its own, and the states of all cameras.
 
+mod error;
+mod state_folder;
+
 use std::{
     collections::{BTreeMap, BTreeSet},
-    fs, io,
-    io::Write,
-    os::unix::fs::{DirBuilderExt, OpenOptionsExt},
-    path::{Path, PathBuf},
+    path::PathBuf,
     sync::Arc,
     time::Duration,
 };
 
-use lookdown_common::{ConfigError, plain_name, read_file};
-use lookdown_watch::{
-    CameraEntry, CameraState, Frame, Location, Metrics, SourceError, first_frame,
-};
+use lookdown_common::{ConfigError, plain_name};
+use lookdown_watch::{CameraEntry, CameraState, Frame, Location, Metrics, first_frame};
 use parking_lot::{Mutex, RwLock};
 use secrecy::{ExposeSecret, SecretString};
-use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use serde::{Deserialize, Serialize};
+use state_folder::StateFolder;
+
+pub use error::CameraError;
 
 /// Longest wait for the frame of a test.
 const TEST_TIMEOUT: Duration = Duration::from_secs(15);
@@ -29,8 +30,6 @@ const MAX_CAMERAS: usize = 256;
 const FILE: &str = "cameras.json";
 /// The file with the names of the cameras of the settings that are paused, in the state folder.
 const PAUSED: &str = "paused.json";
-/// The folder of the passwords in the state folder.
-const PASSWORDS: &str = "passwords";
 
 /// A camera as it is stored, without its password.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -69,29 +68,12 @@ fn shown_source(url: &str) -> String {
     location.map_or_else(|_| String::new(), |(location, _)| location.to_string())
 }
 
-/// A camera that cannot be stored or removed.
-#[derive(Debug, thiserror::Error)]
-pub enum CameraError {
-    /// A value that cannot be used.
-    #[error(transparent)]
-    Invalid(#[from] ConfigError),
-    /// A camera of the settings file.
-    #[error("{0}: this camera is in the settings file: change it there")]
-    Configured(String),
-    /// The state folder cannot be used.
-    #[error("state.path: {0} cannot be written: {1}")]
-    Folder(PathBuf, #[source] io::Error),
-    /// The camera gives no frame.
-    #[error(transparent)]
-    Source(#[from] SourceError),
-}
-
 /// Stored cameras by name.
 pub type Stored = BTreeMap<String, StoredCamera>;
 
 /// The cameras of this process.
 pub struct Cameras {
-    folder: PathBuf,
+    folder: StateFolder,
     /// Locked while the file is changed.
     changing: Mutex<()>,
     /// The cameras of the settings file and the command line.
@@ -104,7 +86,7 @@ impl Cameras {
     #[must_use]
     pub fn new(folder: PathBuf, metrics: Arc<Metrics>) -> Self {
         Self {
-            folder,
+            folder: StateFolder::new(folder),
             changing: Mutex::default(),
             configured: RwLock::default(),
             metrics,
@@ -171,7 +153,7 @@ impl Cameras {
                 paused.insert(name.to_owned());
             }
             let content = serde_json::to_string(&paused).unwrap_or_default();
-            return self.write(&self.folder.join(PAUSED), &content);
+            return self.folder.write(&self.folder.file(PAUSED), &content);
         }
         let mut stored = self.stored()?;
         let Some(camera) = stored.get_mut(name) else {
@@ -211,25 +193,12 @@ impl Cameras {
     /// # Errors
     /// [`ConfigError`].
     pub fn stored(&self) -> Result<Stored, ConfigError> {
-        self.read(FILE)
+        self.folder.read(FILE)
     }
 
     /// Returns the names of the paused cameras of the settings, possibly also of earlier settings.
     fn paused(&self) -> Result<BTreeSet<String>, ConfigError> {
-        self.read(PAUSED)
-    }
-
-    /// Reads a file of the state folder. A missing file is empty.
-    fn read<T: Default + DeserializeOwned>(&self, name: &str) -> Result<T, ConfigError> {
-        let path = self.folder.join(name);
-        if !path.exists() {
-            return Ok(T::default());
-        }
-        let content = read_file("state.path", &path)?;
-        serde_json::from_slice(&content).map_err(|error| {
-            let problem = format!("{} is not a file of cameras: {error}", path.display());
-            ConfigError::problem("state.path", &problem)
-        })
+        self.folder.read(PAUSED)
     }
 
     /// Creates or replaces a camera, and returns true if it is new. Without a URL, the stored one
@@ -258,8 +227,10 @@ impl Cameras {
             before.user == camera.user && origin(&before.url) == origin(&camera.url)
         });
         match password {
-            Some(password) => self.write(&self.password(name), password.expose_secret())?,
-            None if !is_same_login => remove_file(&self.password(name))?,
+            Some(password) => self
+                .folder
+                .write(&self.folder.password(name), password.expose_secret())?,
+            None if !is_same_login => StateFolder::remove(&self.folder.password(name))?,
             None => {}
         }
         let is_new = stored.insert(name.to_owned(), camera).is_none();
@@ -281,7 +252,7 @@ impl Cameras {
             return Ok(false);
         }
         self.store(&stored)?;
-        remove_file(&self.password(name))?;
+        StateFolder::remove(&self.folder.password(name))?;
         Ok(true)
     }
 
@@ -341,41 +312,16 @@ impl Cameras {
 
     /// Returns the entry of a stored camera with the file of its password.
     fn entry(&self, name: &str, camera: &StoredCamera) -> CameraEntry {
-        let password = self.password(name);
+        let password = self.folder.password(name);
         CameraEntry {
             password_file: (camera.user.is_some() && password.exists()).then_some(password),
             ..entry(name, camera)
         }
     }
 
-    fn password(&self, name: &str) -> PathBuf {
-        self.folder.join(PASSWORDS).join(name)
-    }
-
     fn store(&self, stored: &Stored) -> Result<(), CameraError> {
         let content = serde_json::to_string_pretty(stored).unwrap_or_default();
-        self.write(&self.folder.join(FILE), &content)
-    }
-
-    /// Writes a file that only this user can read: beside the old one, synced and renamed.
-    fn write(&self, path: &Path, content: &str) -> Result<(), CameraError> {
-        let unfinished = path.with_extension("part");
-        let written = || {
-            fs::DirBuilder::new()
-                .recursive(true)
-                .mode(0o700)
-                .create(self.folder.join(PASSWORDS))?;
-            let mut file = fs::OpenOptions::new()
-                .create(true)
-                .write(true)
-                .truncate(true)
-                .mode(0o600)
-                .open(&unfinished)?;
-            writeln!(file, "{content}")?;
-            file.sync_all()?;
-            fs::rename(&unfinished, path)
-        };
-        written().map_err(|error| CameraError::Folder(path.to_owned(), error))
+        self.folder.write(&self.folder.file(FILE), &content)
     }
 }
 
@@ -416,15 +362,5 @@ fn origin(url: &str) -> Option<(String, String, Option<u16>)> {
     Some((url.scheme().to_owned(), host, url.port_or_known_default()))
 }
 
-/// Removes a file, if it exists.
-fn remove_file(path: &Path) -> Result<(), CameraError> {
-    match fs::remove_file(path) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => {
-            Err(CameraError::Folder(path.to_owned(), error))
-        }
-        _ => Ok(()),
-    }
-}
-
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -1,12 +1,14 @@
-use std::os::unix::fs::PermissionsExt;
+use std::{fs, os::unix::fs::PermissionsExt, path::Path};
 
 use super::*;
 
-fn cameras(folder: &Path) -> Cameras {
+/// The cameras of a state folder within `folder`.
+pub(crate) fn cameras(folder: &Path) -> Cameras {
     Cameras::new(folder.join("state"), Arc::new(Metrics::new().unwrap()))
 }
 
-fn camera(url: &str) -> StoredCamera {
+/// A stored camera with this URL.
+pub(crate) fn camera(url: &str) -> StoredCamera {
     StoredCamera {
         url: url.to_owned(),
         user: Some("viewer".to_owned()),
@@ -59,12 +61,12 @@ fn a_password_stays_with_its_host_and_user_only() {
             .put("hall", camera("rtsp://10.0.0.8/s1"), None)
             .unwrap()
     );
-    assert!(cameras.password("hall").exists());
+    assert!(cameras.folder.password("hall").exists());
     cameras
         .put("hall", camera("rtsp://10.0.0.9/s1"), None)
         .unwrap();
     assert!(
-        !cameras.password("hall").exists(),
+        !cameras.folder.password("hall").exists(),
         "another host never gets it"
     );
 }
@@ -155,7 +157,7 @@ fn a_camera_without_a_url_keeps_the_stored_one() {
     cameras.put("hall", camera(url), Some(&password)).unwrap();
     assert!(!cameras.put("hall", camera(""), None).unwrap());
     assert_eq!(cameras.stored().unwrap()["hall"].url, url);
-    assert!(cameras.password("hall").exists());
+    assert!(cameras.folder.password("hall").exists());
     let watched = cameras.get("hall").unwrap().unwrap();
     assert!(watched.credentials.is_some());
     let refused = cameras.put("gate", camera(""), None).unwrap_err();

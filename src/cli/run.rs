@@ -25,16 +25,13 @@ use crate::{
     api::{Companions, Readiness},
     cameras::Cameras,
     probe,
-    settings::{Settings, environment},
+    settings::{CAMERA_VARIABLE, Settings, environment},
 };
 
 /// The name of the key with which cameras and counts use the server of this process.
 const OWN_KEY: &str = "lookdown-run";
 /// The name of a camera of the command line without a name.
 const CAMERA: &str = "camera";
-/// The variable with a source, for containers: arguments are shown in lists of processes, and its
-/// URL may hold a password.
-const SOURCE_VARIABLE: &str = "LOOKDOWN_CAMERA";
 /// Threads for sockets, cameras, counts and JSON. Frames have separate threads.
 const RUNTIME_THREADS: usize = 2;
 
@@ -65,7 +62,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments, commit: Option<&str>) -> anyhow::Result<ExitCode> {
     let (file, source) = separate(arguments.source.as_deref())?;
     let in_variable = environment()
-        .find(|(name, source)| name == SOURCE_VARIABLE && !source.is_empty())
+        .find(|(name, source)| name == CAMERA_VARIABLE && !source.is_empty())
         .map(|(_, source)| source);
     let source = source.or(in_variable.as_deref());
     let flags = given(&[

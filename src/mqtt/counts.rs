@@ -1,5 +1,6 @@
 //! Publishes the counts of `lookdown count`: totals, occupancy and dwell times.
 
+mod event_entities;
 mod events;
 mod number;
 
@@ -24,19 +25,17 @@ use super::{
     Broker,
     connector::Connector,
     discovery::{OFFLINE, ONLINE},
-    entity::{self, EVENT, IMAGE, SENSOR},
+    entity::{self, SENSOR},
     message::Message,
     retained::RetainedTopics,
     session::{Session, SessionError},
     topics::{Topics, level},
 };
 use crate::tls::TlsError;
+use event_entities::{announcements, config_topics, event_topic, image_topic};
 use events::{EventImage, events, request_images};
 use number::{AVAILABILITY, Number, Owner};
 
-/// The IDs of the entities of events.
-const EVENT_ID: &str = "count_event";
-const EVENT_IMAGE_ID: &str = "count_event_image";
 /// Most images of events that wait. Further ones are not requested.
 const IMAGES: usize = 8;
 
@@ -159,7 +158,7 @@ impl CountsPublisher {
             session.publish(changes(&published, &retained)).await?;
             published = retained;
             for event in events(&before, &snapshot) {
-                let topic = self.event_topic(&event.camera);
+                let topic = event_topic(&self.topics, &event.camera);
                 let body = event.body.to_string().into();
                 session.publish([Message::passing(topic, body)]).await?;
                 // Without room, the event has no image.
@@ -181,7 +180,7 @@ impl CountsPublisher {
                     session.publish(self.withdrawals(&mut unknown, &published)).await?;
                 }
                 Some(EventImage { camera, jpeg }) = images.recv() => {
-                    let topic = self.event_image_topic(&camera);
+                    let topic = image_topic(&self.topics, &camera);
                     session.publish([Message::passing(topic, jpeg.into())]).await?;
                 }
                 Ok(()) = self.snapshots.changed() => {}
@@ -239,10 +238,7 @@ impl CountsPublisher {
             }
             topics.push(self.topics.counts(&first));
             if let Owner::Camera(name) = owner {
-                let device = self.device(owner, name);
-                let ids = [(EVENT, EVENT_ID), (IMAGE, EVENT_IMAGE_ID)];
-                let config = |(component, id)| self.topics.config(component, &device.entity_id(id));
-                topics.extend(ids.into_iter().filter_map(config));
+                topics.extend(config_topics(&self.topics, &self.device(owner, name)));
             }
         }
         let gone = topics
@@ -254,41 +250,6 @@ impl CountsPublisher {
     fn state_topic(&self, owner: Owner<'_>, number: Number<'_>) -> String {
         let topic = format!("{}/{}", owner.path(), number.topic());
         self.topics.counts(&topic)
-    }
-
-    fn event_topic(&self, camera: &str) -> String {
-        self.topics.counts(&format!("events/{}", level(camera)))
-    }
-
-    fn event_image_topic(&self, camera: &str) -> String {
-        self.topics
-            .counts(&format!("event_images/{}", level(camera)))
-    }
-
-    /// The announcements of a camera's events and of their images.
-    fn event_entities(&self, camera: &str) -> Retained {
-        let name = level(camera);
-        let device = self.device(Owner::Camera(&name), camera);
-        let event = json!({
-            "name": "Event",
-            "state_topic": self.event_topic(camera),
-            "event_types": events::TYPES,
-        });
-        let image = json!({
-            "name": "Latest event",
-            "image_topic": self.event_image_topic(camera),
-            "content_type": "image/jpeg",
-        });
-        let image = self
-            .options
-            .image_every
-            .map(|_| (IMAGE, EVENT_IMAGE_ID, image));
-        let entities = [(EVENT, EVENT_ID, event)].into_iter().chain(image);
-        let status = || [self.topics.counts("status")];
-        let announced = entities.filter_map(|(component, id, config)| {
-            device.announcement(&self.topics, component, id, status(), config)
-        });
-        announced.collect()
     }
 
     fn device<'a>(&self, owner: Owner<'_>, name: &'a str) -> entity::Device<'a> {
@@ -309,7 +270,9 @@ impl CountsPublisher {
         for camera in &snapshot.cameras {
             let name = level(&camera.name);
             let owner = Owner::Camera(&name);
-            retained.extend(self.event_entities(&camera.name));
+            let events = self.device(owner, &camera.name);
+            let has_images = self.options.image_every.is_some();
+            retained.extend(announcements(&self.topics, &events, has_images));
             let mut device = Device::new(self, owner, &camera.name, camera.persons, &mut retained);
             for line in &camera.lines {
                 let (of, direction) = (level(&line.line), level(&line.direction));

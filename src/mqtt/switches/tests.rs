@@ -1,20 +1,18 @@
 use bytes::Bytes;
-use lookdown_watch::{CameraEntry, Metrics};
 use rumqttc::QoS;
 
 use super::*;
+use crate::cameras::tests::{camera, cameras};
 
 const HALL: &str = "lookdown/cameras/hall/detection";
 const UNKNOWN_FOR: Duration = Duration::from_mins(10);
 
 fn switches(folder: &std::path::Path) -> Switches {
-    let cameras = Cameras::new(folder.to_owned(), Arc::new(Metrics::new().unwrap()));
-    let hall = CameraEntry {
-        name: Some("hall".to_owned()),
-        url: Some("rtsp://10.0.0.8/".to_owned()),
-        ..CameraEntry::default()
-    };
-    cameras.add_to(&mut vec![hall]).unwrap();
+    let cameras = cameras(folder);
+    if cameras.stored().unwrap().is_empty() {
+        let hall = camera("rtsp://10.0.0.8/");
+        cameras.put("hall", hall, None).unwrap();
+    }
     let topics = Topics::new("lookdown", Some("homeassistant"));
     Switches::new(topics, Discovery::default(), Arc::new(cameras))
 }
