@@ -4,7 +4,6 @@
 //! network, and each 8 megapixels that are drawn add 1. A frame with more pixels than the limit also
 //! costs 1, because its header is enough to refuse it. No frame costs more than a client may use.
 
-
 use super::{DetectJob, ViewsJob};
 
 /// Pixels, decoded or drawn, that add 1. With the default limits, two of the largest frames are
