@@ -100,7 +100,7 @@ export async function drawTools(card, info) {
 
 function stateOf(info) {
   if (!info) return "";
-  if (info.paused) return "Paused: no frames are read.";
+  if (info.paused) return info.stored ? "Paused: no frames are read." : "Paused by its switch over MQTT: no frames are read.";
   if (info.problem) return `No frames: ${info.problem}`;
   return info.warning ?? "";
 }
