@@ -36,8 +36,7 @@ serve: ## download ONNX Runtime and the default models, build what a first look 
 	@$(PYTHON) scripts/setup.py runtime model & trap 'kill $$!; exit 130' INT; \
 		cargo build --profile quick --locked --target-dir target
 	@$(PYTHON) scripts/setup.py runtime model
-	@# Makes glibc return the memory of replaced models: docs/models.md.
-	@MALLOC_MMAP_THRESHOLD_=131072 exec target/quick/lookdown serve
+	@exec target/quick/lookdown serve
 
 check: ## check formatting and lints and run the unit tests; without network once the crates are there
 	cargo fmt --all --check

@@ -94,7 +94,7 @@ async fn forward(
         outgoing = outgoing.header(ACCEPT, accept);
     }
     let answered = client.send(outgoing).await.map_err(|error| {
-        tracing::warn!("counts.url: {}", client.failure(error));
+        tracing::warn!("counts.url: {}", client.failure(&error));
         unavailable("the counts do not respond: the log of the server has the reason; retry")
     })?;
     let mut response = Response::new(Body::empty());

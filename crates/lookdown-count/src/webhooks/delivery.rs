@@ -3,8 +3,8 @@
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
-use lookdown_common::{AbortOnDrop, ClientError, LogOnce, client_builder, text::with_causes};
-use reqwest::{Client, StatusCode, Url, header::CONTENT_TYPE};
+use lookdown_common::{AbortOnDrop, ClientError, HttpClient, LogOnce, text::with_causes};
+use reqwest::{StatusCode, Url, header::CONTENT_TYPE};
 use tokio::{
     sync::mpsc::{self, error::TrySendError},
     task::spawn_blocking,
@@ -37,7 +37,7 @@ pub(crate) struct Deliveries {
 
 /// A receiver of messages.
 struct Receiver {
-    client: Client,
+    client: HttpClient,
     key: SigningKey,
     url: Url,
     /// The scheme, the host and the port: the path may be a secret.
@@ -61,7 +61,7 @@ impl Deliveries {
         store: &Store,
         metrics: &Arc<Metrics>,
     ) -> Result<Self, ClientError> {
-        let client = client_builder().timeout(TIMEOUT).build()?;
+        let client = HttpClient::new(None)?;
         let mut receivers = BTreeMap::new();
         let mut of_urls = BTreeMap::<&Url, mpsc::Sender<Message>>::new();
         let mut tasks = Vec::new();
@@ -167,13 +167,14 @@ impl Receiver {
         let request = self
             .client
             .post(self.url.clone())
+            .timeout(TIMEOUT)
             .header(CONTENT_TYPE, "application/json")
             .header("webhook-id", &message.id)
             .header("webhook-timestamp", timestamp_s)
             .header("webhook-signature", signature)
             .body(message.body.clone());
         let address = &self.address;
-        match request.send().await {
+        match self.client.send(request).await {
             Ok(response) if response.status().is_success() => Attempt::Delivered,
             Ok(response) if response.status() == StatusCode::GONE => Attempt::Refused(format!(
                 "the webhook at {address} answered 410 Gone: remove it from the settings"
@@ -184,7 +185,7 @@ impl Receiver {
             )),
             Err(error) => Attempt::Failed(format!(
                 "the webhook at {address} cannot be reached: {}: start it, or correct its URL",
-                with_causes(&error.without_url())
+                with_causes(&error)
             )),
         }
     }
