@@ -424,6 +424,17 @@ fn lookdown_key(name: &str) -> Key {
 }
 
 #[test]
+fn signals_without_a_meaning_do_not_end_the_server() {
+    let server = Server::start("", &[NO_GRACE]);
+    for signal in ["USR1", "USR2", "PIPE", "HUP"] {
+        server.signal(signal);
+        assert!(server.get("/livez", "").contains(" 200 "), "{signal}");
+    }
+    server.signal("TERM");
+    server.has_ended();
+}
+
+#[test]
 fn a_second_signal_ends_the_server_at_once() {
     let mut server = Server::start("", &[LONG_GRACE]);
     server.signal("TERM");

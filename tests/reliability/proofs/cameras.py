@@ -14,7 +14,7 @@ from support.lookdown import TINY, lookdown
 from support.row import Row
 
 SECONDS = 15.0
-MAX_CORES = 0.3
+MAX_CORES = 0.5
 """Most CPU time of `lookdown watch` beside cameras whose responses never begin; without a limit one core for each."""
 MIN_FRAMES = 8
 """Fewest frames of the good camera, which has one each second."""
@@ -65,7 +65,7 @@ def _watch(target: str, urls: list[str]) -> Watched:
     with tempfile.TemporaryDirectory() as folder:
         settings = Path(folder) / "watch.toml"
         cameras = [f'[[cameras]]\nname = "camera{number}"\nurl = "{url}"\n' for number, url in enumerate(urls)]
-        head = f'[server]\nurl = "http://{target}"\n[defaults]\nevery = "1s"\n'
+        head = f'[upstream]\nurl = "http://{target}"\n[camera_defaults]\nevery = "1s"\n'
         settings.write_text(head + "".join(cameras), encoding="utf-8")
         command = [str(LOOKDOWN), "watch", str(settings), "--metrics-listen", f"127.0.0.1:{port}"]
         with running("watch", command, port, "/metrics", {}) as watch:
