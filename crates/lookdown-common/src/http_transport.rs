@@ -42,6 +42,8 @@ const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 const IDLE_TIMEOUT: Duration = Duration::from_secs(20);
 /// Interval of the probes of TCP that find a peer which is gone.
 const KEEPALIVE: Duration = Duration::from_secs(15);
+/// Most bytes that are read at once, and of the head of a response.
+const MAX_BUFFER_BYTES: usize = 64 << 10;
 /// Most provisional responses before a response.
 const MAX_PROVISIONAL: usize = 16;
 
@@ -123,6 +125,7 @@ impl HttpClient {
         let transport = legacy::Client::builder(TokioExecutor::new())
             .pool_idle_timeout(IDLE_TIMEOUT)
             .pool_timer(TokioTimer::new())
+            .http1_max_buf_size(MAX_BUFFER_BYTES)
             .build(connector);
         Ok(Self {
             requests: requests.map_err(|error| ClientError(with_causes(&error)))?,
