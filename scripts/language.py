@@ -13,6 +13,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 LONGEST_TEST_NAME = 60
 LONGEST_SUMMARY_WORDS = 6
+LONGEST_SENTENCE_WORDS = 35
 QUESTION_WORDS = "What|Who|Whom|Whose|How|Whether|Where|Which|Of|Why|When"
 # Things are not persons.
 PERSONS = re.compile(r"\b(somebody|nobody|whoever|anybody|everybody|whomever)\b", re.IGNORECASE)
@@ -20,6 +21,9 @@ FIRST_WORD = re.compile(rf"(?:{QUESTION_WORDS})\b(?!-)")
 RUST_DOC = re.compile(r"^\s*//[/!](?!/) ?(.*)$")
 RUST_TEST = re.compile(r"#\[(?:tokio::)?test\b")
 RUST_FUNCTION = re.compile(r"\bfn (\w+)")
+# Ends of paragraphs in Markdown: empty lines, headings, items of lists, quotes and lines of tables.
+MARKDOWN_BREAK = re.compile(r"^\s*($|#|[*+-] |\d+\. |>|\||<)")
+SENTENCE_END = re.compile(r"(?<=[.!?:])[)\"*]*\s+(?=[A-Z`\[(*])")
 PYTHON_TEST = re.compile(r"^\s*(?:async )?def (test_\w+)")
 # Files that hold the rules, and texts of others.
 EXEMPT = {"scripts/language.py", "scripts/tests/test_language.py", "CONTRIBUTING.md", "LICENSE", "NOTICE"}
@@ -68,6 +72,35 @@ def findings_in_python(name, lines):
             yield from finding_of_test_name(name, number, test.group(1))
 
 
+def paragraphs(lines):
+    """The paragraphs of Markdown as pairs of their first line's number and their text, without tables and code."""
+    first, words, is_code = 0, [], False
+    for number, line in enumerate(lines, 1):
+        is_fence = line.lstrip().startswith("```")
+        if is_fence or is_code or MARKDOWN_BREAK.match(line) or line.startswith("    ") and not words:
+            if words:
+                yield first, " ".join(words)
+            first, words = number, []
+            is_code ^= is_fence
+            if is_fence or is_code or line.startswith("    ") or line.lstrip().startswith(("|", "#", "<")):
+                continue
+        if not words:
+            first = number
+        words.extend(line.lstrip(" *+->0123456789.").split() if not words else line.split())
+    if words:
+        yield first, " ".join(words)
+
+
+def findings_in_markdown(name, lines):
+    """Sentences that are too long."""
+    for number, paragraph in paragraphs(lines):
+        for sentence in SENTENCE_END.split(paragraph):
+            words = sentence.split()
+            if len(words) > LONGEST_SENTENCE_WORDS:
+                start = " ".join(words[:6])
+                yield f"{name}:{number}: a sentence has {len(words)} words, {LONGEST_SENTENCE_WORDS} are allowed: {start}"
+
+
 def findings_in_openapi(name, text):
     """Summaries that are questions or too long."""
     for path, operations in json.loads(text)["paths"].items():
@@ -92,6 +125,8 @@ def findings(paths):
             yield from findings_in_rust(name, lines)
         elif path.suffix == ".py":
             yield from findings_in_python(name, lines)
+        elif path.suffix == ".md":
+            yield from findings_in_markdown(name, lines)
 
 
 if __name__ == "__main__":

@@ -4,6 +4,9 @@ mod check;
 mod convert;
 mod fit;
 mod frame_file;
+mod height;
+mod native_output;
+mod people;
 mod source;
 mod suggest_area;
 mod walked_area;
@@ -12,7 +15,7 @@ use std::process::ExitCode;
 
 use clap::Subcommand;
 
-use self::frame_file::read_frame;
+use self::frame_file::{read_frame, read_frames};
 
 /// The subcommands for calibrations.
 #[derive(Debug, Subcommand)]
@@ -21,8 +24,10 @@ pub(super) enum Command {
     Check(check::Arguments),
     /// Write a calibration in the native format, or in that of another program
     Convert(convert::Arguments),
-    /// Fit a calibration to frames: the lens circle is detected, an ideal lens assumed
+    /// Fit a calibration to frames of the room: lens, center and level from its straight edges
     Fit(fit::Arguments),
+    /// Find the height of a camera from the people in its frames
+    Height(height::Arguments),
     /// Suggest an area from the places where people walked
     SuggestArea(suggest_area::Arguments),
 }
@@ -33,6 +38,7 @@ pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
         Command::Check(arguments) => check::run(arguments),
         Command::Convert(arguments) => convert::run(arguments),
         Command::Fit(arguments) => fit::run(arguments),
+        Command::Height(arguments) => height::run(arguments),
         Command::SuggestArea(arguments) => suggest_area::run(arguments),
     }
 }

@@ -293,3 +293,49 @@ fn zones_and_masks_are_listed_and_drawn_in_the_preview() {
         .filter(|&(x, y)| picture.pixel(x, y).iter().all(|&value| value < 30));
     assert!(black.count() > 100_000);
 }
+
+/// Copies the calibration of a sample without its height.
+fn without_height(folder: &std::path::Path) -> String {
+    let text = std::fs::read_to_string("samples/calibrations/office.json").unwrap();
+    let mut calibration: serde_json::Value = serde_json::from_str(&text).unwrap();
+    calibration["mount"]
+        .as_object_mut()
+        .unwrap()
+        .remove("height_m");
+    let file = folder.join("office.json");
+    std::fs::write(&file, calibration.to_string()).unwrap();
+    file.to_str().unwrap().to_owned()
+}
+
+#[test]
+fn height_of_a_camera_is_found_from_people() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = without_height(folder.path());
+    let found = lookdown(&["calibration", "height", &file, "samples/office.jpg"], &[]);
+    let said = String::from_utf8_lossy(&found.stderr);
+    assert!(found.status.success(), "{said}");
+    assert!(said.contains("people"), "{said}");
+    let calibration: serde_json::Value = serde_json::from_slice(&found.stdout).unwrap();
+    let source = &calibration["sources"]["height_m"];
+    assert_eq!(source["source"], "from_people");
+    // The true height is 2.9 m.
+    let error = calibration["mount"]["height_m"].as_f64().unwrap() - 2.9;
+    assert!(
+        error.abs() < 3.0 * source["uncertainty"].as_f64().unwrap(),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_given_height_is_not_replaced_by_that_from_people() {
+    let output = lookdown(
+        &[
+            "calibration",
+            "height",
+            "samples/calibrations/office.json",
+            "samples/office.jpg",
+        ],
+        &[],
+    );
+    assert_fails_with(&output, &["mount.height_m is 2.9 m", "remove it"]);
+}

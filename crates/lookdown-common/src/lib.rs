@@ -24,6 +24,8 @@ pub mod plain_name;
 #[cfg(feature = "companion")]
 mod reload;
 #[cfg(feature = "companion")]
+mod secret;
+#[cfg(feature = "companion")]
 mod server_entry;
 pub mod text;
 
@@ -39,6 +41,7 @@ pub use {
     http_transport::{ClientError, HttpClient, HttpError},
     in_process::InProcess,
     reload::Reload,
+    secret::Secret,
     server_entry::{ServerEntry, ServerOptions},
 };
 

@@ -30,9 +30,9 @@ use self::{
 };
 use crate::Shutdown;
 
-/// Longest time for the handshake, and for the head, on a connection beyond the limit. A probe
-/// needs milliseconds.
-const TIMEOUT_BEYOND_LIMIT: Duration = Duration::from_millis(500);
+/// Longest time for the handshake, and for the head, on a connection beyond the limit. A probe needs
+/// milliseconds of CPU time, which it may wait for beside a flood of handshakes.
+const TIMEOUT_BEYOND_LIMIT: Duration = Duration::from_secs(2);
 
 /// The services that answer. Each request carries the address of its client, a
 /// [`SocketAddr`], among its extensions.

@@ -1,10 +1,11 @@
-//! A camera's lens and level from the straight edges of a room.
+//! A camera's lens and level from the straight edges of a room, and its height from people.
 //!
 //! Rooms have edges in three orthogonal directions. With the right lens, center and level, the
 //! planes through the center of projection and nearly all edges contain one of those directions.
 //! `docs/geometry.md` has the derivation.
 
 mod camera;
+mod camera_height;
 mod climb;
 mod edge_curve;
 mod evaluation;
@@ -16,6 +17,7 @@ mod search;
 #[cfg(test)]
 mod tests;
 
+pub use camera_height::{CameraHeight, HeightRefusal};
 pub use edge_curve::EdgeCurve;
 pub use fit::{CircleGuess, FitUncertainty, KnownLens, RoomFit};
 pub use refusal::FitRefusal;

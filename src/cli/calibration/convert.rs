@@ -1,18 +1,12 @@
 //! `lookdown calibration convert`
 
-use std::{
-    fs,
-    io::{self, Write},
-    path::PathBuf,
-    process::ExitCode,
-};
+use std::{path::PathBuf, process::ExitCode};
 
 use anyhow::Context;
 use clap::Args;
 use lookdown_lens::calibration::{export::Target, native::NativeImage};
 
-use super::source::Source;
-use crate::cli::output::UNWRITABLE;
+use super::{native_output::write_content, source::Source};
 use crate::cli::parameters::one_of;
 
 /// Arguments of `lookdown calibration convert`.
@@ -51,10 +45,6 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     for note in notes.chain(exported.lost) {
         eprintln!("lookdown: {path}: {note}");
     }
-    match &arguments.out {
-        Some(out) => fs::write(out, exported.content)
-            .with_context(|| format!("--out: {} cannot be written", out.display()))?,
-        None => write!(io::stdout(), "{}", exported.content).context(UNWRITABLE)?,
-    }
+    write_content(&exported.content, arguments.out.as_deref())?;
     Ok(ExitCode::SUCCESS)
 }

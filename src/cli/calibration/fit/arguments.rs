@@ -8,6 +8,8 @@ use lookdown_lens::{
     geometry::lens::{Equidistant, Equisolid, LensModel, Orthographic, Stereographic},
 };
 
+use crate::cli::settings_file::SettingsFile;
+
 /// Arguments of `lookdown calibration fit`.
 #[derive(Debug, Args)]
 pub(in crate::cli) struct Arguments {
@@ -30,12 +32,17 @@ pub(in crate::cli) struct Arguments {
     /// Height of the camera above the floor: enables floor positions of persons
     #[arg(long, value_name = "METRES", value_parser = height)]
     pub(super) height: Option<f64>,
+    /// Find the height of the camera from the people in the frames
+    #[arg(long, conflicts_with = "height")]
+    pub(super) people: bool,
     /// Output file [default: standard output]
     #[arg(long, value_name = "FILE")]
     pub(super) out: Option<PathBuf>,
     /// Output file of straightened views before and after the fit, JPEG
     #[arg(long, value_name = "OUT.jpg", conflicts_with = "circle_only")]
     pub(super) preview: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) settings_file: SettingsFile,
 }
 
 /// Lenses with one parameter, the focal length.
