@@ -3,6 +3,9 @@
 //! never ends them would keep a core busy until the deadline of the request.
 
 mod body;
+mod error;
+
+pub use error::{ClientError, HttpError};
 
 use std::{
     sync::{
@@ -35,6 +38,7 @@ use tower::{BoxError, timeout::Timeout, util::BoxCloneSyncService};
 
 use crate::text::with_causes;
 use body::UntilDeadline;
+use error::MAX_PROVISIONAL;
 
 /// Longest time for a connection, with the look-up of the name and the handshake of TLS.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
@@ -44,34 +48,8 @@ const IDLE_TIMEOUT: Duration = Duration::from_secs(20);
 const KEEPALIVE: Duration = Duration::from_secs(15);
 /// Most bytes that are read at once, and of the head of a response.
 const MAX_BUFFER_BYTES: usize = 64 << 10;
-/// Most provisional responses before a response.
-const MAX_PROVISIONAL: usize = 16;
 
 type Connector = BoxCloneSyncService<Uri, MaybeHttpsStream<TokioIo<TcpStream>>, BoxError>;
-
-/// A reason why there is no HTTP client.
-#[derive(Debug, thiserror::Error)]
-#[error(
-    "upstream.authorities: {0}: give a PEM file with the authorities of the server's certificate"
-)]
-pub struct ClientError(pub(crate) String);
-
-/// The reason why a request has no response, or its response no end.
-#[derive(Debug, thiserror::Error)]
-pub enum HttpError {
-    /// A request that cannot be written, or a body that ends early.
-    #[error(transparent)]
-    Message(reqwest::Error),
-    /// No connection, or one that ended.
-    #[error(transparent)]
-    Connection(#[from] legacy::Error),
-    /// No response in time.
-    #[error("there is no whole response within {0:?}")]
-    Timeout(Duration),
-    /// Provisional responses without end.
-    #[error("more than {MAX_PROVISIONAL} provisional responses (1xx) arrived before the response")]
-    Provisional,
-}
 
 /// A client without redirections and proxies.
 #[derive(Debug, Clone)]
@@ -86,13 +64,6 @@ pub struct HttpClient {
 struct Provisional {
     received: AtomicUsize,
     exceeded: Notify,
-}
-
-impl From<reqwest::Error> for HttpError {
-    fn from(error: reqwest::Error) -> Self {
-        // A URL may be a secret.
-        Self::Message(error.without_url())
-    }
 }
 
 impl HttpClient {

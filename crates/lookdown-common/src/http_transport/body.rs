@@ -13,7 +13,7 @@ use hyper::body::Incoming;
 use tokio::time::{Instant, Sleep, sleep_until};
 use tower::BoxError;
 
-use super::HttpError;
+use super::error::HttpError;
 
 /// A body that fails at its deadline.
 pub(super) struct UntilDeadline {
