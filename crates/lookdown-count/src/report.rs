@@ -74,6 +74,7 @@ pub(crate) struct Person {
 struct OrientedBox {
     cx: f64,
     cy: f64,
+    width: f64,
     height: f64,
     angle_deg: f64,
 }
@@ -171,6 +172,7 @@ impl Report {
         let OrientedBox {
             cx,
             cy,
+            width,
             height,
             angle_deg,
         } = person.oriented_box;
@@ -195,6 +197,7 @@ impl Report {
             azimuth_deg: bearing.azimuth_deg,
             off_axis_deg: bearing.off_axis_deg,
             centre_px: [cx, cy],
+            size_px: [width, height],
             foot_px: [foot.x, foot.y],
             score: person.score,
             is_in_margin,
