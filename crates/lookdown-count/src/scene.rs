@@ -41,11 +41,11 @@ pub(crate) struct SceneState {
 /// The time of a report.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ReportTime {
-    /// Of its frame, milliseconds since the Unix epoch.
+    /// Time of its frame, milliseconds since the Unix epoch.
     pub(crate) at_ms: i64,
     /// Longest time between two reports of a camera that is known, milliseconds.
     pub(crate) longest_gap_ms: i64,
-    /// Of its arrival, by a clock that never jumps.
+    /// Its arrival, by a clock that never jumps.
     pub(crate) now: Instant,
 }
 

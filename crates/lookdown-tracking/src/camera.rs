@@ -14,7 +14,7 @@ const VISIBLE_HEIGHTS: f64 = 4.0;
 pub(super) struct Camera {
     pub pose: CameraPose,
     pub last_report_s: Option<f64>,
-    /// What stands in its frame and is not a person.
+    /// The things that stand in its frame.
     pub furniture: Furniture,
     /// The areas of its reports on the site's floor; everywhere if there are none.
     #[serde(skip)]

@@ -104,7 +104,7 @@ impl Tracker {
         }
     }
 
-    /// Returns what stands in the frame of a camera and is not a person.
+    /// Returns the things that stand in the frame of a camera.
     #[must_use]
     pub fn furniture(&self, camera: usize) -> Option<&Furniture> {
         Some(&self.cameras.get(camera)?.furniture)

@@ -44,7 +44,7 @@ pub(super) struct Tracks {
     lines: Vec<LineRow>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     zones: Vec<ZoneRow>,
-    /// What stands in the frame of the camera and may be furniture.
+    /// The things that stand in the frame of the camera, furniture and candidates.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     furniture: Vec<Thing>,
 }
