@@ -11,13 +11,14 @@ use std::{
     time::Duration,
 };
 
-use lookdown_common::{ConfigError, Secret, plain_name, read_file};
+use lookdown_common::{ConfigError, Secret, StoredFile, plain_name, read_file};
 use lookdown_watch::{
     CameraEntry, CameraState, Frame, Location, Metrics, SourceError, first_frame,
 };
 use parking_lot::{Mutex, RwLock};
 use secrecy::ExposeSecret;
 use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
 
 /// Longest wait for the frame of a test.
 const TEST_TIMEOUT: Duration = Duration::from_secs(15);
@@ -82,6 +83,14 @@ pub enum CameraError {
 /// Stored cameras by name.
 pub type Stored = BTreeMap<String, StoredCamera>;
 
+/// The content of the file of the cameras.
+#[derive(Serialize)]
+struct CameraFile<'a> {
+    version: u8,
+    #[serde(flatten)]
+    cameras: &'a Stored,
+}
+
 /// The cameras of this process.
 pub struct Cameras {
     folder: PathBuf,
@@ -145,10 +154,18 @@ impl Cameras {
             return Ok(Stored::new());
         }
         let content = read_file("state.path", &path)?;
-        serde_json::from_slice(&content).map_err(|error| {
-            let problem = format!("{} is not a file of cameras: {error}", path.display());
+        let refused = |problem: String| {
+            let problem = format!("{} {problem}", path.display());
             ConfigError::problem("state.path", &problem)
-        })
+        };
+        let not_cameras =
+            |error: serde_json::Error| refused(format!("is not a file of cameras: {error}"));
+        let mut cameras: Map<_, _> = serde_json::from_slice(&content).map_err(not_cameras)?;
+        if let Some(version) = cameras.remove(StoredFile::KEY) {
+            let checked = StoredFile::Cameras.check(&version.to_string());
+            checked.map_err(refused)?;
+        }
+        Stored::deserialize(Value::Object(cameras)).map_err(not_cameras)
     }
 
     /// Creates or replaces a camera, and returns true if it is new. Without a URL, the stored one
@@ -248,8 +265,9 @@ impl Cameras {
     }
 
     fn check(&self, name: &str, camera: &StoredCamera) -> Result<(), CameraError> {
-        if !plain_name::is_plain(name) || name == TEST {
-            let remedy = "is not a name of 1 to 64 of a-z, 0-9, '_' and '-', and not test";
+        if !plain_name::is_plain(name) || [TEST, StoredFile::KEY].contains(&name) {
+            let remedy =
+                "is not a name of 1 to 64 of a-z, 0-9, '_' and '-', and not test or version";
             return Err(ConfigError::value("name", name, remedy).into());
         }
         if self.configured.read().contains_key(name) {
@@ -272,7 +290,11 @@ impl Cameras {
     }
 
     fn store(&self, stored: &Stored) -> Result<(), CameraError> {
-        let content = serde_json::to_string_pretty(stored).unwrap_or_default();
+        let content = serde_json::to_string_pretty(&CameraFile {
+            version: StoredFile::Cameras.version(),
+            cameras: stored,
+        });
+        let content = content.unwrap_or_default();
         self.write(&self.folder.join(FILE), &content)
     }
 
