@@ -88,11 +88,12 @@ release: deb wheel sbom ## build every artifact of a release with its sums: targ
 	cp target/dist/*.tar.* target/deb/*.deb target/wheels/*.whl target/lookdown.cdx.json target/release-files
 	cd target/release-files && sha256sum -- * > SHA256SUMS
 
-image: ## build the container image from source with docker, or with ENGINE=podman or buildah
+image: ## build the container image from source with docker, or with ENGINE=podman or buildah; TARGET=serve without ffmpeg
 	$(ENGINE) build $(if $(filter-out docker,$(ENGINE)),--format docker) --file docker/Dockerfile \
 		--build-arg PROGRAM=built --build-arg LOOKDOWN_COMMIT=$(LOOKDOWN_COMMIT) \
 		--build-arg CREATED=$$(date --utc --date=@$(SOURCE_DATE_EPOCH) +%Y-%m-%dT%H:%M:%SZ) \
-		--build-arg SOURCE_URL=$(SOURCE_URL) --tag lookdown:$(VERSION) .
+		--build-arg SOURCE_URL=$(SOURCE_URL) $(if $(TARGET),--target $(TARGET)) \
+		--tag lookdown$(if $(TARGET),-$(TARGET)):$(VERSION) .
 
 wheel: ## build the Python wheel: target/wheels
 	@$(PYTHON) scripts/setup.py toolchain model wheel

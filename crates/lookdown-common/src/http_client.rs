@@ -88,6 +88,11 @@ impl ServerClient {
         self.client.post(url)
     }
 
+    /// Starts a DELETE request.
+    pub fn delete(&self, url: Url) -> RequestBuilder {
+        self.client.delete(url)
+    }
+
     /// Sends a request of this client.
     ///
     /// # Errors

@@ -22,7 +22,7 @@ use rusqlite::Connection;
 pub(crate) use read::{Span, Step, StoredCalibrations};
 
 /// First byte of the stored state of a scene. Changes with the types in it.
-const STATE_VERSION: u8 = 2;
+const STATE_VERSION: u8 = 3;
 /// Longest wait for the other connection.
 const BUSY_TIMEOUT: Duration = Duration::from_secs(5);
 /// Longest wait for an earlier user of the store, and the interval of the attempts.

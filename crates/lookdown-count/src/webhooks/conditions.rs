@@ -8,7 +8,8 @@ use serde_json::{Value, json};
 use super::{Condition, Webhook};
 use crate::{
     message::{HeldCondition, Message},
-    scene::{NamedCrossing, Scene},
+    scene::Scene,
+    scene_camera::NamedCrossing,
 };
 
 /// The conditions and whether they hold.
