@@ -13,6 +13,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 LONGEST_TEST_NAME = 60
 LONGEST_SUMMARY_WORDS = 6
+LONGEST_SENTENCE_WORDS = 35
 QUESTION_WORDS = "What|Who|Whom|Whose|How|Whether|Where|Which|Of|Why|When"
 # Things are not persons.
 PERSONS = re.compile(r"\b(somebody|nobody|whoever|anybody|everybody|whomever)\b", re.IGNORECASE)
@@ -20,6 +21,12 @@ FIRST_WORD = re.compile(rf"(?:{QUESTION_WORDS})\b(?!-)")
 RUST_DOC = re.compile(r"^\s*//[/!](?!/) ?(.*)$")
 RUST_TEST = re.compile(r"#\[(?:tokio::)?test\b")
 RUST_FUNCTION = re.compile(r"\bfn (\w+)")
+# Markdown lines without sentences: empty lines, headings, rows of tables, HTML, and images.
+NOT_PROSE = re.compile(r"$|#|\||<|!\[")
+LIST_ITEM = re.compile(r"^\s*(?:[*+-]|\d+\.|>) +")
+# An inline code span counts as one word.
+CODE_SPAN = re.compile(r"`[^`]+`")
+SENTENCE_END = re.compile(r"(?:[.!?]|:(?= +[A-Z`\[(*]))[)\"*]* +")
 PYTHON_TEST = re.compile(r"^\s*(?:async )?def (test_\w+)")
 # Files that hold the rules, and texts of others.
 EXEMPT = {"scripts/language.py", "scripts/tests/test_language.py", "CONTRIBUTING.md", "LICENSE", "NOTICE"}
@@ -68,6 +75,34 @@ def findings_in_python(name, lines):
             yield from finding_of_test_name(name, number, test.group(1))
 
 
+def paragraphs(lines):
+    """The paragraphs and list items of Markdown with the number of their first line, without tables and code."""
+    first, text, is_code = 0, [], False
+    for number, line in enumerate([*lines, ""], 1):
+        stripped = line.strip()
+        is_fence = stripped.startswith("```")
+        is_code ^= is_fence
+        # Four spaces are code, except in the lines that continue a list item.
+        is_indented_code = not text and line.startswith("    ")
+        is_prose = not (is_code or is_fence or is_indented_code or NOT_PROSE.match(stripped))
+        if text and (not is_prose or LIST_ITEM.match(line)):
+            yield first, " ".join(text)
+            text = []
+        if is_prose:
+            first = first if text else number
+            text.append(LIST_ITEM.sub("", stripped))
+
+
+def findings_in_markdown(name, lines):
+    """Sentences that are too long."""
+    for number, paragraph in paragraphs(lines):
+        for sentence in SENTENCE_END.split(CODE_SPAN.sub("`code`", paragraph)):
+            words = [word for word in sentence.split() if any(map(str.isalnum, word))]
+            if len(words) > LONGEST_SENTENCE_WORDS:
+                start = " ".join(words[:6])
+                yield f"{name}:{number}: a sentence has {len(words)} words, {LONGEST_SENTENCE_WORDS} are allowed: {start}"
+
+
 def findings_in_openapi(name, text):
     """Summaries that are questions or too long."""
     for path, operations in json.loads(text)["paths"].items():
@@ -92,6 +127,8 @@ def findings(paths):
             yield from findings_in_rust(name, lines)
         elif path.suffix == ".py":
             yield from findings_in_python(name, lines)
+        elif path.suffix == ".md":
+            yield from findings_in_markdown(name, lines)
 
 
 if __name__ == "__main__":
