@@ -17,6 +17,35 @@ LONGEST_SENTENCE_WORDS = 35
 QUESTION_WORDS = "What|Who|Whom|Whose|How|Whether|Where|Which|Of|Why|When"
 # Things are not persons.
 PERSONS = re.compile(r"\b(somebody|nobody|whoever|anybody|everybody|whomever)\b", re.IGNORECASE)
+# Beginnings and whole words that prose has in another form. Names of keys, files and CSS classes keep theirs.
+OTHER_WORDS = {
+    "artefact": "artifact",
+    "behaviour": "behavior",
+    "centre": "center",
+    "colour": "color",
+    "defence": "defense",
+    "favour": "favor",
+    "grey": "gray",
+    "honour": "honor",
+    "labelled": "labeled",
+    "labelling": "labeling",
+    "learnt": "learned",
+    "licence": "license",
+    "metre": "meter",
+    "modelled": "modeled",
+    "neighbour": "neighbor",
+    "normalis": "normaliz",
+    "optimis": "optimiz",
+    "picture": "image",
+    "quantis": "quantiz",
+    "recognis": "recogniz",
+    "serialis": "serializ",
+    "towards": "toward",
+}
+# A word of prose, and not a part of a name: `centre_px`, `"colour"`, `calibrate-picture`, `licence =`.
+WORD = r"(?<![\w./:#$-])(?<!['\"]){}(?![\w-]*[\w-]*(?:[_(=/]| =|['\"]|\.\w))"
+OTHER_WORD = re.compile(WORD.format(f"({'|'.join(OTHER_WORDS)})"), re.IGNORECASE)
+IS_NO = re.compile(r"(?<!there )\b(?:is|are) no (?!longer|more|farther|further|reason)[a-z]", re.IGNORECASE)
 FIRST_WORD = re.compile(rf"(?:{QUESTION_WORDS})\b(?!-)")
 RUST_DOC = re.compile(r"^\s*//[/!](?!/) ?(.*)$")
 RUST_TEST = re.compile(r"#\[(?:tokio::)?test\b")
@@ -110,7 +139,7 @@ def findings_in_openapi(name, text):
             summary = operation.get("summary", "")
             words = len(summary.split())
             if summary.endswith("?") or not 1 <= words <= LONGEST_SUMMARY_WORDS:
-                yield f"{name}: {method.upper()} {path}: the summary `{summary}` is no imperative of 1 to 6 words"
+                yield f"{name}: {method.upper()} {path}: the summary `{summary}` is not an imperative of 1 to 6 words"
 
 
 def findings(paths):

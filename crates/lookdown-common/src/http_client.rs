@@ -20,7 +20,7 @@ use crate::{
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 /// Idle time after which a connection is closed: less than the keep-alive of common servers.
 const IDLE_TIMEOUT: Duration = Duration::from_secs(20);
-/// Longest `Retry-After` that is honoured.
+/// Longest `Retry-After` that is honored.
 const MAX_RETRY_AFTER: Duration = Duration::from_mins(1);
 /// Largest problem document that is read.
 const MAX_PROBLEM_BYTES: usize = 64 << 10;

@@ -101,7 +101,7 @@ def rug(rng, kind):
 
 
 def fabric(rng, number, n=512):
-    """Plain, stripes, checks, dots, camouflage, print: mid-grey on average, so that a tint colours it."""
+    """Plain, stripes, checks, dots, camouflage, print: mid-gray on average, so that a tint colors it."""
     muted = lambda low, high: (
         rng.uniform(low, high) * (1 + 0.35 * rng.uniform(-1, 1, 3))
     )  # Clothes are greyer than paint.
