@@ -42,10 +42,14 @@ OTHER_WORDS = {
     "serialis": "serializ",
     "towards": "toward",
 }
-# A word of prose, and not a part of a name: `centre_px`, `"colour"`, `calibrate-picture`, `licence =`.
-WORD = r"(?<![\w./:#$-])(?<!['\"]){}(?![\w-]*[\w-]*(?:[_(=/]| =|['\"]|\.\w))"
-OTHER_WORD = re.compile(WORD.format(f"({'|'.join(OTHER_WORDS)})"), re.IGNORECASE)
-IS_NO = re.compile(r"(?<!there )\b(?:is|are) no (?!longer|more|farther|further|reason)[a-z]", re.IGNORECASE)
+# Not in a name, such as `centre_px`, `calibrate-picture`, `results.pictures`, `"grey"` and `licence = "MIT"`.
+OTHER_WORD = re.compile(rf"(?<![\w./#$'\"-])({'|'.join(OTHER_WORDS)})[a-z]*\b(?![-_./]\w|[\"'(]| ?=)", re.IGNORECASE)
+IS_NO = re.compile(r"(?<!there )\b(is|are) no (?!longer|more|farther|further|reason|\W)", re.IGNORECASE)
+# The prose of a line of code: its comment, and its strings that have a space.
+COMMENT = re.compile(r"(?:^|\s)(?://[/!]?|#|/\*+) (\D.*)")
+STRING = re.compile(r'"((?:[^"\\]|\\.)*)"')
+# Names in prose: code, the fields of a formatted string, and the targets of links.
+NAMES = re.compile(r"`[^`]*`|\{[^{}]*\}|\]\([^)]*\)")
 FIRST_WORD = re.compile(rf"(?:{QUESTION_WORDS})\b(?!-)")
 RUST_DOC = re.compile(r"^\s*//[/!](?!/) ?(.*)$")
 RUST_TEST = re.compile(r"#\[(?:tokio::)?test\b")
@@ -68,9 +72,21 @@ def tracked_files(paths):
     return [name for name in listed.stdout.splitlines() if name not in EXEMPT]
 
 
+def prose(name, line):
+    """The prose of a line, without the names in it."""
+    if not name.endswith(".md"):
+        line = " ".join([*COMMENT.findall(line), *(text for text in STRING.findall(line) if " " in text)])
+    return NAMES.sub("", line)
+
+
 def findings_in_text(name, lines):
-    """Words that make persons of things."""
+    """Words that make persons of things, words with another form, and "is no" for "is not a"."""
     for number, line in enumerate(lines, 1):
+        text = prose(name, line)
+        for found in OTHER_WORD.finditer(text):
+            yield f"{name}:{number}: `{found.group()}`: write `{OTHER_WORDS[found.group(1).lower()]}…`"
+        if found := IS_NO.search(text):
+            yield f"{name}:{number}: `{found.group().strip()}`: write `{found.group(1)} not`"
         if found := PERSONS.search(line):
             yield f"{name}:{number}: `{found.group()}`: name the client, the caller or the component"
 

@@ -59,3 +59,23 @@ class Language(unittest.TestCase):
             self.assertEqual([*language.findings_in_markdown("a.md", lines)], [], lines)
         for text in [f"{half}: {half}", f"{half}; {half}"]:
             self.assertEqual(len([*language.findings_in_markdown("a.md", [text])]), 1, text)
+
+    def test_british_words_and_pictures_are_found_in_prose(self):
+        for name, line in [
+            ("a.md", "The colour of the text"),
+            ("a.md", "Two pictures, and a metre"),
+            ("a.rs", "/// The centre of the box."),
+            ("a.rs", '    bail!("{name} is no number of metres")'),
+            ("a.py", "x = 1  # towards the rim"),
+        ]:
+            self.assertTrue([*language.findings_in_text(name, [line])], line)
+
+    def test_names_keep_their_spelling(self):
+        for name, line in [
+            ("a.md", "The key `licence` and [images](page.md#pictures), results.pictures"),
+            ("a.rs", "let centre = colour(grey);"),
+            ("a.rs", 'format!("of {colour}: centre_px and licence = 3")'),
+            ("a.py", 'values["colour"] * grey'),
+            ("a.md", "There is no calibration, and it is no longer used."),
+        ]:
+            self.assertEqual([*language.findings_in_text(name, [line])], [], line)
