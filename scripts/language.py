@@ -17,7 +17,7 @@ LONGEST_SENTENCE_WORDS = 35
 QUESTION_WORDS = "What|Who|Whom|Whose|How|Whether|Where|Which|Of|Why|When"
 # Things are not persons.
 PERSONS = re.compile(r"\b(somebody|nobody|whoever|anybody|everybody|whomever)\b", re.IGNORECASE)
-# Beginnings and whole words that prose has in another form. Names of keys, files and CSS classes keep theirs.
+# Beginnings of words that prose spells in another way, or replaces. Names of keys, files and CSS classes keep theirs.
 OTHER_WORDS = {
     "artefact": "artifact",
     "behaviour": "behavior",
