@@ -1,4 +1,5 @@
-//! A tracker with the cameras that it follows: one camera, or all cameras of a site.
+//! A tracker with its cameras, one or all of a site: their lines and zones make counts of its
+//! tracks.
 
 use std::{
     collections::BTreeMap,

@@ -4,6 +4,8 @@
 //! plane for the angle `theta` from the optical axis, `mei` then distorts that plane
 //! ([`RadialTangential`]), and an affine [`ImagePlane`] turns it into pixels. A ray or pixel
 //! outside the valid range is refused with `None`, never mapped to a made-up place.
+//!
+//! A model is a file in `models/` and a line of the list in `models.rs`.
 
 use std::f64::consts::PI;
 
