@@ -17,7 +17,6 @@ use lookdown_detect::{
     parameters::DetectParameters,
     pipeline::{BatchOptions, DefaultModels, Engine, EngineOptions, WorkerPool},
 };
-use lookdown_lens::geometry::FieldOfViewReading;
 
 use lookdown_common::{InProcess, ServerClient, ServerOptions};
 
@@ -70,19 +69,13 @@ pub fn assemble(settings: &Settings) -> anyhow::Result<Assembly> {
     let calibrations =
         Calibrations::open_within(store, writable, CALIBRATIONS_WAIT, Arc::clone(&metrics));
     let calibrations = calibrations.context("calibrations.path")?;
-    assemble_with(
-        settings,
-        calibrations,
-        metrics,
-        FieldOfViewReading::default(),
-    )
+    assemble_with(settings, calibrations, metrics)
 }
 
 fn assemble_with(
     settings: &Settings,
     calibrations: Arc<Calibrations>,
     metrics: Arc<Metrics>,
-    paper_field_of_view: FieldOfViewReading,
 ) -> anyhow::Result<Assembly> {
     let (models, default_models) = models::open(settings, &metrics.detect)?;
     let options = EngineOptions {
@@ -94,7 +87,6 @@ fn assemble_with(
         },
         sessions: settings.threads.sessions,
         remap_threads: settings.threads.remapping,
-        paper_field_of_view,
         rig_cache_bytes: settings.calibrations.cache_bytes,
         inference_cache_frames: settings.inference.inference_cache_frames,
     };
@@ -126,20 +118,8 @@ pub(crate) fn decode_limits(limits: &LimitSettings) -> DecodeLimits {
 /// # Errors
 /// One sentence that names the setting, for a file that is missing or cannot be used.
 pub fn engine_for(settings: &Settings, requests: &[DetectParameters]) -> anyhow::Result<Engine> {
-    evaluation_engine(settings, requests, FieldOfViewReading::default())
-}
-
-/// [`engine_for`], with a reading of the paper's field of view.
-///
-/// # Errors
-/// Those of [`engine_for`].
-pub fn evaluation_engine(
-    settings: &Settings,
-    requests: &[DetectParameters],
-    paper_field_of_view: FieldOfViewReading,
-) -> anyhow::Result<Engine> {
     let calibrations = Arc::new(open_calibrations(settings)?);
-    let assembly = assemble_with(settings, calibrations, Arc::default(), paper_field_of_view)?;
+    let assembly = assemble_with(settings, calibrations, Arc::default())?;
     let Assembly { engine, models, .. } = assembly;
     for request in requests {
         for name in engine.default_models().needed_by(request) {

@@ -11,12 +11,12 @@ use std::{
     time::Duration,
 };
 
-use lookdown_common::{ConfigError, plain_name, read_file};
+use lookdown_common::{ConfigError, Secret, plain_name, read_file};
 use lookdown_watch::{
     CameraEntry, CameraState, Frame, Location, Metrics, SourceError, first_frame,
 };
 use parking_lot::{Mutex, RwLock};
-use secrecy::{ExposeSecret, SecretString};
+use secrecy::ExposeSecret;
 use serde::{Deserialize, Serialize};
 
 /// Longest wait for the frame of a test.
@@ -160,7 +160,7 @@ impl Cameras {
         &self,
         name: &str,
         mut camera: StoredCamera,
-        password: Option<&SecretString>,
+        password: Option<&Secret>,
     ) -> Result<bool, CameraError> {
         let _changing = self.changing.lock();
         let mut stored = self.stored()?;
@@ -210,7 +210,7 @@ impl Cameras {
     /// [`CameraError`].
     pub async fn test(
         camera: &StoredCamera,
-        password: Option<SecretString>,
+        password: Option<Secret>,
     ) -> Result<Frame, CameraError> {
         let mut checked = checked("test", camera)?;
         if let (Some(credentials), Some(password)) = (&mut checked.credentials, password) {

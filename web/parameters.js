@@ -14,7 +14,7 @@ const form = () => find("#parameters");
  * frame again. */
 export function query() {
   const given = [...new FormData(form())].filter(([, value]) => value !== "");
-  return new URLSearchParams([...given, ["camera", "web-page"], ["store", "false"], ["remember", "true"]]);
+  return new URLSearchParams([...given, ["camera", "web-page"], ["store", "false"], ["cache", "true"]]);
 }
 
 export const profile = () => new FormData(form()).get("profile");

@@ -20,7 +20,7 @@ fn camera(url: &str) -> StoredCamera {
 #[test]
 fn a_camera_is_stored_with_its_password_in_a_private_file() {
     let folder = tempfile::tempdir().unwrap();
-    let password = SecretString::from("geheim");
+    let password = Secret::from("geheim");
     let url = "rtsp://10.0.0.8/s2";
     assert!(
         cameras(folder.path())
@@ -50,7 +50,7 @@ fn a_camera_is_stored_with_its_password_in_a_private_file() {
 fn a_password_stays_with_its_host_and_user_only() {
     let folder = tempfile::tempdir().unwrap();
     let cameras = cameras(folder.path());
-    let password = SecretString::from("geheim");
+    let password = Secret::from("geheim");
     cameras
         .put("hall", camera("rtsp://10.0.0.8/s2"), Some(&password))
         .unwrap();
@@ -117,7 +117,7 @@ fn a_camera_without_a_url_keeps_the_stored_one() {
     let folder = tempfile::tempdir().unwrap();
     let cameras = cameras(folder.path());
     let url = "rtsp://10.0.0.8/s2?token=1";
-    let password = SecretString::from("geheim");
+    let password = Secret::from("geheim");
     cameras.put("hall", camera(url), Some(&password)).unwrap();
     assert!(!cameras.put("hall", camera(""), None).unwrap());
     assert_eq!(cameras.stored().unwrap()["hall"].url, url);

@@ -19,7 +19,7 @@ use lookdown_eval::DetectedRow;
 
 pub(super) use self::arguments::Arguments;
 use self::{detect_group::detect_group, output::Output};
-use crate::app::evaluation_engine;
+use crate::app::engine_for;
 
 /// Scores every profile with every refinement.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
@@ -45,7 +45,7 @@ fn detect_groups(arguments: &Arguments, output: &mut Output) -> anyhow::Result<(
     let groups = variants::groups(arguments)?;
     let settings = arguments.settings_file.load()?;
     let data_set = arguments.truth.open(&arguments.settings_file)?;
-    let engine = evaluation_engine(&settings, &groups.concat(), arguments.field_of_view)?;
+    let engine = engine_for(&settings, &groups.concat())?;
     for group in groups {
         for row in detect_group(&engine, &data_set, &group, &settings)? {
             if let Some(folder) = &arguments.save_detections {

@@ -4,11 +4,10 @@ use std::{process::ExitCode, sync::Arc};
 
 use anyhow::{Context, bail};
 use clap::Args;
-use lookdown_common::ServerOptions;
+use lookdown_common::{Secret, ServerOptions};
 use lookdown_count::Started;
 use lookdown_http::Shutdown;
 use lookdown_watch::{CameraEntry, Metrics, Origin, watch as watch_cameras};
-use secrecy::SecretString;
 use tokio::{runtime, sync::watch};
 
 use super::{
@@ -116,7 +115,7 @@ fn check(settings: &Settings) -> anyhow::Result<()> {
 }
 
 /// Adds a key of this process to those of the settings, if requests need keys. It is in memory only.
-fn own_key(settings: &mut Settings) -> anyhow::Result<Option<SecretString>> {
+fn own_key(settings: &mut Settings) -> anyhow::Result<Option<Secret>> {
     if !settings.access.needs_keys() {
         return Ok(None);
     }
@@ -133,7 +132,7 @@ struct Parts {
     settings: SettingsSource,
     /// The camera of the command line.
     camera: Option<CameraEntry>,
-    key: Option<SecretString>,
+    key: Option<Secret>,
     shutdown: Shutdown,
 }
 

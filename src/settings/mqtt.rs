@@ -2,7 +2,7 @@
 
 use std::{num::NonZeroUsize, path::PathBuf, time::Duration};
 
-use lookdown_common::read_secret;
+use lookdown_common::{Secret, read_secret};
 use secrecy::{ExposeSecret, SecretString};
 use url::Url;
 
@@ -69,7 +69,7 @@ impl MqttKeys {
             .map_err(|error: BrokerError| refusal("mqtt.url", error.to_string()))?;
         let in_file = self.password_file.as_deref();
         let in_file = in_file.map(|path| read_secret("mqtt.password_file", path));
-        if let Some(password) = self.password.or(in_file.transpose()?) {
+        if let Some(password) = self.password.map(Secret::from).or(in_file.transpose()?) {
             let with_password = |broker: Broker| broker.with_password(password.expose_secret());
             broker = broker
                 .map(with_password)

@@ -153,16 +153,6 @@ fn the_calibration_for_every_image_must_exist() {
 }
 
 #[test]
-fn an_unknown_field_of_view_is_refused_with_the_known_ones() {
-    let output = lookdown(&["eval", "somewhere", "--field-of-view", "wide"], &[]);
-    let message = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(2), "{message}");
-    for part in ["--field-of-view", "horizontal, diagonal, literal"] {
-        assert!(message.contains(part), "{message}");
-    }
-}
-
-#[test]
 fn a_sweep_takes_one_profile() {
     let flags = ["--sweep", "out", "--profile", "fast", "--profile", "paper"];
     let output = lookdown(&[&["eval", "somewhere"], &flags[..]].concat(), &[]);

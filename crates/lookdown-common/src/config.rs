@@ -2,10 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use secrecy::SecretString;
 use serde::de::DeserializeOwned;
 
-use crate::files::{self, MAX_SETTINGS_BYTES};
+use crate::{
+    Secret,
+    files::{self, MAX_SETTINGS_BYTES},
+};
 
 /// A setting that cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -112,7 +114,7 @@ pub fn read_file(field: &str, path: &Path) -> Result<Vec<u8>, ConfigError> {
 ///
 /// # Errors
 /// [`ConfigError`].
-pub fn read_secret(field: &str, path: &Path) -> Result<SecretString, ConfigError> {
+pub fn read_secret(field: &str, path: &Path) -> Result<Secret, ConfigError> {
     let content = read_file(field, path)?;
     let text = String::from_utf8_lossy(&content);
     let line = text.lines().next().unwrap_or_default().trim_end();

@@ -22,6 +22,8 @@ pub mod plain_name;
 #[cfg(feature = "companion")]
 mod reload;
 #[cfg(feature = "companion")]
+mod secret;
+#[cfg(feature = "companion")]
 mod server_entry;
 pub mod text;
 
@@ -36,6 +38,7 @@ pub use {
     http_client::{ClientError, ServerClient, client_builder, read_body, retry_after},
     in_process::InProcess,
     reload::Reload,
+    secret::Secret,
     server_entry::{ServerEntry, ServerOptions},
 };
 

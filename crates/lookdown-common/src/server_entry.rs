@@ -3,11 +3,10 @@
 use std::path::PathBuf;
 
 use reqwest::Url;
-use secrecy::{ExposeSecret, SecretString};
 use serde::Deserialize;
 
 use crate::{
-    ConfigError, InProcess,
+    ConfigError, InProcess, Secret,
     config::{read_file, read_secret},
 };
 
@@ -15,29 +14,16 @@ use crate::{
 const DEFAULT_SERVER: &str = "http://127.0.0.1:8080";
 
 /// The server of a companion.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ServerOptions {
     /// Its base URL.
     pub url: Url,
     /// The API key.
-    pub api_key: Option<SecretString>,
+    pub api_key: Option<Secret>,
     /// The authorities to trust instead of those of the system, as PEM.
     pub authorities: Option<Vec<u8>>,
     /// The server if it is in this process. The URL then only names it.
     pub in_process: Option<InProcess>,
-}
-
-impl PartialEq for ServerOptions {
-    fn eq(&self, other: &Self) -> bool {
-        let key = |options: &Self| {
-            let key = options.api_key.as_ref();
-            key.map(|key| key.expose_secret().to_owned())
-        };
-        self.url == other.url
-            && key(self) == key(other)
-            && self.authorities == other.authorities
-            && self.in_process == other.in_process
-    }
 }
 
 /// The server as it is written in the file or on the command line.

@@ -6,8 +6,8 @@ use std::{
     time::Duration,
 };
 
-use lookdown_common::{ConfigError, ServerEntry, ServerOptions, read_secret};
-use secrecy::{ExposeSecret, SecretString};
+use lookdown_common::{ConfigError, Secret, ServerEntry, ServerOptions, read_secret};
+use secrecy::ExposeSecret;
 
 use crate::webhooks::{Webhook, WebhookEntry};
 
@@ -62,14 +62,14 @@ impl Default for CountEntry {
 }
 
 /// The checked settings.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct CountOptions {
     /// The server.
     pub server: ServerOptions,
     /// The address of the HTTP API; `None` if another server answers with its routes.
     pub listen: Option<SocketAddr>,
     /// The key that requests to the HTTP API must have.
-    pub api_key: Option<SecretString>,
+    pub api_key: Option<Secret>,
     /// True if every client may read without a key.
     pub open: bool,
     /// Public names of an open address.
@@ -86,28 +86,6 @@ pub struct CountOptions {
     pub max_cameras: usize,
     /// Receivers of messages.
     pub(crate) webhooks: Vec<Webhook>,
-}
-
-impl PartialEq for CountOptions {
-    fn eq(&self, other: &Self) -> bool {
-        let key = |options: &Self| {
-            let key = options.api_key.as_ref();
-            key.map(|key| key.expose_secret().to_owned())
-        };
-        let plain = |options: &Self| {
-            (
-                options.listen,
-                options.store.clone(),
-                [options.retention, options.commit_every, options.longest_gap],
-                options.max_cameras,
-                (options.open, options.hosts.clone()),
-            )
-        };
-        self.server == other.server
-            && key(self) == key(other)
-            && plain(self) == plain(other)
-            && self.webhooks == other.webhooks
-    }
 }
 
 impl CountEntry {
@@ -149,7 +127,7 @@ impl CountEntry {
 ///
 /// # Errors
 /// [`ConfigError`].
-pub fn read_key(path: &Path) -> Result<SecretString, ConfigError> {
+pub fn read_key(path: &Path) -> Result<Secret, ConfigError> {
     let key = read_secret("counts.api_key_file", path)?;
     if key.expose_secret().len() < LEAST_KEY_CHARS {
         let problem = "the key is too short: write at least 16 characters into the file";

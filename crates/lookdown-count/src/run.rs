@@ -10,6 +10,7 @@ use lookdown_http::{
     server::bind,
 };
 use parking_lot::Mutex;
+use secrecy::SecretString;
 use tokio::{
     net::TcpListener,
     sync::watch,
@@ -174,7 +175,7 @@ fn serve_alone(
         tracing::info!("counts at http://{address}/counts");
     }
     let access = match (&options.api_key, address) {
-        (Some(key), _) => Access::Key(key.clone()),
+        (Some(key), _) => Access::Key(SecretString::clone(key)),
         (None, _) if options.open => Access::Everyone(options.hosts.clone().into()),
         (None, Some(address)) => Access::without_key(address),
         (None, None) => Access::OwnMachine,

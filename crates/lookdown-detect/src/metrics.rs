@@ -70,7 +70,7 @@ metric_set! {
     /// Remap tables evicted from memory.
     rig_cache_evictions: IntCounter = "rig_cache_evictions_total" [];
     /// Frames answered from the inference cache.
-    inference_cache_hits: IntCounter = "recalled_frames_total" [];
+    inference_cache_hits: IntCounter = "inference_cache_hits_total" [];
 }
 
 impl DetectMetrics {

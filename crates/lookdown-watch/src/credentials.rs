@@ -1,27 +1,22 @@
 //! The user name and the password of a camera, and the header that carries them.
 
 use http_auth::{PasswordClient, PasswordParams};
+use lookdown_common::Secret;
 use reqwest::{
     Url,
     header::{HeaderMap, HeaderValue, WWW_AUTHENTICATE},
 };
-use secrecy::{ExposeSecret, SecretString};
+use secrecy::ExposeSecret;
 
 use crate::SourceError;
 
 /// The user name and the password of a camera.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Credentials {
     /// The user name.
     pub user: String,
     /// The password.
-    pub password: SecretString,
-}
-
-impl PartialEq for Credentials {
-    fn eq(&self, other: &Self) -> bool {
-        self.user == other.user && self.password.expose_secret() == other.password.expose_secret()
-    }
+    pub password: Secret,
 }
 
 /// Authentication of requests to a camera, as the camera asks for it: Digest is preferred to Basic

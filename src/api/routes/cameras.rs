@@ -11,7 +11,7 @@ use axum::{
     },
     response::{IntoResponse, Response},
 };
-use secrecy::SecretString;
+use lookdown_common::Secret;
 use serde::{Deserialize, Serialize};
 use tokio::task::spawn_blocking;
 use utoipa::ToSchema;
@@ -107,7 +107,7 @@ impl FromRequest<ApiState> for NewCamera {
 }
 
 impl NewCamera {
-    fn separate(self) -> (StoredCamera, Option<SecretString>) {
+    fn separate(self) -> (StoredCamera, Option<Secret>) {
         let camera = StoredCamera {
             url: self.url,
             user: self.user.filter(|user| !user.is_empty()),
@@ -116,7 +116,7 @@ impl NewCamera {
             profile: self.profile,
             paused: self.paused,
         };
-        (camera, self.password.map(SecretString::from))
+        (camera, self.password.map(Secret::from))
     }
 }
 

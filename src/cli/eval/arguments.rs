@@ -2,12 +2,8 @@
 
 use std::path::PathBuf;
 
-use clap::{
-    Args,
-    builder::{PossibleValuesParser, TypedValueParser},
-};
+use clap::Args;
 use lookdown_detect::{detection::Refinement, parameters::Profile};
-use lookdown_lens::geometry::FieldOfViewReading;
 
 use super::{plot_file::PlotFile, truth::TruthFlags};
 use crate::cli::{parameters::one_of, settings_file::SettingsFile};
@@ -51,16 +47,6 @@ pub(in crate::cli) struct Arguments {
     /// Width of Gaussian Soft-NMS [default: 0.3]
     #[arg(long, value_name = "NUMBER")]
     pub(super) sigma: Option<String>,
-    /// The reading of the paper's field of view, for the profile paper: 53° across, 53° from corner to
-    /// corner, or its formula taken literally, 90°
-    #[arg(
-        long,
-        value_name = "READING",
-        default_value = "horizontal",
-        value_parser = PossibleValuesParser::new(["horizontal", "diagonal", "literal"])
-            .map(|name| reading(&name))
-    )]
-    pub(super) field_of_view: FieldOfViewReading,
     /// Print one JSON object per row instead of a table
     #[arg(long)]
     pub(super) json: bool,
@@ -82,12 +68,4 @@ pub(in crate::cli) struct Arguments {
     pub(super) from_detections: Vec<PathBuf>,
     #[command(flatten)]
     pub(super) settings_file: SettingsFile,
-}
-
-fn reading(name: &str) -> FieldOfViewReading {
-    match name {
-        "diagonal" => FieldOfViewReading::Diagonal,
-        "literal" => FieldOfViewReading::Literal,
-        _ => FieldOfViewReading::Horizontal,
-    }
 }

@@ -18,7 +18,7 @@ use super::{
 };
 use crate::cli::output::UNWRITABLE;
 use crate::{
-    app::{decode_limits, evaluation_engine},
+    app::{decode_limits, engine_for},
     settings::LimitSettings,
 };
 
@@ -33,11 +33,7 @@ pub(super) fn run(arguments: &Arguments, folder: &Path) -> anyhow::Result<()> {
     let settings = arguments.settings_file.load()?;
     let data_set = arguments.truth.open(&arguments.settings_file)?;
     fs::create_dir_all(folder).with_context(|| unwritable(folder))?;
-    let engine = evaluation_engine(
-        &settings,
-        std::slice::from_ref(&base),
-        arguments.field_of_view,
-    )?;
+    let engine = engine_for(&settings, std::slice::from_ref(&base))?;
     let detected = detect_group(&engine, &data_set, &sweep::cells(&base), &settings)?;
     let cells = detected.into_iter().map(|row| {
         let evaluated = row.evaluate(&data_set)?;

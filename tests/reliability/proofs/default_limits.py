@@ -53,7 +53,7 @@ def prove(effort: Effort) -> Row:
         with lookdown({"LOG__FILTER": "error"}, inside=inside) as server, contextlib.ExitStack() as held:
             address = server.address
             for number in range(CAMERAS):
-                path = f"{DETECT}&camera=hall{number}&motion=true&remember=true"
+                path = f"{DETECT}&camera=hall{number}&motion=true&cache=true"
                 ask(address, "POST", path, OFFICE.read_bytes())
             tables = _rig_cache_mib(address)
             finished = threading.Event()

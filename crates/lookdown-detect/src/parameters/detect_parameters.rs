@@ -138,8 +138,8 @@ parameter_table! {
         example: None,
         interfaces: REQUESTS_WITH_DEFAULTS,
     };
-    REMEMBER = ParameterSpec {
-        name: "remember",
+    CACHE = ParameterSpec {
+        name: "cache",
         kind: ParameterKind::Switch,
         default: ParameterDefault::Value("false"),
         help: "Caches the detections in the views of this frame, and uses them if the same file was \
@@ -199,7 +199,7 @@ pub struct DetectParameters {
     /// Skips views without motion since the last frame of the camera.
     pub motion: bool,
     /// Caches the detections in the views, and uses cached ones.
-    pub remember: bool,
+    pub cache: bool,
     /// Stores the report under the name of its camera.
     pub store: bool,
     /// The priority among queued frames.
@@ -264,7 +264,7 @@ impl DetectParameters {
             },
             captured_at: given.optional(&CAPTURED_AT)?,
             motion: given.value(&MOTION)?,
-            remember: given.value(&REMEMBER)?,
+            cache: given.value(&CACHE)?,
             store: given.optional(&STORE)?.unwrap_or(is_named),
             priority: Priority::of_level(given.value(&PRIORITY)?),
             timeout: timeout.map(Duration::from_millis),

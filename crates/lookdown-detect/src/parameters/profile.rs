@@ -47,12 +47,11 @@ impl Profile {
         self.into()
     }
 
-    /// Returns the view plan; `None` for [`Profile::Direct`]. `paper_reading` is the interpretation
-    /// of the paper's field of view.
+    /// Returns the view plan; `None` for [`Profile::Direct`].
     #[must_use]
-    pub fn view_plan(self, paper_reading: FieldOfViewReading) -> Option<ViewPlan> {
+    pub fn view_plan(self) -> Option<ViewPlan> {
         match self {
-            Self::Paper => Some(ViewPlan::paper(paper_reading)),
+            Self::Paper => Some(ViewPlan::paper(FieldOfViewReading::default())),
             Self::Fast => Some(ViewPlan::fast()),
             Self::Balanced => Some(ViewPlan::balanced()),
             Self::Quality => Some(ViewPlan::quality()),

@@ -13,10 +13,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use lookdown_lens::{
-    geometry::FieldOfViewReading,
-    warning::{Warning, WarningCode},
-};
+use lookdown_lens::warning::{Warning, WarningCode};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 pub use self::observation::Observation;
@@ -58,8 +55,6 @@ pub struct EngineOptions {
     pub sessions: NonZeroUsize,
     /// Number of threads that build remap tables and render batches of several views.
     pub remap_threads: NonZeroUsize,
-    /// The interpretation of the paper's field of view.
-    pub paper_field_of_view: FieldOfViewReading,
     /// Maximum memory of cached remap tables, bytes.
     pub rig_cache_bytes: usize,
     /// Maximum number of frames in the inference cache, which requests opt in to.
@@ -83,7 +78,6 @@ impl EngineOptions {
             },
             sessions: threads,
             remap_threads: threads,
-            paper_field_of_view: FieldOfViewReading::default(),
             rig_cache_bytes: Self::RIG_CACHE_BYTES,
             inference_cache_frames: 0,
         }
@@ -252,7 +246,7 @@ impl Engine {
         if !camera.rig.has_no_masks() {
             camera.rig.blank(Arc::make_mut(&mut frame));
         }
-        let key = job.parameters.remember.then(|| FrameKey {
+        let key = job.parameters.cache.then(|| FrameKey {
             digest: job.image.digest(),
             is_model_named: job.parameters.model.is_some(),
             rig: Arc::clone(&camera.rig),

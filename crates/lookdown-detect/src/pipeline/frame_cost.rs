@@ -4,7 +4,6 @@
 //! network, and each 8 megapixels that are drawn add 1. A frame with more pixels than the limit also
 //! costs 1, because its header is enough to refuse it. No frame costs more than a client may use.
 
-use lookdown_lens::geometry::FieldOfViewReading;
 
 use super::{DetectJob, ViewsJob};
 
@@ -22,7 +21,7 @@ pub(super) fn of_frame(job: &DetectJob, max_pixels: u64) -> usize {
         return 1;
     }
     let profile = job.parameters.profile;
-    let plan = profile.view_plan(FieldOfViewReading::default());
+    let plan = profile.view_plan();
     let first_pass = plan.map_or(1, |plan| plan.directions().len());
     let inputs = first_pass + profile.max_second_pass_views();
     cost(size, job.ticket.drawn_width, inputs)

@@ -96,7 +96,7 @@ impl Engine {
             let at = cross_half_pixel(pixel, PixelConvention::CornerOrigin);
             !masked.hides_position(pixel) && reach.as_ref().is_none_or(|reach| reach.holds(at))
         };
-        let plan = profile.view_plan(options.paper_field_of_view);
+        let plan = profile.view_plan();
         let views = plan.as_ref().map(|plan| {
             let mut views = plan.views(calibration.mount(), input.width, input.height);
             views.retain(|view| sees(view, lens, counts));

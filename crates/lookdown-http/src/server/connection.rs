@@ -61,7 +61,7 @@ where
         if let Some(client) = client {
             request.extensions_mut().insert(client);
         }
-        timeouts.request_begins(request.body().size_hint().exact());
+        timeouts.request_begins();
         let answer = service.clone().oneshot(request);
         let (timeouts, shutdown) = (Arc::clone(&timeouts), &shutdown);
         async move {

@@ -26,7 +26,6 @@ struct State {
     /// The time at which the phase times out.
     until: Option<Instant>,
     reading: Reading,
-    request: RequestBytes,
 }
 
 /// The progress of a client that reads responses.
@@ -61,44 +60,6 @@ impl Reading {
     }
 }
 
-/// The bytes of the current request, counted to find bytes of the next one that arrived with it.
-#[derive(Debug, Default)]
-struct RequestBytes {
-    /// The last bytes that arrived, at most as many as [`HEAD_END`] has.
-    tail: Vec<u8>,
-    /// The bytes after the head, once the head is complete.
-    after_head: Option<u64>,
-    /// The length of the body; `None` for a body that states its end itself.
-    body: Option<u64>,
-}
-
-/// The end of a head, and of a body in chunks.
-const HEAD_END: &[u8] = b"\r\n\r\n";
-
-impl RequestBytes {
-    fn add(&mut self, bytes: &[u8]) {
-        self.tail.extend_from_slice(bytes);
-        if let Some(count) = &mut self.after_head {
-            *count += bytes.len() as u64;
-        } else {
-            let mut parts = self.tail.windows(HEAD_END.len());
-            let end = parts.position(|part| part == HEAD_END);
-            self.after_head = end.map(|at| (self.tail.len() - at - HEAD_END.len()) as u64);
-        }
-        self.tail
-            .drain(..self.tail.len().saturating_sub(HEAD_END.len()));
-    }
-
-    /// Returns true if bytes of the next request have arrived.
-    fn hold_the_next(&self) -> bool {
-        match (self.body, self.after_head) {
-            (Some(length), Some(after_head)) => after_head > length,
-            (None, _) => self.tail != HEAD_END,
-            (Some(_), None) => false,
-        }
-    }
-}
-
 /// Tracks the phases of a connection and detects timeouts.
 #[derive(Debug)]
 pub(super) struct ConnectionTimeouts {
@@ -114,7 +75,6 @@ impl ConnectionTimeouts {
             phase: Phase::FirstHead,
             until: Some(Instant::now() + limits.header_timeout),
             reading: Reading::default(),
-            request: RequestBytes::default(),
         };
         Self {
             state: Mutex::new(state),
@@ -123,35 +83,28 @@ impl ConnectionTimeouts {
         }
     }
 
-    /// Records received bytes.
-    pub(super) fn received(&self, bytes: &[u8]) {
+    /// Records that bytes have arrived.
+    pub(super) fn received(&self) {
         let mut state = self.state();
-        state.request.add(bytes);
         if state.phase == Phase::Idle {
             state.phase = Phase::Head;
             state.until = Some(Instant::now() + self.header_timeout);
         }
     }
 
-    /// Records that the head of a request is complete. `body` is the length of its body, if the head
-    /// states it.
-    pub(super) fn request_begins(&self, body: Option<u64>) {
+    /// Records that the head of a request is complete.
+    pub(super) fn request_begins(&self) {
         let mut state = self.state();
-        state.request.body = body;
         state.phase = Phase::Service;
         state.until = None;
     }
 
-    /// Records that all of a response is ready to be sent.
+    /// Records that all of a response is ready to be sent. A head that arrived in part with the last
+    /// request has the time of an idle connection.
     pub(super) fn request_ends(&self) {
         let mut state = self.state();
-        let (phase, time) = if std::mem::take(&mut state.request).hold_the_next() {
-            (Phase::Head, self.header_timeout)
-        } else {
-            (Phase::Idle, self.idle_timeout)
-        };
-        state.phase = phase;
-        state.until = Some(Instant::now() + time);
+        state.phase = Phase::Idle;
+        state.until = Some(Instant::now() + self.idle_timeout);
     }
 
     /// Records that the client blocks the response.
@@ -235,7 +188,7 @@ mod tests {
     #[tokio::test(start_paused = true)]
     async fn a_client_that_reads_slowly_but_steadily_may_finish() {
         let timeouts = pace();
-        timeouts.request_begins(Some(0));
+        timeouts.request_begins();
         timeouts.request_ends();
         for _ in 0..5 {
             timeouts.blocked();
@@ -251,7 +204,7 @@ mod tests {
     #[tokio::test(start_paused = true)]
     async fn a_client_that_reads_a_few_bytes_at_a_time_is_overdue() {
         let timeouts = pace();
-        timeouts.request_begins(Some(0));
+        timeouts.request_begins();
         timeouts.request_ends();
         let began = Instant::now();
         while !is_overdue(&timeouts).await && began.elapsed() < 2 * IDLE {
@@ -264,43 +217,14 @@ mod tests {
     }
 
     #[tokio::test(start_paused = true)]
-    async fn a_head_that_came_with_the_last_request_must_end_soon() {
-        let body = b"POST / HTTP/1.1\r\n\r\nbody";
-        let chunks = b"POST / HTTP/1.1\r\n\r\n4\r\nbody\r\n0\r\n\r\n";
-        for (request, length) in [
-            (&b"GET / HTTP/1.1\r\n\r\n"[..], Some(0)),
-            (body, Some(4)),
-            (chunks, None),
-        ] {
-            for (more, limit) in [(&b""[..], IDLE), (b"GET /", Duration::from_secs(1))] {
-                for size in [1, 7, 1000] {
-                    let timeouts = pace();
-                    for part in [request, more].concat().chunks(size) {
-                        timeouts.received(part);
-                    }
-                    timeouts.request_begins(length);
-                    timeouts.request_ends();
-                    let began = Instant::now();
-                    timeouts.overdue().await;
-                    assert_eq!(
-                        began.elapsed().as_secs(),
-                        limit.as_secs(),
-                        "{more:?} {size}"
-                    );
-                }
-            }
-        }
-    }
-
-    #[tokio::test(start_paused = true)]
     async fn a_deadline_set_during_the_wait_is_kept() {
         let timeouts = pace();
-        timeouts.request_begins(Some(0));
+        timeouts.request_begins();
         timeouts.request_ends();
         let began = Instant::now();
         let head = async {
             tokio::time::sleep(IDLE / 3).await;
-            timeouts.received(b"G");
+            timeouts.received();
         };
         tokio::join!(timeouts.overdue(), head);
         let since_received = began.elapsed().saturating_sub(IDLE / 3);

@@ -2,11 +2,10 @@
 
 use std::{collections::BTreeMap, path::PathBuf, time::Duration};
 
-use secrecy::SecretString;
 use serde::Deserialize;
 
 use crate::{Camera, Credentials, Location, Transport, VideoOptions};
-use lookdown_common::{ConfigError, optional_duration, read_secret, text::is_invisible};
+use lookdown_common::{ConfigError, Secret, optional_duration, read_secret, text::is_invisible};
 
 /// Shortest interval between two frames.
 const MIN_EVERY: Duration = Duration::from_millis(40);
@@ -238,7 +237,7 @@ fn credentials(
         }
         (None, Some(user), None) => Ok(Some(Credentials {
             user,
-            password: SecretString::default(),
+            password: Secret::default(),
         })),
         (Some(_), _, _) => Err(ConfigError::problem(
             &format!("{prefix}user"),

@@ -155,7 +155,7 @@ impl Engine {
             input_size: (input.width, input.height),
         };
         self.rigs.get_or_build(&key, || {
-            let plan = profile.view_plan(self.options.paper_field_of_view);
+            let plan = profile.view_plan();
             let (width, height) = (frame.width(), frame.height());
             self.remappers
                 .install(|| CameraRig::new(geometry, width, height, plan.as_ref(), input))

@@ -156,7 +156,7 @@ fn views_without_motion_skip_inference() {
 fn a_cached_frame_is_refined_without_inference() {
     let engine = engine_with_lobby();
     let report = |disc: [f64; 2], more: &[(&str, &str)]| {
-        let named = [("calibration", "lobby"), ("remember", "true")];
+        let named = [("calibration", "lobby"), ("cache", "true")];
         let named: Vec<_> = named.iter().chain(more).copied().collect();
         let image = frame_with_disc(600, disc, 20.0);
         engine.detect(&job(image, &named)).unwrap().report

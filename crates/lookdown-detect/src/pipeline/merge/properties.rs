@@ -4,7 +4,7 @@ use std::sync::{Arc, LazyLock};
 
 use lookdown_lens::{
     calibration::{Areas, CameraGeometry},
-    geometry::{FieldOfViewReading, Lens, Mount},
+    geometry::{Lens, Mount},
 };
 use proptest::prelude::*;
 use strum::VariantArray;
@@ -37,7 +37,7 @@ static CAMERAS: LazyLock<Vec<(Arc<CameraRig>, Profile)>> = LazyLock::new(|| {
                 mount: Mount::new(up, Some(2.8)),
                 areas: Areas::default(),
             };
-            let plan = profile.view_plan(FieldOfViewReading::default());
+            let plan = profile.view_plan();
             let input = BlobDetector::default().input;
             let rig = CameraRig::new(geometry, WIDTH, HEIGHT, plan.as_ref(), &input);
             rigs.push((Arc::new(rig), profile));

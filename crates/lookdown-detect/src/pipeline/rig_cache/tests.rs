@@ -1,6 +1,6 @@
 use lookdown_lens::{
     calibration::{Areas, CameraGeometry},
-    geometry::{FieldOfViewReading, Lens, Mount, ViewPlan},
+    geometry::{Lens, Mount, ViewPlan},
 };
 use strum::VariantArray;
 
@@ -142,7 +142,7 @@ fn a_thousand_cameras_used_once_each_fit_the_default_budget() {
 #[test]
 fn no_profile_takes_more_than_two_mebibytes_per_camera() {
     for &profile in Profile::VARIANTS {
-        let plan = profile.view_plan(FieldOfViewReading::default());
+        let plan = profile.view_plan();
         for (side, up) in [(416, [0.0, 0.0, -1.0]), (300, [0.0, 0.3, -1.0])] {
             let geometry = CameraGeometry {
                 mount: Mount::new(nalgebra::Unit::new_normalize(up.into()), None),
