@@ -1,5 +1,4 @@
-//! A tracker with its cameras, one or all of a site: their lines and zones make counts of its
-//! tracks.
+//! A tracker with its cameras, one or all of a site, whose lines and zones count its tracks.
 
 use std::{
     collections::BTreeMap,
