@@ -68,7 +68,7 @@ impl HeatMap {
 }
 
 impl Cell {
-    /// Returns the cell of a place in meters. `None` for places more than a kilometre away.
+    /// Returns the cell of a place in meters. `None` for places more than a kilometer away.
     #[must_use]
     pub fn of([x, y]: [f64; 2]) -> Option<Self> {
         let index = |metres: f64| {

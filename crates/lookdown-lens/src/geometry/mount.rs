@@ -68,7 +68,7 @@ impl Mount {
         }
     }
 
-    /// The levelled camera frame: z straight down, x and y as image right and image down would be
+    /// The leveled camera frame: z straight down, x and y as image right and image down would be
     /// if the camera were turned to look straight down by the smallest rotation.
     #[must_use]
     pub fn camera_from_floor(&self) -> Rotation3<f64> {
