@@ -64,6 +64,7 @@ class Language(unittest.TestCase):
         for name, line in [
             ("a.md", "The colour of the text"),
             ("a.md", "Two pictures, and a metre"),
+            ("a.md", "It is no error."),
             ("a.rs", "/// The centre of the box."),
             ("a.rs", '    bail!("{name} is no number of metres")'),
             ("a.py", "x = 1  # towards the rim"),
