@@ -36,8 +36,7 @@ serve: ## download ONNX Runtime and the default models, build what a first look 
 	@$(PYTHON) scripts/setup.py runtime model & trap 'kill $$!; exit 130' INT; \
 		cargo build --profile quick --locked --target-dir target
 	@$(PYTHON) scripts/setup.py runtime model
-	@# Makes glibc return the memory of replaced models: docs/models.md.
-	@MALLOC_MMAP_THRESHOLD_=131072 exec target/quick/lookdown serve
+	@exec target/quick/lookdown serve
 
 check: ## check formatting and lints and run the unit tests; without network once the crates are there
 	cargo fmt --all --check
@@ -64,7 +63,7 @@ test: ## set up, then check formatting, lints, tests and documentation; needs on
 	cargo test --workspace --locked
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --document-private-items --locked
 
-audit: ## check the licences, sources and bans of all dependencies (deny.toml)
+audit: ## check the licenses, sources and bans of all dependencies (deny.toml)
 	@$(PYTHON) scripts/setup.py checkers
 	$(CARGO_DENY) bans licenses sources
 

@@ -31,6 +31,7 @@ mod recording;
 mod report;
 mod run;
 mod scene;
+mod scene_camera;
 mod snapshot;
 mod store;
 mod sums;

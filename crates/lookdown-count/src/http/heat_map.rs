@@ -15,11 +15,14 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::{
-    counts::unknown_parameter,
+    counts::unusable_query,
     shared::{Shared, blocking, check_known, query},
     time::TimeParameters,
 };
-use crate::sums::{DAY_MS, MINUTE_MS, Owner};
+use crate::{
+    now::time_of,
+    sums::{DAY_MS, MINUTE_MS, Owner},
+};
 
 /// Most cells along a side of an answer: those with the most time decide.
 const MAX_SIDE: i64 = 400;
@@ -33,7 +36,7 @@ struct HeatMap {
     from: Timestamp,
     to: Timestamp,
     cell_m: f64,
-    /// The corner with the least x and y, metres on the floor of the camera or the site.
+    /// The corner with the least x and y, meters on the floor of the camera or the site.
     origin_m: [f64; 2],
     /// Seconds of presence, row by row from the least y on.
     seconds: Vec<Vec<f64>>,
@@ -115,10 +118,7 @@ pub(super) async fn png_of_site(
 
 async fn heat_map(api: &Shared, owner: Owner, parameters: Parameters) -> Result<HeatMap, Problem> {
     let (time, cells) = stored(api, owner, parameters).await?;
-    let day = |milliseconds: i64| {
-        let time = Timestamp::from_millisecond(milliseconds.div_euclid(DAY_MS) * DAY_MS);
-        time.unwrap_or(Timestamp::UNIX_EPOCH)
-    };
+    let day = |milliseconds: i64| time_of(milliseconds.div_euclid(DAY_MS) * DAY_MS);
     let (origin, seconds) = blocking(move || Ok(grid(&cells))).await?;
     Ok(HeatMap {
         from: day(time.0),
@@ -135,7 +135,7 @@ pub(super) async fn stored(
     owner: Owner,
     parameters: Parameters,
 ) -> Result<((i64, i64), BTreeMap<Cell, u64>), Problem> {
-    let Query(parameters) = parameters.map_err(|_| unknown_parameter())?;
+    let Query(parameters) = parameters.map_err(|refused| unusable_query(&refused))?;
     let span = parameters.span()?;
     check_known(api, &owner).await?;
     let time = (span.from * MINUTE_MS, span.to * MINUTE_MS);
@@ -237,7 +237,7 @@ fn encoded(pixels: &[u8], width: usize, height: usize) -> Result<Vec<u8>, png::E
     Ok(file)
 }
 
-/// Returns the colour of a time of presence, with the most of any cell.
+/// Returns the color of a time of presence, with the most of any cell.
 pub(super) fn colour(seconds: f64, most: f64) -> [u8; 4] {
     if seconds <= 0.0 {
         return [0; 4];

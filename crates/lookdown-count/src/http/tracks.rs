@@ -12,10 +12,15 @@ use lookdown_tracking::{Plane, TailPoint, Track};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::shared::{Shared, check_known, now_ms};
+use super::{
+    furniture::{Thing, things},
+    shared::{Shared, check_known, now_ms, rounded},
+};
 use crate::{
     engine::Engine,
-    scene::{Scene, SceneCamera},
+    now::time_of,
+    scene::Scene,
+    scene_camera::SceneCamera,
     snapshot::{LineSnapshot, ZoneSnapshot},
     sums::Owner,
 };
@@ -40,6 +45,9 @@ pub(super) struct Tracks {
     lines: Vec<LineRow>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     zones: Vec<ZoneRow>,
+    /// The things that stand in the frame of the camera, furniture and candidates.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    furniture: Vec<Thing>,
 }
 
 /// A line of a camera.
@@ -64,12 +72,12 @@ struct ZoneRow {
     outline_px: Option<Vec<[f64; 2]>>,
 }
 
-/// A track. Places are on the floor in metres, or in frame pixels of the camera.
+/// A track. Places are on the floor in meters, or in frame pixels of the camera.
 #[derive(Serialize, ToSchema)]
 struct TrackRow {
     id: u64,
-    first_seen: Option<Timestamp>,
-    last_seen: Option<Timestamp>,
+    first_seen: Timestamp,
+    last_seen: Timestamp,
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     floor_m: Option<[f64; 2]>,
@@ -143,9 +151,7 @@ fn tracks(engine: &Engine, scene: &Scene, camera: Option<&str>) -> Tracks {
         .map(|camera| (camera.lines, camera.zones))
         .unwrap_or_default();
     Tracks {
-        last_report: presence
-            .last_ms
-            .and_then(|last_ms| Timestamp::from_millisecond(last_ms).ok()),
+        last_report: presence.last_ms.map(time_of),
         tracks: seen
             .filter(|_| is_current)
             .map(|track| row(track, of_camera.map(|(_, camera)| camera)))
@@ -153,6 +159,7 @@ fn tracks(engine: &Engine, scene: &Scene, camera: Option<&str>) -> Tracks {
         is_current,
         lines: of_camera.map_or_else(Vec::new, |(_, camera)| line_rows(camera, &lines)),
         zones: of_camera.map_or_else(Vec::new, |(_, camera)| zone_rows(camera, &zones)),
+        furniture: camera.map_or_else(Vec::new, |camera| things(scene, camera)),
     }
 }
 
@@ -165,6 +172,7 @@ impl Tracks {
             tracks: Vec::new(),
             lines: Vec::new(),
             zones: Vec::new(),
+            furniture: Vec::new(),
         }
     }
 }
@@ -258,12 +266,8 @@ fn row(track: &Track, camera: Option<&SceneCamera>) -> TrackRow {
     }
 }
 
-fn rounded(place: [f64; 2]) -> [f64; 2] {
-    place.map(|value| (value * 1000.0).round() / 1000.0)
-}
-
-fn time(seconds: f64) -> Option<Timestamp> {
+fn time(seconds: f64) -> Timestamp {
     #[expect(clippy::cast_possible_truncation, reason = "times of reports")]
     let milliseconds = (seconds * 1000.0).round() as i64;
-    Timestamp::from_millisecond(milliseconds).ok()
+    time_of(milliseconds)
 }

@@ -9,9 +9,9 @@ use std::{
 use base64::{Engine as _, engine::general_purpose::STANDARD};
 use jiff::Timestamp;
 use lookdown_common::{
-    AbortOnDrop, ClientError, LogOnce, ServerClient, client_builder, text::with_causes,
+    AbortOnDrop, ClientError, HttpClient, LogOnce, ServerClient, text::with_causes,
 };
-use reqwest::{Client, StatusCode, Url, header::CONTENT_TYPE};
+use reqwest::{StatusCode, Url, header::CONTENT_TYPE};
 use serde_json::{Value, json};
 use tokio::{
     sync::mpsc::{self, error::TrySendError},
@@ -48,7 +48,7 @@ pub(crate) struct Deliveries {
 
 /// A receiver of messages.
 struct Receiver {
-    client: Client,
+    client: HttpClient,
     key: SigningKey,
     url: Url,
     /// The scheme, the host and the port: the path may be a secret.
@@ -82,7 +82,7 @@ impl Deliveries {
         store: &Store,
         metrics: &Arc<Metrics>,
     ) -> Result<Self, ClientError> {
-        let client = client_builder().timeout(TIMEOUT).build()?;
+        let client = HttpClient::new(None)?;
         let with_image = webhooks.iter().filter(|webhook| webhook.with_image);
         let images = Images {
             server: server.clone(),
@@ -195,13 +195,14 @@ impl Receiver {
         let request = self
             .client
             .post(self.url.clone())
+            .timeout(TIMEOUT)
             .header(CONTENT_TYPE, "application/json")
             .header("webhook-id", id)
             .header("webhook-timestamp", timestamp_s)
             .header("webhook-signature", signature)
             .body(body.to_owned());
         let address = &self.address;
-        match request.send().await {
+        match self.client.send(request).await {
             Ok(response) if response.status().is_success() => Attempt::Delivered,
             Ok(response) if response.status() == StatusCode::GONE => Attempt::Refused(format!(
                 "the webhook at {address} answered 410 Gone: remove it from the settings"
@@ -212,7 +213,7 @@ impl Receiver {
             )),
             Err(error) => Attempt::Failed(format!(
                 "the webhook at {address} cannot be reached: {}: start it, or correct its URL",
-                with_causes(&error.without_url())
+                with_causes(&error)
             )),
         }
     }

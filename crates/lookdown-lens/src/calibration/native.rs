@@ -8,6 +8,7 @@ mod source;
 
 use std::{collections::BTreeMap, str::FromStr};
 
+use lookdown_common::StoredFile;
 use serde::{Deserialize, Serialize};
 
 pub use areas::{NativeLine, NativeMask, NativePlace, NativeZone};
@@ -20,6 +21,9 @@ use crate::geometry::lens::LensModel;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NativeCalibration {
+    /// The version of the format; 1 if absent.
+    #[serde(default = "first", skip_serializing_if = "is_first")]
+    pub version: u8,
     /// The calibration's ID, `[a-z0-9][a-z0-9_-]{0,63}`.
     pub id: String,
     /// The size of the frames it was made for.
@@ -57,6 +61,7 @@ impl NativeCalibration {
     #[must_use]
     pub fn new(id: String, image: NativeImage, lens: LensModel) -> Self {
         Self {
+            version: StoredFile::Calibration.version(),
             id,
             image,
             lens,
@@ -70,6 +75,18 @@ impl NativeCalibration {
             sources: BTreeMap::new(),
         }
     }
+}
+
+/// The version of a file without one.
+const FIRST: u8 = 1;
+
+const fn first() -> u8 {
+    FIRST
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "the shape serde needs")]
+const fn is_first(version: &u8) -> bool {
+    *version == FIRST
 }
 
 /// A frame size.
@@ -107,13 +124,13 @@ pub struct NotAFrameSize;
 pub struct NativeMount {
     /// The direction of up in the camera frame, a unit vector.
     pub world_up: [f64; 3],
-    /// Metres above the floor.
+    /// Meters above the floor.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub height_m: Option<f64>,
     /// The name of the site whose floor several cameras share.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub site: Option<String>,
-    /// The floor point below the camera, in metres of the site.
+    /// The floor point below the camera, in meters of the site.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub position_m: Option<[f64; 2]>,
     /// The angle from the x axis of the site to that of the camera's floor, in degrees from x to y.

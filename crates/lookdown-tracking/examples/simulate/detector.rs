@@ -18,7 +18,7 @@ use crate::{
 
 /// Side of the frame, pixels.
 pub const FRAME_PX: f64 = 1280.0;
-/// Radius of a person, metres.
+/// Radius of a person, meters.
 const BODY_RADIUS_M: f64 = 0.25;
 /// Time over which scores and places stay wrong, seconds, and the share of the variance that does.
 const CORRELATION_S: f64 = 1.0;
@@ -229,6 +229,7 @@ impl Camera {
                 azimuth_deg: (seen.azimuth.to_degrees() + 90.0).rem_euclid(360.0),
                 off_axis_deg: seen.off_axis.to_degrees(),
                 centre_px: [oriented.center.x, oriented.center.y],
+                size_px: [oriented.width, oriented.height],
                 foot_px: [foot.x, foot.y],
                 score,
                 is_in_margin: false,

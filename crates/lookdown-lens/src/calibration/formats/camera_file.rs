@@ -15,7 +15,7 @@ use crate::{
 /// The content of a calibration file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibrationFile {
-    /// The format that was recognised.
+    /// The format that was recognized.
     pub format: Format,
     /// Its cameras, in the file's order; at least one.
     pub cameras: Vec<FileCamera>,
@@ -78,9 +78,6 @@ impl Camera {
     #[must_use]
     pub fn to_native(&self, id: String, image: NativeImage) -> NativeCalibration {
         NativeCalibration {
-            id,
-            image,
-            lens: self.lens.clone(),
             mount: self.mount.clone(),
             zones: self.zones.clone(),
             lines: self.lines.clone(),
@@ -89,6 +86,7 @@ impl Camera {
             ignore: self.ignore.clone(),
             detect: self.detect.clone(),
             sources: self.sources.clone(),
+            ..NativeCalibration::new(id, image, self.lens.clone())
         }
     }
 }
