@@ -1,6 +1,6 @@
 //! `lookdown run`
 
-use std::{process::ExitCode, sync::Arc};
+use std::{fs, process::ExitCode, sync::Arc};
 
 use anyhow::{Context, bail};
 use clap::Args;
@@ -24,7 +24,7 @@ use crate::{
     api::{Companions, Readiness},
     cameras::Cameras,
     probe,
-    settings::{CAMERA_VARIABLE, Settings, environment},
+    settings::{CAMERA_VARIABLE, CalibrationPlace, Settings, environment},
 };
 
 /// The name of the key with which cameras and counts use the server of this process.
@@ -81,6 +81,7 @@ pub(super) fn run(arguments: &Arguments, commit: Option<&str>) -> anyhow::Result
         settings.server.listen.set_port(port);
     }
     check(&settings)?;
+    create_calibrations(&settings);
     let key = own_key(&mut settings)?;
     let runtime = runtime::Builder::new_multi_thread()
         .worker_threads(RUNTIME_THREADS)
@@ -116,6 +117,17 @@ fn check(settings: &Settings) -> anyhow::Result<()> {
         );
     }
     Ok(())
+}
+
+/// Creates the folder of calibrations in an existing folder, such as a new volume: the page saves
+/// calibrations there. If it cannot be created, the start names the setting.
+fn create_calibrations(settings: &Settings) {
+    if let CalibrationPlace::Folder(folder) = &settings.calibrations.path
+        && folder.is_absolute()
+        && settings.calibrations.writable
+    {
+        let _ = fs::create_dir(folder);
+    }
 }
 
 /// Adds a key of this process to those of the settings, if requests need keys. It is in memory only.

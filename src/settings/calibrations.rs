@@ -16,7 +16,8 @@ settings! {
     #[derive(Debug, Clone, PartialEq)]
     pub struct CalibrationSettings in "calibrations" {
         /// The folder of calibration files (docs/calibrate.md). The default folder may be missing,
-        /// any other must exist. Or the URL of a bucket: `s3://bucket/prefix`, `gs://bucket/prefix`
+        /// any other must exist; `lookdown run` creates one with an absolute path in an existing
+        /// folder. Or the URL of a bucket: `s3://bucket/prefix`, `gs://bucket/prefix`
         /// or `az://container/prefix`; its credentials come from the provider's variables, such as
         /// `AWS_ACCESS_KEY_ID`.
         path: CalibrationPlace = CalibrationPlace::Folder(DEFAULT_CALIBRATIONS.into()) => place();

@@ -83,3 +83,16 @@ pub(super) fn ignored(
         format!("these variables are not settings and are ignored: {names}")
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_other_variables_are_reported_as_ignored() {
+        let names = |names: &[&str]| names.iter().map(ToString::to_string).collect::<Vec<_>>();
+        assert_eq!(ignored(names(&[CAMERA_VARIABLE, "PATH"]), &[]), None);
+        let found = ignored(names(&[CAMERA_VARIABLE, "LOOKDOWN_PORT"]), &[]).unwrap();
+        assert!(found.ends_with("ignored: LOOKDOWN_PORT"), "{found}");
+    }
+}

@@ -192,8 +192,18 @@ fn a_variable_has_the_source_of_a_camera() {
     let store = folder.path().join("counts.sqlite");
     let arguments = ["run", "--every", "200ms", "--profile", "fast", "--store"];
     let arguments = [&arguments[..], &[store.to_str().unwrap()]].concat();
-    let running = Running::start(&arguments, &[("LOOKDOWN_CAMERA", frames.to_str().unwrap())]);
+    let calibrations = folder.path().join("calibrations");
+    let variables = [
+        ("LOOKDOWN_CAMERA", frames.to_str().unwrap()),
+        (
+            "LOOKDOWN__CALIBRATIONS__PATH",
+            calibrations.to_str().unwrap(),
+        ),
+    ];
+    let running = Running::start(&arguments, &variables);
     running.until("/counts", "", "\"camera\"", drop_frames(&frames));
+    // As in a new volume.
+    assert!(calibrations.is_dir());
     running.interrupt();
     // Without a camera, flags of a camera are refused, as without the variable.
     let refused = lookdown(&arguments, &[("LOOKDOWN_CAMERA", "")]);
