@@ -122,12 +122,13 @@ class ContainerImage(unittest.TestCase):
                 self.assertIn(b"<title>Lookdown</title>", server.get("/"))
 
                 def cameras(server=server) -> list:
-                    return json.loads(server.get("/counts"))["cameras"]
+                    return json.loads(server.get("/counts"))
 
                 wait_until(cameras, "the camera is counted", 60)
                 self.assertEqual([counted["name"] for counted in cameras()], ["camera"])
                 (shown,) = json.loads(server.get("/cameras"))
                 self.assertEqual((shown["name"], shown["problem"]), ("camera", None))
+                wait_until(lambda server=server: json.loads(server.get("/results")), "a frame is detected", 60)
                 report = json.loads(server.get("/results/camera/latest"))
                 self.assertGreater(len(report["persons"]), 3)
                 server.process.terminate()
