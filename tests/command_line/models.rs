@@ -4,7 +4,7 @@ use std::{
     fs,
     io::{Cursor, Read, Write},
     net::TcpListener,
-    path::Path,
+    path::{Path, PathBuf},
     thread,
 };
 
@@ -44,24 +44,32 @@ fn listed(repository: &Path) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// Answers one request with the weights. Returns the address and the path of the request.
-fn server() -> (String, thread::JoinHandle<String>) {
+/// Answers each request with the weights after this number of redirections. Returns the address, and
+/// the paths of the requests once the last one is answered.
+fn server(redirections: usize, location: &str) -> (String, thread::JoinHandle<Vec<String>>) {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = format!("http://{}/converted/", listener.local_addr().unwrap());
+    let moved = format!(
+        "HTTP/1.1 302 Found\r\nLocation: {location}\r\nContent-Length: 0\r\nConnection: close\r\n\r\n"
+    );
+    let found = format!(
+        "HTTP/1.1 200 OK\r\nContent-Length: {}\r\nConnection: close\r\n\r\n",
+        WEIGHTS.len()
+    );
+    let answers =
+        std::iter::repeat_n(moved.into_bytes(), redirections)
+            .chain([[found.as_bytes(), WEIGHTS].concat()]);
     let served = thread::Builder::new().name("file-server".to_owned());
     let served = served.spawn(move || {
-        let (mut stream, _) = listener.accept().unwrap();
-        let mut request = [0; 4096];
-        let length = stream.read(&mut request).unwrap();
-        let head = format!(
-            "HTTP/1.1 200 OK\r\nContent-Length: {}\r\n\r\n",
-            WEIGHTS.len()
-        );
-        stream
-            .write_all(&[head.as_bytes(), WEIGHTS].concat())
-            .unwrap();
-        let request = String::from_utf8_lossy(&request[..length]).into_owned();
-        request.split(' ').nth(1).unwrap().to_owned()
+        let answer_one = |answer: Vec<u8>| {
+            let (mut stream, _) = listener.accept().unwrap();
+            let mut request = [0; 4096];
+            let length = stream.read(&mut request).unwrap();
+            stream.write_all(&answer).unwrap();
+            let request = String::from_utf8_lossy(&request[..length]).into_owned();
+            request.split(' ').nth(1).unwrap().to_owned()
+        };
+        answers.map(answer_one).collect()
     });
     (address, served.unwrap())
 }
@@ -85,12 +93,40 @@ fn weights_are_fetched_from_a_folder() {
 
 #[test]
 fn weights_are_fetched_over_http() {
-    let (repository, (address, served)) = (repository(), server());
+    let (repository, (address, served)) = (repository(), server(0, ""));
     let output = fetch(repository.path(), "tiny", &address);
     assert!(output.status.success(), "{output:?}");
-    assert_eq!(served.join().unwrap(), "/converted/tiny/model.onnx");
+    assert_eq!(served.join().unwrap(), ["/converted/tiny/model.onnx"]);
     let weights = fs::read(repository.path().join("tiny/model.onnx"));
     assert_eq!(weights.unwrap(), WEIGHTS);
+}
+
+#[test]
+fn weights_are_fetched_from_another_path_of_the_same_host() {
+    let (repository, (address, served)) = (repository(), server(1, "/moved"));
+    let output = fetch(repository.path(), "tiny", &address);
+    assert!(output.status.success(), "{output:?}");
+    assert_eq!(
+        served.join().unwrap(),
+        ["/converted/tiny/model.onnx", "/moved"]
+    );
+}
+
+#[test]
+fn redirections_to_another_host_or_without_end_are_refused() {
+    let other = TcpListener::bind("127.0.0.1:0").unwrap();
+    other.set_nonblocking(true).unwrap();
+    let location = format!("http://{}/tiny/model.onnx", other.local_addr().unwrap());
+    let repository = repository();
+    let (address, _) = server(1, &location);
+    let output = fetch(repository.path(), "tiny", &address);
+    assert_fails_with(&output, &["redirects to another host"]);
+    assert!(other.accept().is_err(), "the other host got a request");
+    let (address, _) = server(100, "/moved");
+    let output = fetch(repository.path(), "tiny", &address);
+    assert_fails_with(&output, &["too many redirections"]);
+    let files = fs::read_dir(repository.path().join("tiny")).unwrap();
+    assert_eq!(files.count(), 1);
 }
 
 #[test]
@@ -109,42 +145,68 @@ fn other_weights_are_refused_and_change_nothing() {
     assert_fails_with(&unknown, &["huge", "tiny"]);
 }
 
-/// A folder with a network of random weights in the layout of YOLOX, without a manifest.
-fn yolox_without_manifest() -> TempDir {
+/// Networks of random weights, each in the layout of a family.
+fn families() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/models/families")
+}
+
+/// A folder with a copy of a network as `yolox_s.onnx`, without a manifest.
+fn without_manifest(network: &Path) -> TempDir {
     let folder = tempdir().unwrap();
-    let families = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/models/families");
-    let model = folder.path().join("yolox_s.onnx");
-    fs::copy(families.join("yolox/model.onnx"), model).unwrap();
+    fs::copy(network, folder.path().join("yolox_s.onnx")).unwrap();
     folder
 }
 
-#[test]
-fn check_writes_a_manifest_and_warns_without_a_person() {
-    let folder = yolox_without_manifest();
+fn write_manifest(folder: &TempDir) -> std::process::Output {
     let model = folder.path().join("yolox_s.onnx");
-    let write = [
-        "model",
-        "check",
-        "--write-manifest",
-        model.to_str().unwrap(),
-    ];
-    let output = lookdown(&write, &[]);
+    let model = model.to_str().unwrap();
+    lookdown(&["model", "check", "--write-manifest", model], &[])
+}
+
+#[test]
+fn manifests_of_random_networks_are_written_with_a_warning() {
+    let families = fs::read_dir(families()).unwrap();
+    let families: Vec<_> = families.map(|family| family.unwrap().path()).collect();
+    assert_eq!(families.len(), 6);
+    for family in families {
+        let folder = without_manifest(&family.join("model.onnx"));
+        let output = write_manifest(&folder);
+        let warning = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success(), "{warning}");
+        let message = "no input finds the persons of the samples";
+        assert!(warning.contains(message), "{family:?} {warning}");
+    }
+}
+
+#[test]
+fn manifest_of_a_network_that_detects_persons_has_its_input() {
+    let installed = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/nanodet_g_416/model.onnx");
+    let folder = without_manifest(&installed);
+    let output = write_manifest(&folder);
     let warning = String::from_utf8(output.stderr).unwrap();
     assert!(output.status.success(), "{warning}");
-    assert!(warning.contains("no plausible person"), "{warning}");
+    assert!(!warning.contains("no input"), "{warning}");
+    let printed = String::from_utf8(output.stdout).unwrap();
+    assert!(printed.contains("model.toml (rgb, 0 to 255)"), "{printed}");
+}
+
+#[test]
+fn a_manifest_is_written_once() {
+    let folder = without_manifest(&families().join("yolox/model.onnx"));
+    assert!(write_manifest(&folder).status.success());
     let written = fs::read_to_string(folder.path().join("model.toml")).unwrap();
     let manifest = "name = \"yolox_s\"\nonnx = \"yolox_s.onnx\"\n\n[input]\n\n[output]\nhead = \
                     \"yolox\"\nperson_class = 0\n";
     assert_eq!(written, manifest);
     assert_fails_with(
-        &lookdown(&write, &[]),
+        &write_manifest(&folder),
         &["--write-manifest", "model.toml exists"],
     );
 }
 
 #[test]
 fn folder_without_a_manifest_names_the_command_that_writes_it() {
-    let folder = yolox_without_manifest();
+    let folder = without_manifest(&families().join("yolox/model.onnx"));
     let output = lookdown(&["model", "check", folder.path().to_str().unwrap()], &[]);
     let model = folder.path().join("yolox_s.onnx");
     let command = format!("lookdown model check --write-manifest {}", model.display());

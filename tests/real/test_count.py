@@ -1,5 +1,6 @@
 """`lookdown count` with a real server and a real MQTT broker."""
 
+import base64
 import contextlib
 import http.server
 import json
@@ -104,7 +105,7 @@ class CountedCamera(unittest.TestCase):
         self.broker = self.enterContext(broker(self.folder))
         (self.port,) = free_ports(1)
         server = {"MODEL__PATH": "", "MQTT__URL": self.broker.url, "RESULTS__CAMERA_METRICS": "true"}
-        server["COUNTS__URL"] = f"http://127.0.0.1:{self.port}"
+        server |= {"RESULTS__PICTURES": "office", "COUNTS__URL": f"http://127.0.0.1:{self.port}"}
         self.server = self.enterContext(lookdown(server, calibrations=calibrations))
         password = self.folder / "password"
         password.write_text(PASSWORD + "\n", encoding="utf-8")
@@ -294,14 +295,18 @@ class Counts(CountedCamera):
         secret = self.folder / "hook.secret"
         secret.write_text(SECRET + "\n", encoding="utf-8")
         with open(self.settings, "a", encoding="utf-8") as settings:
-            settings.write(f'[[webhooks]]\nurl = "{url}"\nsecret_file = "{secret}"\non = "occupancy"\n')
+            settings.write(f'[[webhooks]]\nurl = "{url}"\nsecret_file = "{secret}"\non = "occupancy"\nimage = true\n')
         with self.counting() as count:
             wait_until(lambda: count.get("/counts") is not None, "lookdown count answers")
             self.send_frames()
             message = wait_until(lambda: received and received[0], "a webhook is received")
         right = verified(SECRET, message)
         self.assertEqual(0, right.returncode, right.stderr)
-        self.assertEqual("occupancy.reached", json.loads(right.stdout)["type"])
+        event = json.loads(right.stdout)
+        self.assertEqual("occupancy.reached", event["type"])
+        image = event["data"]["image"]
+        self.assertEqual("image/jpeg", image["media_type"])
+        self.assertTrue(base64.b64decode(image["base64"]).startswith(b"\xff\xd8"))
         changed = message | {"body": message["body"].replace("office", "0ffice")}
         for secret, wrong in ((OTHER_SECRET, message), (SECRET, changed)):
             refused = verified(secret, wrong)

@@ -16,6 +16,7 @@ mod definition;
 mod definition_key;
 mod drops;
 mod engine;
+mod event_image;
 mod event_parser;
 mod event_stream;
 mod follower;
@@ -36,6 +37,7 @@ mod store;
 mod sums;
 mod webhooks;
 
+pub use event_image::latest_image;
 pub use http::openapi_document;
 pub use options::{CountEntry, CountOptions, read_key};
 pub use recording::{Recording, RecordingError};

@@ -1,6 +1,7 @@
 //! The parts of a report of the server that are used.
 
 use jiff::Timestamp;
+use lookdown_common::text::is_invisible;
 use lookdown_lens::{calibration::CalibrationId, geometry::Pixel};
 use lookdown_tracking::Observation;
 use nalgebra::Vector2;
@@ -98,10 +99,11 @@ impl Report {
         }
     }
 
-    /// Returns true if the names are as long as the server permits at most.
+    /// Returns true if the server permits such names.
     pub(crate) fn has_valid_names(&self) -> bool {
         let used = &self.calibration;
-        self.camera.chars().count() <= MAX_CAMERA_CHARS
+        (1..=MAX_CAMERA_CHARS).contains(&self.camera.chars().count())
+            && !self.camera.contains(is_invisible)
             && (used.assumed || used.id.parse::<CalibrationId>().is_ok())
             && used.revision.len() <= MAX_REVISION_BYTES
     }
@@ -250,6 +252,8 @@ mod tests {
         };
         assert!(change(|_| ()));
         assert!(!change(|report| report.camera = "n".repeat(129)));
+        assert!(!change(|report| report.camera = String::new()));
+        assert!(!change(|report| report.camera = "\u{202e}llah".to_owned()));
         assert!(!change(
             |report| report.calibration.id = "../results".to_owned()
         ));

@@ -118,7 +118,7 @@ fn outgoing(client: &ServerClient, request: &Request) -> RequestBuilder {
 /// here.
 async fn forward(client: &ServerClient, outgoing: RequestBuilder) -> Result<Response, Problem> {
     let answered = client.send(outgoing).await.map_err(|error| {
-        tracing::warn!("counts.url: {}", client.failure(error));
+        tracing::warn!("counts.url: {}", client.failure(&error));
         unavailable("the counts do not respond: the log of the server has the reason; retry")
     })?;
     let mut response = Response::new(Body::empty());
