@@ -4,7 +4,7 @@ use sha2::{Digest, Sha256};
 
 /// Longest name that is used unchanged in a topic.
 const MAX_CHARS: usize = 64;
-/// Characters that are kept of a name that is changed, to recognise it by.
+/// Characters that are kept of a name that is changed, to recognize it by.
 const RECOGNISABLE_CHARS: usize = 32;
 
 /// The names of topics.
@@ -118,7 +118,7 @@ impl Topics {
             .map(|rest| format!("{}/cameras/{rest}", self.prefix))
     }
 
-    /// Recognises a topic of a camera.
+    /// Recognizes a topic of a camera.
     pub(super) fn camera_topic<'a>(&self, topic: &'a str) -> Option<CameraTopic<'a>> {
         let (camera, rest) = self.below_cameras(topic)?;
         match rest {

@@ -119,6 +119,11 @@ impl HttpClient {
         self.requests.post(url)
     }
 
+    /// Starts a DELETE request.
+    pub fn delete(&self, url: Url) -> RequestBuilder {
+        self.requests.delete(url)
+    }
+
     /// Sends a request of this client. Its timeout includes the body of the response.
     ///
     /// # Errors

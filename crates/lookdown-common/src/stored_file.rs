@@ -13,7 +13,7 @@ pub enum StoredFile {
     Calibration,
     /// The cameras of `lookdown run` that are added over HTTP.
     Cameras,
-    /// The counts: `user_version` of an SQLite file.
+    /// The counts: `user_version` of the `SQLite` file.
     Counts,
     /// The state of a tracker in the counts: its first byte.
     Tracks,

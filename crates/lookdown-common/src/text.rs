@@ -8,7 +8,7 @@ const MAX_CHARS: usize = 64;
 const MAX_LINE_CHARS: usize = 300;
 
 /// Displays a text in quotation marks with its control characters escaped, cut after 64 characters:
-/// enough to recognise it, too short to fill a log.
+/// enough to recognize it, too short to fill a log.
 #[derive(Debug, Clone, Copy)]
 pub struct Quoted<'a>(pub &'a str);
 
@@ -40,6 +40,15 @@ pub fn is_invisible(character: char) -> bool {
                 | '\u{fff9}'..='\u{fffb}'
                 | '\u{e0000}'..='\u{e007f}'
         )
+}
+
+/// Most characters of the name of a camera.
+pub const MAX_CAMERA_CHARS: usize = 128;
+
+/// Returns true if a camera may have this name.
+#[must_use]
+pub fn is_camera_name(name: &str) -> bool {
+    (1..=MAX_CAMERA_CHARS).contains(&name.chars().count()) && !name.contains(is_invisible)
 }
 
 /// Formats a text as one line of at most 300 characters, so that it can neither forge nor fill log
@@ -85,6 +94,7 @@ mod tests {
     fn characters_that_reorder_a_line_are_replaced() {
         assert_eq!(one_line("a\u{202e}b\u{feff}c\nd"), "a b c d");
         assert!(!is_invisible('ä') && !is_invisible('走') && !is_invisible(' '));
+        assert!(is_camera_name("Eingang, 2. OG") && !is_camera_name("\u{202e}llah"));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The parts of a report of the server that are used.
 
 use jiff::Timestamp;
-use lookdown_common::text::is_invisible;
+use lookdown_common::text::is_camera_name;
 use lookdown_lens::{calibration::CalibrationId, geometry::Pixel};
 use lookdown_tracking::Observation;
 use nalgebra::Vector2;
@@ -17,8 +17,7 @@ const MAX_BEHIND_MS: i64 = 3_600_000;
 const MAX_AHEAD_ON_SITE_MS: i64 = 500;
 const MAX_BEHIND_ON_SITE_MS: i64 = 1_000;
 
-/// The server's limits of names.
-const MAX_CAMERA_CHARS: usize = 128;
+/// The server's limit of revisions.
 const MAX_REVISION_BYTES: usize = 128;
 
 /// A report of the server.
@@ -102,8 +101,7 @@ impl Report {
     /// Returns true if the server permits such names.
     pub(crate) fn has_valid_names(&self) -> bool {
         let used = &self.calibration;
-        (1..=MAX_CAMERA_CHARS).contains(&self.camera.chars().count())
-            && !self.camera.contains(is_invisible)
+        is_camera_name(&self.camera)
             && (used.assumed || used.id.parse::<CalibrationId>().is_ok())
             && used.revision.len() <= MAX_REVISION_BYTES
     }
