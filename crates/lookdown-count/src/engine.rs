@@ -311,7 +311,7 @@ impl Engine {
         if is_full || site.is_some_and(|site| site.cameras.len() >= MAX_CAMERAS) {
             return None;
         }
-        let furniture = self.furniture(camera).cloned();
+        let furniture = self.furniture_for(camera, definition);
         if let Some(before) = before {
             self.rebuild(&before, |cameras| drop(cameras.remove(camera)));
         }

@@ -116,7 +116,8 @@ impl Scene {
                 continue;
             };
             camera.last_report = before.last_report;
-            let kept = other.tracker.furniture(known);
+            let is_same = before.definition.has_frames_of(&camera.definition);
+            let kept = other.tracker.furniture(known).filter(|_| is_same);
             if let (Some(kept), Some(own)) = (kept, self.tracker.furniture_mut(index)) {
                 own.clone_from(kept);
             }
