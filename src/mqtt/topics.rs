@@ -89,12 +89,12 @@ impl Topics {
         format!("{}/set", self.detection(camera))
     }
 
-    /// Filters for the topics that [`Topics::switch_topic`] recognises.
+    /// Filters for the topics that [`Topics::switch_topic`] recognizes.
     pub(super) fn switch_filters(&self) -> [String; 2] {
         ["+/detection", "+/detection/set"].map(|rest| format!("{}/cameras/{rest}", self.prefix))
     }
 
-    /// Recognises a topic of a camera's switch.
+    /// Recognizes a topic of a camera's switch.
     pub(super) fn switch_topic<'a>(&self, topic: &'a str) -> Option<SwitchTopic<'a>> {
         let (camera, rest) = self.below_cameras(topic)?;
         match rest {
@@ -112,7 +112,7 @@ impl Topics {
         topic.split_once('/')
     }
 
-    /// Filters for the topics that [`Topics::camera_topic`] recognises.
+    /// Filters for the topics that [`Topics::camera_topic`] recognizes.
     pub(super) fn camera_filters(&self) -> [String; 3] {
         ["+/persons", "+/availability", "+/zones/+"]
             .map(|rest| format!("{}/cameras/{rest}", self.prefix))
