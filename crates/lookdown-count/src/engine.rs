@@ -311,7 +311,7 @@ impl Engine {
         if is_full || site.is_some_and(|site| site.cameras.len() >= MAX_CAMERAS) {
             return None;
         }
-        let furniture = self.furniture(camera).cloned();
+        let furniture = self.furniture_for(camera, definition);
         if let Some(before) = before {
             self.rebuild(&before, |cameras| drop(cameras.remove(camera)));
         }
@@ -367,13 +367,9 @@ impl Engine {
         let cameras = cameras.into_iter().collect();
         match Scene::new(owner.clone(), cameras) {
             Ok(mut scene) => {
-                for camera in &mut scene.cameras {
-                    let before = before
-                        .as_ref()
-                        .and_then(|before| before.camera(&camera.name));
-                    camera.last_report = before.and_then(|(_, before)| before.last_report);
+                if let Some(before) = before {
+                    scene.continue_from(&before);
                 }
-                scene.keep_furniture(before.as_ref());
                 self.scenes.insert(owner.clone(), scene);
             }
             Err(problem) => tracing::warn!("{owner:?} is not followed: {problem}"),

@@ -109,11 +109,15 @@ impl Scene {
         self.cameras[camera].redefine(definition);
     }
 
-    /// Takes the furniture of the cameras of another scene.
-    pub(crate) fn keep_furniture(&mut self, other: Option<&Self>) {
-        let names: Vec<String> = self.cameras.iter().map(|one| one.name.clone()).collect();
-        for (index, name) in names.iter().enumerate() {
-            let kept = other.and_then(|other| other.furniture(name));
+    /// Takes the furniture and the last reports of another scene's cameras.
+    pub(crate) fn continue_from(&mut self, other: &Self) {
+        for (index, camera) in self.cameras.iter_mut().enumerate() {
+            let Some((known, before)) = other.camera(&camera.name) else {
+                continue;
+            };
+            camera.last_report = before.last_report;
+            let is_same = before.definition.has_frames_of(&camera.definition);
+            let kept = other.tracker.furniture(known).filter(|_| is_same);
             if let (Some(kept), Some(own)) = (kept, self.tracker.furniture_mut(index)) {
                 own.clone_from(kept);
             }

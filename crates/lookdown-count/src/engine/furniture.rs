@@ -3,6 +3,7 @@
 use lookdown_tracking::furniture::Furniture;
 
 use super::Engine;
+use crate::definition::CameraDefinition;
 
 impl Engine {
     /// Returns the furniture of a camera.
@@ -22,6 +23,17 @@ impl Engine {
         self.changed.insert(owner);
         (self.has_news, self.is_urgent) = (true, true);
         Some(changed)
+    }
+
+    /// Returns the furniture of a camera for frames of this definition: none if their size differs.
+    pub(super) fn furniture_for(
+        &self,
+        camera: &str,
+        definition: &CameraDefinition,
+    ) -> Option<Furniture> {
+        let known = self.definition(camera)?;
+        let has_frames = known.has_frames_of(definition);
+        Some(self.furniture(camera).filter(|_| has_frames)?.clone())
     }
 
     /// Puts furniture of another scene into that of the camera now.

@@ -171,6 +171,23 @@ fn furniture_taken_back_counts_again() {
 }
 
 #[test]
+fn furniture_is_forgotten_with_frames_of_another_size() {
+    for mount in ["", r#", "site": "ground", "position_m": [4, 2]"#] {
+        let mut hall = Hall::with_furniture();
+        let mut larger = report(0, 1);
+        larger.image.width = 2000;
+        larger.image.height = 2000;
+        hall.definition = definition(&larger, mount);
+        hall.follow(10, Duration::from_secs(1));
+        assert_eq!(
+            (hall.states(), hall.persons()),
+            (vec![], Some(1)),
+            "{mount}"
+        );
+    }
+}
+
+#[test]
 fn furniture_stays_when_the_camera_joins_a_site() {
     let mut hall = Hall::with_furniture();
     for mount in [r#", "site": "ground", "position_m": [4, 2]"#, ""] {
