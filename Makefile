@@ -36,8 +36,7 @@ serve: ## download ONNX Runtime and the default models, build what a first look 
 	@$(PYTHON) scripts/setup.py runtime model & trap 'kill $$!; exit 130' INT; \
 		cargo build --profile quick --locked --target-dir target
 	@$(PYTHON) scripts/setup.py runtime model
-	@# Makes glibc return the memory of replaced models: docs/models.md.
-	@MALLOC_MMAP_THRESHOLD_=131072 exec target/quick/lookdown serve
+	@exec target/quick/lookdown serve
 
 check: ## check formatting and lints and run the unit tests; without network once the crates are there
 	cargo fmt --all --check
@@ -89,11 +88,12 @@ release: deb wheel sbom ## build every artifact of a release with its sums: targ
 	cp target/dist/*.tar.* target/deb/*.deb target/wheels/*.whl target/lookdown.cdx.json target/release-files
 	cd target/release-files && sha256sum -- * > SHA256SUMS
 
-image: ## build the container image from source with docker, or with ENGINE=podman or buildah
+image: ## build the container image from source with docker, or with ENGINE=podman or buildah; TARGET=serve without ffmpeg
 	$(ENGINE) build $(if $(filter-out docker,$(ENGINE)),--format docker) --file docker/Dockerfile \
 		--build-arg PROGRAM=built --build-arg LOOKDOWN_COMMIT=$(LOOKDOWN_COMMIT) \
 		--build-arg CREATED=$$(date --utc --date=@$(SOURCE_DATE_EPOCH) +%Y-%m-%dT%H:%M:%SZ) \
-		--build-arg SOURCE_URL=$(SOURCE_URL) --tag lookdown:$(VERSION) .
+		--build-arg SOURCE_URL=$(SOURCE_URL) $(if $(TARGET),--target $(TARGET)) \
+		--tag lookdown$(if $(TARGET),-$(TARGET)):$(VERSION) .
 
 wheel: ## build the Python wheel: target/wheels
 	@$(PYTHON) scripts/setup.py toolchain model wheel

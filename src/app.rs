@@ -24,6 +24,7 @@ use crate::{
     access::AccessKeys,
     api::{self, Access, ApiOptions, ApiState, Companions, Readiness, RequestRate},
     calibration_store::{BucketStore, CalibrationStore, Calibrations, FolderStore},
+    cameras::Cameras,
     metrics::Metrics,
     mqtt::Publisher,
     results::{MemoryResults, RedisResults, ResultStore},
@@ -192,10 +193,12 @@ impl App {
             Some(options) => Some(Arc::new(Tls::open(options, Arc::clone(&metrics))?)),
             None => None,
         };
-        let publisher = settings
-            .mqtt
-            .clone()
-            .map(|options| Publisher::new(options, Arc::clone(&results), Arc::clone(&metrics)));
+        let publisher = settings.mqtt.clone().map(|mut options| {
+            if options.image_every.is_some() {
+                options.discovery.images = settings.results.pictures_of.clone();
+            }
+            Publisher::new(options, Arc::clone(&results), Arc::clone(&metrics))
+        });
         let access = match &keys {
             Some(keys) => Access::Keys(Arc::clone(keys)),
             None => Access::Open {
@@ -261,6 +264,14 @@ impl App {
     #[must_use]
     pub fn companions(&self) -> Companions {
         self.companions.clone()
+    }
+
+    /// Answers requests to `/cameras` with these cameras, and publishes a switch for each to MQTT.
+    pub fn set_cameras(&mut self, cameras: &Arc<Cameras>) {
+        self.companions.set_cameras(Arc::clone(cameras));
+        if let Some(publisher) = &mut self.publisher {
+            publisher.add_switches(Arc::clone(cameras));
+        }
     }
 
     /// Returns the connection of parts of this process to the server.

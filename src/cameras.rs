@@ -1,24 +1,25 @@
 //! The cameras of `lookdown run` that are added over HTTP: a file in the state folder, with each
 //! password in a file of its own, and the states of all cameras.
 
+mod error;
+mod state_folder;
+
 use std::{
-    collections::BTreeMap,
-    fs, io,
-    io::Write,
-    os::unix::fs::{DirBuilderExt, OpenOptionsExt},
-    path::{Path, PathBuf},
+    collections::{BTreeMap, BTreeSet},
+    path::PathBuf,
     sync::Arc,
     time::Duration,
 };
 
-use lookdown_common::{ConfigError, Secret, StoredFile, plain_name, read_file};
-use lookdown_watch::{
-    CameraEntry, CameraState, Frame, Location, Metrics, SourceError, first_frame,
-};
+use lookdown_common::{ConfigError, Secret, StoredFile, plain_name};
+use lookdown_watch::{CameraEntry, CameraState, Frame, Location, Metrics, first_frame};
 use parking_lot::{Mutex, RwLock};
 use secrecy::ExposeSecret;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
+use state_folder::StateFolder;
+
+pub use error::CameraError;
 
 /// Longest wait for the frame of a test.
 const TEST_TIMEOUT: Duration = Duration::from_secs(15);
@@ -28,8 +29,8 @@ const TEST: &str = "test";
 const MAX_CAMERAS: usize = 256;
 /// The file of the cameras in the state folder.
 const FILE: &str = "cameras.json";
-/// The folder of the passwords in the state folder.
-const PASSWORDS: &str = "passwords";
+/// The file with the names of the cameras of the settings that are paused, in the state folder.
+const PAUSED: &str = "paused.json";
 
 /// A camera as it is stored, without its password.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -58,26 +59,14 @@ impl StoredCamera {
     /// Returns the source without its query, which may hold a token.
     #[must_use]
     pub fn shown_source(&self) -> String {
-        let location = Location::parse(&self.url);
-        location.map_or_else(|_| String::new(), |(location, _)| location.to_string())
+        shown_source(&self.url)
     }
 }
 
-/// A camera that cannot be stored or removed.
-#[derive(Debug, thiserror::Error)]
-pub enum CameraError {
-    /// A value that cannot be used.
-    #[error(transparent)]
-    Invalid(#[from] ConfigError),
-    /// A camera of the settings file.
-    #[error("{0}: this camera is in the settings file: change it there")]
-    Configured(String),
-    /// The state folder cannot be used.
-    #[error("state.path: {0} cannot be written: {1}")]
-    Folder(PathBuf, #[source] io::Error),
-    /// The camera gives no frame.
-    #[error(transparent)]
-    Source(#[from] SourceError),
+/// Returns a source without its credentials and its query, which may hold a token.
+fn shown_source(url: &str) -> String {
+    let location = Location::parse(url);
+    location.map_or_else(|_| String::new(), |(location, _)| location.to_string())
 }
 
 /// Stored cameras by name.
@@ -93,7 +82,7 @@ struct CameraFile<'a> {
 
 /// The cameras of this process.
 pub struct Cameras {
-    folder: PathBuf,
+    folder: StateFolder,
     /// Locked while the file is changed.
     changing: Mutex<()>,
     /// The cameras of the settings file and the command line.
@@ -106,7 +95,7 @@ impl Cameras {
     #[must_use]
     pub fn new(folder: PathBuf, metrics: Arc<Metrics>) -> Self {
         Self {
-            folder,
+            folder: StateFolder::new(folder),
             changing: Mutex::default(),
             configured: RwLock::default(),
             metrics,
@@ -125,7 +114,66 @@ impl Cameras {
         states
     }
 
-    /// Adds the stored cameras that are not paused to those of the settings, which have precedence.
+    /// Returns the paused cameras of the settings with their sources. Blocks.
+    ///
+    /// # Errors
+    /// [`ConfigError`].
+    pub fn paused_of_settings(&self) -> Result<BTreeMap<String, String>, ConfigError> {
+        let paused = self.paused()?;
+        let configured = self.configured.read();
+        let of_settings = configured.iter().filter(|(name, _)| paused.contains(*name));
+        let with_source = of_settings.map(|(name, entry)| {
+            let url = entry.url.as_deref().unwrap_or_default();
+            (name.clone(), shown_source(url))
+        });
+        Ok(with_source.collect())
+    }
+
+    /// Returns all cameras by name, and whether their frames are read. Blocks.
+    ///
+    /// # Errors
+    /// [`ConfigError`].
+    pub fn detection(&self) -> Result<BTreeMap<String, bool>, ConfigError> {
+        let stored = self.stored()?;
+        let mut states: BTreeMap<_, _> = stored
+            .into_iter()
+            .map(|(name, camera)| (name, !camera.paused))
+            .collect();
+        let paused = self.paused()?;
+        for name in self.configured.read().keys() {
+            states.insert(name.clone(), !paused.contains(name));
+        }
+        Ok(states)
+    }
+
+    /// Pauses a camera or resumes it; it stays so after a restart. Does nothing for an unknown
+    /// camera. Blocks.
+    ///
+    /// # Errors
+    /// [`CameraError`].
+    pub fn set_detection(&self, name: &str, is_on: bool) -> Result<(), CameraError> {
+        let _changing = self.changing.lock();
+        let configured: BTreeSet<_> = self.configured.read().keys().cloned().collect();
+        if configured.contains(name) {
+            let mut paused = self.paused()?;
+            // Names that the settings no longer have are dropped, so that the file stays small.
+            paused.retain(|paused| configured.contains(paused) && paused != name);
+            if !is_on {
+                paused.insert(name.to_owned());
+            }
+            let content = serde_json::to_string(&paused).unwrap_or_default();
+            return self.folder.write(&self.folder.file(PAUSED), &content);
+        }
+        let mut stored = self.stored()?;
+        let Some(camera) = stored.get_mut(name) else {
+            return Ok(());
+        };
+        camera.paused = !is_on;
+        self.store(&stored)
+    }
+
+    /// Adds the stored cameras that are not paused to those of the settings, which have precedence,
+    /// and removes those of the settings that are paused.
     ///
     /// # Errors
     /// [`ConfigError`] if the file of the cameras cannot be used. Blocks.
@@ -135,6 +183,11 @@ impl Cameras {
             Some((name, camera.clone()))
         });
         let configured: BTreeMap<_, _> = named.collect();
+        let paused = self.paused()?;
+        cameras.retain(|camera| {
+            let name = camera.name.as_ref().or(camera.calibration.as_ref());
+            name.is_none_or(|name| !paused.contains(name))
+        });
         for (name, camera) in self.stored()? {
             if !camera.paused && !configured.contains_key(&name) {
                 cameras.push(self.entry(&name, &camera));
@@ -149,23 +202,18 @@ impl Cameras {
     /// # Errors
     /// [`ConfigError`].
     pub fn stored(&self) -> Result<Stored, ConfigError> {
-        let path = self.folder.join(FILE);
-        if !path.exists() {
-            return Ok(Stored::new());
-        }
-        let content = read_file("state.path", &path)?;
-        let refused = |problem: String| {
-            let problem = format!("{} {problem}", path.display());
-            ConfigError::problem("state.path", &problem)
-        };
-        let not_cameras =
-            |error: serde_json::Error| refused(format!("is not a file of cameras: {error}"));
-        let mut cameras: Map<_, _> = serde_json::from_slice(&content).map_err(not_cameras)?;
+        let mut cameras: Map<String, Value> = self.folder.read(FILE)?;
         if let Some(version) = cameras.remove(StoredFile::KEY) {
             let checked = StoredFile::Cameras.check(&version.to_string());
-            checked.map_err(refused)?;
+            checked.map_err(|problem| self.folder.refused(FILE, &problem))?;
         }
-        Stored::deserialize(Value::Object(cameras)).map_err(not_cameras)
+        Stored::deserialize(Value::Object(cameras))
+            .map_err(|error| self.folder.malformed(FILE, &error))
+    }
+
+    /// Returns the names of the paused cameras of the settings, possibly also of earlier settings.
+    fn paused(&self) -> Result<BTreeSet<String>, ConfigError> {
+        self.folder.read(PAUSED)
     }
 
     /// Creates or replaces a camera, and returns true if it is new. Without a URL, the stored one
@@ -194,8 +242,10 @@ impl Cameras {
             before.user == camera.user && origin(&before.url) == origin(&camera.url)
         });
         match password {
-            Some(password) => self.write(&self.password(name), password.expose_secret())?,
-            None if !is_same_login => remove_file(&self.password(name))?,
+            Some(password) => self
+                .folder
+                .write(&self.folder.password(name), password.expose_secret())?,
+            None if !is_same_login => StateFolder::remove(&self.folder.password(name))?,
             None => {}
         }
         let is_new = stored.insert(name.to_owned(), camera).is_none();
@@ -217,7 +267,7 @@ impl Cameras {
             return Ok(false);
         }
         self.store(&stored)?;
-        remove_file(&self.password(name))?;
+        StateFolder::remove(&self.folder.password(name))?;
         Ok(true)
     }
 
@@ -278,15 +328,11 @@ impl Cameras {
 
     /// Returns the entry of a stored camera with the file of its password.
     fn entry(&self, name: &str, camera: &StoredCamera) -> CameraEntry {
-        let password = self.password(name);
+        let password = self.folder.password(name);
         CameraEntry {
             password_file: (camera.user.is_some() && password.exists()).then_some(password),
             ..entry(name, camera)
         }
-    }
-
-    fn password(&self, name: &str) -> PathBuf {
-        self.folder.join(PASSWORDS).join(name)
     }
 
     fn store(&self, stored: &Stored) -> Result<(), CameraError> {
@@ -294,29 +340,8 @@ impl Cameras {
             version: StoredFile::Cameras.version(),
             cameras: stored,
         });
-        let content = content.unwrap_or_default();
-        self.write(&self.folder.join(FILE), &content)
-    }
-
-    /// Writes a file that only this user can read: beside the old one, synced and renamed.
-    fn write(&self, path: &Path, content: &str) -> Result<(), CameraError> {
-        let unfinished = path.with_extension("part");
-        let written = || {
-            fs::DirBuilder::new()
-                .recursive(true)
-                .mode(0o700)
-                .create(self.folder.join(PASSWORDS))?;
-            let mut file = fs::OpenOptions::new()
-                .create(true)
-                .write(true)
-                .truncate(true)
-                .mode(0o600)
-                .open(&unfinished)?;
-            writeln!(file, "{content}")?;
-            file.sync_all()?;
-            fs::rename(&unfinished, path)
-        };
-        written().map_err(|error| CameraError::Folder(path.to_owned(), error))
+        self.folder
+            .write(&self.folder.file(FILE), &content.unwrap_or_default())
     }
 }
 
@@ -357,15 +382,5 @@ fn origin(url: &str) -> Option<(String, String, Option<u16>)> {
     Some((url.scheme().to_owned(), host, url.port_or_known_default()))
 }
 
-/// Removes a file, if it exists.
-fn remove_file(path: &Path) -> Result<(), CameraError> {
-    match fs::remove_file(path) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => {
-            Err(CameraError::Folder(path.to_owned(), error))
-        }
-        _ => Ok(()),
-    }
-}
-
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -6,11 +6,18 @@ use std::{
     process::{Command, ExitCode},
 };
 
-/// The variable that disables the telemetry of ONNX Runtime, which reads it when it is loaded.
-const NO_TELEMETRY: &str = "ORT_DISABLE_TELEMETRY";
+/// The variables that libraries read when they are loaded, and their values unless they are set: no
+/// telemetry of ONNX Runtime, and a malloc (glibc) that returns freed memory of this many bytes, so
+/// that the limits on memory hold for the process and not for its live objects only.
+const DEFAULTS: [(&str, &str); 2] = [
+    ("ORT_DISABLE_TELEMETRY", "1"),
+    ("MALLOC_MMAP_THRESHOLD_", "131072"),
+];
 
 fn main() -> ExitCode {
-    if env::var_os(NO_TELEMETRY).is_none() {
+    let is_unset = |(name, _): &(&str, &str)| env::var_os(name).is_none();
+    let missing: Vec<_> = DEFAULTS.into_iter().filter(is_unset).collect();
+    if !missing.is_empty() {
         let mut arguments = env::args_os();
         // Setting a variable in a process is not memory-safe, so the process is replaced by itself.
         // If that fails, as without /proc, the program runs with the variables it has. The path, not
@@ -18,7 +25,7 @@ fn main() -> ExitCode {
         let _ = Command::new(env::current_exe().unwrap_or_default())
             .arg0(arguments.next().unwrap_or_default())
             .args(arguments)
-            .env(NO_TELEMETRY, "1")
+            .envs(missing)
             .exec();
     }
     // `make dist` sets the commit. A source tarball has none.

@@ -12,11 +12,13 @@ mod connector;
 mod counts;
 mod discovery;
 mod entity;
+mod images;
 mod message;
 mod occupancy;
 mod publisher;
 mod retained;
 mod session;
+mod switches;
 mod topics;
 
 pub use broker::{Broker, BrokerError};

@@ -53,7 +53,7 @@ pub use results::ResultSettings;
 pub use server::{ServerSettings, ShutdownSettings};
 pub use state::StateSettings;
 pub use threads::ThreadPlan;
-pub use variables::environment;
+pub use variables::{CAMERA_VARIABLE, environment};
 
 pub(crate) use variables::variable_of;
 

@@ -3,6 +3,7 @@
 import { countRows, drawCounts } from "./counts_drawing.js";
 import { element, find, shape } from "./dom.js";
 import { options } from "./camera_states.js";
+import { furnitureList } from "./furniture.js";
 import { key } from "./server.js";
 
 /** The interval between two updates of the tracks. */
@@ -16,7 +17,7 @@ const HEAT_MILLIS = 60_000;
 
 /** The shown cards by camera. */
 const cards = new Map();
-/** The drawings by camera: `{drawing, rows, heat, heatAt}`. */
+/** The drawings by camera: `{drawing, rows, furniture, heat, heatAt}`. */
 const counted = new Map();
 let polling = null;
 const PATH = "counts";
@@ -88,7 +89,7 @@ async function load(camera, signal) {
   if (!answer) return remove(camera);
   if (!counted.has(camera)) {
     const drawing = shape("svg", { class: "counts", role: "img" });
-    counted.set(camera, { drawing, rows: element("ul", { class: "count-rows" }), answer, heat: "", heatAt: 0 });
+    counted.set(camera, { drawing, rows: element("ul", { class: "count-rows" }), furniture: furnitureList(camera), answer, heat: "", heatAt: 0 });
     attach(cards.get(camera));
   }
   counted.get(camera).answer = answer;
@@ -111,14 +112,15 @@ async function refresh(camera, signal = polling?.signal) {
   const { width, height } = card.report.image;
   drawCounts(counts.drawing, { camera, width, height, heat: bar.heat.checked ? counts.heat : "" }, counts.answer);
   counts.rows.replaceChildren(...countRows(counts.answer));
+  counts.furniture.show(counts.answer.furniture);
 }
 
 function attach(card) {
-  const { drawing, rows } = counted.get(card.camera);
+  const { drawing, rows, furniture } = counted.get(card.camera);
   card.node.classList.add("counted");
   const sight = find(".sight", card.node);
   sight.append(drawing);
-  sight.after(rows);
+  sight.after(rows, furniture.node);
 }
 
 function remove(camera) {
@@ -128,6 +130,7 @@ function remove(camera) {
   URL.revokeObjectURL(counts.heat);
   counts.drawing.remove();
   counts.rows.remove();
+  counts.furniture.node.remove();
   cards.get(camera)?.node.classList.remove("counted");
 }
 

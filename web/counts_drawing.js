@@ -11,18 +11,20 @@ const UNIT = 1 / 320;
 const ARROWS = ["→", "↘", "↓", "↙", "←", "↖", "↑", "↗"];
 
 /** Draws an answer over the frame of a camera. `heat` is the address of its heat map, empty for none. */
-export function drawCounts(drawing, { camera, width, height, heat }, { tracks, lines = [], zones = [] }) {
+export function drawCounts(drawing, { camera, width, height, heat }, { tracks, lines = [], zones = [], furniture = [] }) {
   const unit = width * UNIT;
   drawing.setAttribute("viewBox", `0 0 ${width} ${height}`);
   drawing.setAttribute("aria-label", `${plural(tracks.length, "track")} of ${camera}`);
   drawing.replaceChildren(
     ...(heat ? [shape("image", { href: heat, width, height })] : []),
     ...zones.filter(hasOutline).map(({ outline_px: outline }) => shape("polygon", { class: "count-zone", points: points(outline), "stroke-width": unit })),
+    ...furniture.filter(isFurniture).map(({ id, outline_px: outline }) => shape("polygon", { class: "count-furniture", "data-thing": id, points: points(outline), "stroke-width": unit, "stroke-dasharray": 3 * unit })),
     ...lines.filter(hasOutline).flatMap((line) => drawnLine(line, unit)),
     ...tracks.filter(({ frame_px: place }) => place).map((track) => drawnTrack(track, unit)),
   );
 }
 
+const isFurniture = ({ state }) => state !== "candidate";
 const hasOutline = ({ outline_px: outline }) => outline?.length > 1;
 
 /** A line with its name, and an arrow in its first direction. */

@@ -46,12 +46,7 @@ impl App {
         let address = sockets.main.local_addr()?;
         let scheme = if self.tls.is_some() { "https" } else { "http" };
         log_start(&self.settings, scheme, address);
-        if self.keys.is_none() && self.settings.access.open {
-            tracing::warn!(
-                "access.open is true and no API keys are set: every client that reaches {address} may \
-                 send frames and read calibrations and reports; set access.keys_file to require keys"
-            );
-        }
+        log_exposure(&self.settings, self.keys.is_some(), address);
         let _pollers = self.start_pollers()?;
         let publishing = self
             .publisher
@@ -216,6 +211,22 @@ impl App {
             );
         }
         Ok(())
+    }
+}
+
+/// Logs which clients an address without keys has.
+fn log_exposure(settings: &Settings, has_keys: bool, address: SocketAddr) {
+    match (has_keys, settings.access.open) {
+        (true, _) => {}
+        (false, true) => tracing::warn!(
+            "access.open is true and no API keys are set: every client that reaches {address} may \
+             send frames and read calibrations and reports; set access.keys_file to require keys"
+        ),
+        (false, false) => tracing::info!(
+            "no API keys are set: every client of this machine may do everything, and so may the \
+             clients of a tunnel or of a proxy that adds no header to their requests; set \
+             access.keys_file to require keys"
+        ),
     }
 }
 

@@ -1,12 +1,14 @@
-use std::os::unix::fs::PermissionsExt;
+use std::{fs, os::unix::fs::PermissionsExt, path::Path};
 
 use super::*;
 
-fn cameras(folder: &Path) -> Cameras {
+/// The cameras of a state folder within `folder`.
+pub(crate) fn cameras(folder: &Path) -> Cameras {
     Cameras::new(folder.join("state"), Arc::new(Metrics::new().unwrap()))
 }
 
-fn camera(url: &str) -> StoredCamera {
+/// A stored camera with this URL.
+pub(crate) fn camera(url: &str) -> StoredCamera {
     StoredCamera {
         url: url.to_owned(),
         user: Some("viewer".to_owned()),
@@ -60,12 +62,12 @@ fn a_password_stays_with_its_host_and_user_only() {
             .put("hall", camera("rtsp://10.0.0.8/s1"), None)
             .unwrap()
     );
-    assert!(cameras.password("hall").exists());
+    assert!(cameras.folder.password("hall").exists());
     cameras
         .put("hall", camera("rtsp://10.0.0.9/s1"), None)
         .unwrap();
     assert!(
-        !cameras.password("hall").exists(),
+        !cameras.folder.password("hall").exists(),
         "another host never gets it"
     );
 }
@@ -114,6 +116,40 @@ fn cameras_of_the_settings_file_have_precedence() {
 }
 
 #[test]
+fn detection_is_switched_off_until_it_is_switched_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let add = |cameras: &Cameras| {
+        let mut entries = vec![entry("gate", &camera("rtsp://10.0.0.1/"))];
+        cameras.add_to(&mut entries).unwrap();
+        let names = entries.into_iter().filter_map(|entry| entry.name);
+        names.collect::<Vec<_>>()
+    };
+    let first = cameras(folder.path());
+    first
+        .put("hall", camera("rtsp://10.0.0.8/s2"), None)
+        .unwrap();
+    assert_eq!(add(&first), ["gate", "hall"]);
+    for name in ["gate", "hall", "unknown"] {
+        first.set_detection(name, false).unwrap();
+    }
+    // After a restart.
+    let second = cameras(folder.path());
+    assert_eq!(add(&second), [""; 0]);
+    let both = |is_on| [("gate".to_owned(), is_on), ("hall".to_owned(), is_on)].into();
+    assert_eq!(second.detection().unwrap(), both(false));
+    let paused = second.paused_of_settings().unwrap();
+    assert_eq!(
+        paused,
+        [("gate".to_owned(), "rtsp://10.0.0.1/".to_owned())].into()
+    );
+    for name in ["gate", "hall"] {
+        second.set_detection(name, true).unwrap();
+    }
+    assert_eq!(add(&second), ["gate", "hall"]);
+    assert_eq!(second.detection().unwrap(), both(true));
+}
+
+#[test]
 fn a_camera_without_a_url_keeps_the_stored_one() {
     let folder = tempfile::tempdir().unwrap();
     let cameras = cameras(folder.path());
@@ -122,7 +158,7 @@ fn a_camera_without_a_url_keeps_the_stored_one() {
     cameras.put("hall", camera(url), Some(&password)).unwrap();
     assert!(!cameras.put("hall", camera(""), None).unwrap());
     assert_eq!(cameras.stored().unwrap()["hall"].url, url);
-    assert!(cameras.password("hall").exists());
+    assert!(cameras.folder.password("hall").exists());
     let watched = cameras.get("hall").unwrap().unwrap();
     assert!(watched.credentials.is_some());
     let refused = cameras.put("gate", camera(""), None).unwrap_err();

@@ -6,7 +6,7 @@ use std::{path::PathBuf, process::ExitCode};
 
 use anyhow::{Context, bail};
 use clap::Args;
-use lookdown_common::{ConfigError, Reload, ServerEntry, ServerOptions};
+use lookdown_common::{ConfigError, Reload, ServerClient, ServerEntry, ServerOptions};
 use lookdown_count::{CountEntry, CountOptions, Snapshot, Started, count};
 use lookdown_http::Shutdown;
 use tokio::{runtime, sync::watch};
@@ -91,7 +91,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let outcome = runtime.block_on(async {
         let shutdown = Shutdown::on_signals().context("signals cannot be handled")?;
         let counting = counting(&settings, None);
-        run_counts(&counting, |_| {}, async || shutdown.requested().await).await
+        let counts = run_counts(&counting, |_| {}, async || shutdown.requested().await);
+        Box::pin(counts).await
     });
     serve::end(runtime);
     outcome.map(|()| ExitCode::SUCCESS)
@@ -135,6 +136,7 @@ fn publishing(settings: &Settings) -> Option<CountsOptions> {
         topic_prefix: mqtt.topic_prefix,
         discovery_prefix: mqtt.discovery_prefix,
         unknown_for: settings.counts.longest_gap,
+        image_every: mqtt.image_every,
     })
 }
 
@@ -169,9 +171,13 @@ async fn count_with(
     stop: impl Future<Output = ()>,
 ) -> anyhow::Result<()> {
     let (snapshots, latest_snapshot) = watch::channel(Snapshot::default());
-    let publisher = counting.mqtt.clone();
-    let publisher = publisher.map(|options| CountsPublisher::new(options, latest_snapshot));
-    let publisher = publisher.transpose()?;
+    let publisher = match counting.mqtt.clone() {
+        Some(options) => {
+            let server = ServerClient::new(&counting.options.server)?;
+            Some(CountsPublisher::new(options, latest_snapshot, server)?)
+        }
+        None => None,
+    };
     let publishing = async {
         if let Some(publisher) = publisher {
             publisher.run().await;

@@ -24,7 +24,7 @@ use crate::{
     api::{Companions, Readiness},
     cameras::Cameras,
     probe,
-    settings::Settings,
+    settings::{CAMERA_VARIABLE, Settings, environment},
 };
 
 /// The name of the key with which cameras and counts use the server of this process.
@@ -39,7 +39,7 @@ const RUNTIME_THREADS: usize = 2;
 pub(super) struct Arguments {
     /// A settings file (docs/configuration.md), or a camera: the URL of RTSP, an MJPEG stream or a
     /// JPEG snapshot, a folder into which images are dropped, a video file, or `-` for images on
-    /// standard input
+    /// standard input. The variable `LOOKDOWN_CAMERA` may hold a camera instead
     #[arg(value_name = "SETTINGS.toml|SOURCE")]
     source: Option<String>,
     #[command(flatten)]
@@ -60,6 +60,10 @@ pub(super) struct Arguments {
 /// Serves, watches and counts until a stop is requested.
 pub(super) fn run(arguments: &Arguments, commit: Option<&str>) -> anyhow::Result<ExitCode> {
     let (file, source) = separate(arguments.source.as_deref())?;
+    let in_variable = environment()
+        .find(|(name, source)| name == CAMERA_VARIABLE && !source.is_empty())
+        .map(|(_, source)| source);
+    let source = source.or(in_variable.as_deref());
     let flags = given(&[
         ("server.listen", arguments.listen.as_deref()),
         ("counts.path", arguments.store.as_deref()),
@@ -142,11 +146,11 @@ impl Parts {
     async fn run(self, settings: Settings, commit: Option<&str>) -> anyhow::Result<()> {
         let url = format!("http://{}", probe::reachable(settings.server.listen));
         let state = settings.state.path.clone();
-        let (app, sockets) = serve::open(settings, commit).await?;
+        let (mut app, sockets) = serve::open(settings, commit).await?;
         let (companions, readiness) = (app.companions(), app.readiness());
         let metrics = Arc::new(Metrics::new()?);
         let stored = Arc::new(Cameras::new(state, Arc::clone(&metrics)));
-        companions.set_cameras(Arc::clone(&stored));
+        app.set_cameras(&stored);
         companions.expect_counts();
         let server = ServerOptions {
             url: url.parse()?,
@@ -218,10 +222,10 @@ impl Parts {
             companions.set_counts(started.routes);
             companions.set_metrics("counts", started.metrics);
         };
-        run_counts(&settings, started, async || {
+        let counts = run_counts(&settings, started, async || {
             over(after_watching.clone()).await;
-        })
-        .await
+        });
+        Box::pin(counts).await
     }
 
     /// Requests the end of all parts at the end of this one.

@@ -6,6 +6,7 @@ use std::{
     time::Duration,
 };
 
+use bytes::Bytes;
 use tokio::time::Instant;
 
 use super::{
@@ -19,6 +20,11 @@ use crate::results::StoredReport;
 
 /// Time after the connection until unknown cameras are withdrawn, where none expire.
 const UNKNOWN_FOR: Duration = Duration::from_mins(10);
+
+/// Returns the time after the connection until unknown cameras are withdrawn.
+pub(super) fn unknown_for(discovery: &Discovery) -> Duration {
+    discovery.expire_after.unwrap_or(UNKNOWN_FOR)
+}
 
 /// The published cameras, a bounded number of them.
 pub(super) struct Cameras {
@@ -100,6 +106,12 @@ impl Cameras {
         messages
     }
 
+    /// The message with the latest image of a camera: none for a camera that is not published.
+    pub(super) fn image(&self, camera: &str, jpeg: Bytes) -> Option<Message> {
+        let is_known = self.known.contains_key(&level(camera));
+        is_known.then(|| Message::passing(self.topics.image(camera), jpeg))
+    }
+
     /// The names of the cameras that send frames.
     pub(super) fn available(&self) -> Vec<String> {
         let known = self.known.values().filter(|camera| camera.is_available());
@@ -141,7 +153,7 @@ impl Cameras {
     /// Begins a connection, at whose start the broker sends what it has retained.
     pub(super) fn begin_connection(&mut self, now: Instant) {
         self.retained = RetainedTopics::default();
-        self.withdraw_at = Some(now + self.delays.expire.unwrap_or(UNKNOWN_FOR));
+        self.withdraw_at = Some(now + unknown_for(&self.discovery));
     }
 
     /// Compares a message of the broker with the state. Returns the messages that correct it.

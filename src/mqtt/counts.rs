@@ -1,5 +1,7 @@
 //! Publishes the counts of `lookdown count`: totals, occupancy and dwell times.
 
+mod event_entities;
+mod events;
 mod number;
 
 use std::{
@@ -10,11 +12,12 @@ use std::{
     time::Duration,
 };
 
+use lookdown_common::ServerClient;
 use lookdown_count::Snapshot;
 use rumqttc::Publish;
 use serde_json::{Value, json};
 use tokio::{
-    sync::watch,
+    sync::{mpsc, watch},
     time::{Instant, sleep_until},
 };
 
@@ -29,7 +32,12 @@ use super::{
     topics::{Topics, level},
 };
 use crate::tls::TlsError;
+use event_entities::{announcements, config_topics, event_topic, image_topic};
+use events::{EventImage, events, request_images};
 use number::{AVAILABILITY, Number, Owner};
+
+/// Most images of events that wait. Further ones are not requested.
+const IMAGES: usize = 8;
 
 /// The broker of the counts, and the settings of the messages.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,6 +53,8 @@ pub struct CountsOptions {
     /// Time after the connection until retained topics of unknown cameras, lines, zones and sites
     /// are withdrawn.
     pub unknown_for: Duration,
+    /// Shortest time between two images of events of a camera. `None` publishes none.
+    pub image_every: Option<Duration>,
 }
 
 /// Publishes counts.
@@ -53,6 +63,8 @@ pub struct CountsPublisher {
     options: CountsOptions,
     connector: Connector,
     snapshots: watch::Receiver<Snapshot>,
+    /// The server, which has the images of events.
+    server: ServerClient,
 }
 
 /// The retained messages: payloads by topic.
@@ -66,6 +78,7 @@ impl CountsPublisher {
     pub fn new(
         options: CountsOptions,
         snapshots: watch::Receiver<Snapshot>,
+        server: ServerClient,
     ) -> Result<Self, TlsError> {
         Ok(Self {
             connector: Connector::new(
@@ -76,11 +89,30 @@ impl CountsPublisher {
             topics: Topics::new(&options.topic_prefix, options.discovery_prefix.as_deref()),
             options,
             snapshots,
+            server,
         })
     }
 
     /// Publishes until the counts end, and then publishes the status "offline".
-    pub async fn run(mut self) {
+    pub async fn run(self) {
+        let (wanted, cameras) = mpsc::channel(IMAGES);
+        let (sender, images) = mpsc::channel(1);
+        let (server, every) = (self.server.clone(), self.options.image_every);
+        let requesting = async {
+            if let Some(every) = every {
+                request_images(server, every, cameras, sender).await;
+            }
+        };
+        tokio::join!(self.publish(wanted, images), requesting);
+    }
+
+    /// Publishes in one session after the other. `wanted` receives the cameras of events, and `images`
+    /// has their images.
+    async fn publish(
+        mut self,
+        wanted: mpsc::Sender<String>,
+        mut images: mpsc::Receiver<EventImage>,
+    ) {
         let mut snapshots = self.snapshots.clone();
         let mut stop = pin!(async move { while snapshots.changed().await.is_ok() {} });
         let will = self.status(OFFLINE);
@@ -89,7 +121,8 @@ impl CountsPublisher {
                 session = self.connector.session(&will) => session,
                 () = &mut stop => return,
             };
-            let Err(error) = self.serve(session, stop.as_mut()).await else {
+            let ended = self.serve(session, stop.as_mut(), &wanted, &mut images);
+            let Err(error) = ended.await else {
                 return;
             };
             self.connector.lost(&error);
@@ -105,6 +138,8 @@ impl CountsPublisher {
         &mut self,
         mut session: Session,
         mut stop: Pin<&mut impl Future<Output = ()>>,
+        wanted: &mpsc::Sender<String>,
+        images: &mut mpsc::Receiver<EventImage>,
     ) -> Result<(), SessionError> {
         session.publish([self.status(ONLINE)]).await?;
         let birth = self.topics.birth();
@@ -113,14 +148,23 @@ impl CountsPublisher {
             .subscribe(birth.clone().into_iter().chain(filters))
             .await?;
         let mut published = Retained::new();
+        let mut before = self.snapshots.borrow().clone();
         let mut unknown = RetainedTopics::default();
         let connected = Instant::now();
         let mut withdraw_at = Some(connected + self.options.unknown_for);
         loop {
             let snapshot = self.snapshots.borrow_and_update().clone();
-            let wanted = self.retained(&snapshot);
-            session.publish(changes(&published, &wanted)).await?;
-            published = wanted;
+            let retained = self.retained(&snapshot);
+            session.publish(changes(&published, &retained)).await?;
+            published = retained;
+            for event in events(&before, &snapshot) {
+                let topic = event_topic(&self.topics, &event.camera);
+                let body = event.body.to_string().into();
+                session.publish([Message::passing(topic, body)]).await?;
+                // Without room, the event has no image.
+                let _ = wanted.try_send(event.camera);
+            }
+            before = snapshot;
             tokio::select! {
                 message = session.next() => {
                     let message = message?;
@@ -134,6 +178,10 @@ impl CountsPublisher {
                 () = sleep_until(withdraw_at.unwrap_or(connected)), if withdraw_at.is_some() => {
                     withdraw_at = None;
                     session.publish(self.withdrawals(&mut unknown, &published)).await?;
+                }
+                Some(EventImage { camera, jpeg }) = images.recv() => {
+                    let topic = image_topic(&self.topics, &camera);
+                    session.publish([Message::passing(topic, jpeg.into())]).await?;
                 }
                 Ok(()) = self.snapshots.changed() => {}
                 () = &mut stop => return session.close(self.status(OFFLINE)).await,
@@ -189,6 +237,9 @@ impl CountsPublisher {
                 topics.extend(self.config_topic(owner, number));
             }
             topics.push(self.topics.counts(&first));
+            if let Owner::Camera(name) = owner {
+                topics.extend(config_topics(&self.topics, &self.device(owner, name)));
+            }
         }
         let gone = topics
             .into_iter()
@@ -219,6 +270,9 @@ impl CountsPublisher {
         for camera in &snapshot.cameras {
             let name = level(&camera.name);
             let owner = Owner::Camera(&name);
+            let events = self.device(owner, &camera.name);
+            let has_images = self.options.image_every.is_some();
+            retained.extend(announcements(&self.topics, &events, has_images));
             let mut device = Device::new(self, owner, &camera.name, camera.persons, &mut retained);
             for line in &camera.lines {
                 let (of, direction) = (level(&line.line), level(&line.direction));

@@ -7,17 +7,20 @@ use serde_json::{Value, json};
 use url::Url;
 
 use super::{
-    entity::{BINARY_SENSOR, Device, SENSOR},
+    entity::{BINARY_SENSOR, Device, IMAGE, SENSOR, SWITCH},
     message::Message,
     occupancy::{OFF, ON},
     topics::{Topics, level},
 };
+use crate::results::PicturesOf;
 
 /// The status while the server is connected or a camera sends frames, and the one when it is not.
 pub(super) const ONLINE: &str = "online";
 pub(super) const OFFLINE: &str = "offline";
 /// The ID of the number of the latest frame.
 const FRAME_PERSONS: &str = "frame_persons";
+/// The ID of the switch for detection.
+const DETECTION: &str = "detection";
 
 /// The parts of the announcements that the settings give.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -28,6 +31,8 @@ pub struct Discovery {
     pub configuration_url: Option<Url>,
     /// The address at which users of this installation get help.
     pub support_url: Option<Url>,
+    /// The cameras whose images are published.
+    pub images: PicturesOf,
 }
 
 /// An entity: component, ID within the device, and configuration.
@@ -56,23 +61,48 @@ impl Discovery {
             ]
         });
         let device = device(topics, camera);
-        let all = of_camera.into_iter().chain(zones);
+        let image = self.images.include(camera).then(|| image(topics, camera));
+        let all = of_camera.into_iter().chain(image).chain(zones);
         all.filter_map(|(component, entity, config)| {
             let availability = [topics.status(), topics.availability(camera)];
-            let config = self.completed(config, topics, camera);
+            let mut config = self.completed(config, topics, camera);
+            // Images have no such field.
+            if let Some(expire_after) = self.expire_after.filter(|_| component != IMAGE) {
+                config["expire_after"] = json!(expire_after.as_secs());
+            }
             device.announcement(topics, component, &entity, availability, config)
         })
         .map(|(topic, payload)| Message::retained(topic, payload))
         .collect()
     }
 
+    /// The announcement of a camera's switch for detection, which is available while the server is.
+    /// `None` without a discovery prefix.
+    pub(super) fn switch(&self, topics: &Topics, camera: &str) -> Option<Message> {
+        let config = json!({
+            "name": "Detection",
+            "state_topic": topics.detection(camera),
+            "command_topic": topics.detection_command(camera),
+            "payload_on": ON,
+            "payload_off": OFF,
+            "icon": "mdi:account-search",
+        });
+        let config = self.completed(config, topics, camera);
+        let (device, status) = (device(topics, camera), [topics.status()]);
+        let announcement = device.announcement(topics, SWITCH, DETECTION, status, config);
+        announcement.map(|(topic, payload)| Message::retained(topic, payload))
+    }
+
+    /// The message that removes the switch of a camera from Home Assistant.
+    pub(super) fn switch_withdrawal(topics: &Topics, camera: &str) -> Option<Message> {
+        let id = device(topics, camera).entity_id(DETECTION);
+        topics.config(SWITCH, &id).map(Message::forget)
+    }
+
     /// Adds the fields that all entities of a camera have in common.
     fn completed(&self, mut config: Value, topics: &Topics, camera: &str) -> Value {
         config["json_attributes_topic"] = json!(topics.attributes(camera));
         config["device"]["model"] = json!("Ceiling fisheye camera");
-        if let Some(expire_after) = self.expire_after {
-            config["expire_after"] = json!(expire_after.as_secs());
-        }
         if let Some(url) = &self.configuration_url {
             config["device"]["configuration_url"] = json!(url.as_str());
         }
@@ -96,12 +126,14 @@ pub(super) fn config_withdrawals(
     camera: &str,
     zone: Option<&str>,
 ) -> Vec<Message> {
-    let of_frame = zone.is_none().then(|| (SENSOR, FRAME_PERSONS.to_owned()));
+    let of_camera = [(SENSOR, FRAME_PERSONS), (IMAGE, IMAGE)];
+    let of_camera = of_camera.map(|(component, id)| (component, id.to_owned()));
+    let of_camera = zone.is_none().then_some(of_camera);
     let entities = [occupancy_id(zone), persons_id(zone)];
     let device = device(topics, camera);
     let topics = entities
         .into_iter()
-        .chain(of_frame)
+        .chain(of_camera.into_iter().flatten())
         .filter_map(|(component, entity)| topics.config(component, &device.entity_id(&entity)));
     topics.map(Message::forget).collect()
 }
@@ -140,6 +172,15 @@ fn frame_persons(state_topic: &str) -> Entity {
         "enabled_by_default": false,
     });
     (SENSOR, FRAME_PERSONS.to_owned(), config)
+}
+
+fn image(topics: &Topics, camera: &str) -> Entity {
+    let config = json!({
+        "name": "Latest image",
+        "image_topic": topics.image(camera),
+        "content_type": "image/jpeg",
+    });
+    (IMAGE, IMAGE.to_owned(), config)
 }
 
 fn occupancy_id(zone: Option<&str>) -> (&'static str, String) {
@@ -221,6 +262,7 @@ mod tests {
             expire_after: Some(Duration::from_mins(10)),
             configuration_url: Some(url("http://lookdown.local:8080/")),
             support_url: Some(url("https://help.example/")),
+            images: PicturesOf::default(),
         };
         for message in discovery.announcements(&topics(), "lobby", ["till"]) {
             let config = config(&message);
@@ -233,7 +275,11 @@ mod tests {
 
     #[test]
     fn withdrawals_have_the_topics_of_announcements() {
-        let announced = Discovery::default().announcements(&topics(), "lobby", ["till"]);
+        let discovery = Discovery {
+            images: PicturesOf::All,
+            ..Discovery::default()
+        };
+        let announced = discovery.announcements(&topics(), "lobby", ["till"]);
         let mut withdrawn = config_withdrawals(&topics(), "lobby", None);
         withdrawn.extend(config_withdrawals(&topics(), "lobby", Some("till")));
         let sorted = |messages: &[Message]| {
@@ -243,6 +289,45 @@ mod tests {
         assert_eq!(sorted(&withdrawn), sorted(&announced));
         let is_empty = |message: &Message| message.payload.is_empty() && message.retained;
         assert!(withdrawn.iter().all(is_empty));
+    }
+
+    #[test]
+    fn images_are_announced_for_cameras_that_have_them() {
+        let discovery = Discovery {
+            images: PicturesOf::Some(["lobby".to_owned()].into()),
+            expire_after: Some(Duration::from_mins(1)),
+            ..Discovery::default()
+        };
+        let image = |camera: &str| {
+            let announced = discovery.announcements(&topics(), camera, []);
+            let image = announced.into_iter().find(|message| {
+                message.topic == format!("homeassistant/image/lookdown_{camera}_image/config")
+            });
+            image.map(|message| config(&message))
+        };
+        assert!(image("hall").is_none());
+        let image = image("lobby").unwrap();
+        assert_eq!(image["image_topic"], "lookdown/cameras/lobby/image");
+        assert_eq!(image["content_type"], "image/jpeg");
+        assert!(image.get("expire_after").is_none());
+    }
+
+    #[test]
+    fn a_switch_is_available_while_the_server_is() {
+        let switch = Discovery::default().switch(&topics(), "hall").unwrap();
+        let id = "homeassistant/switch/lookdown_hall_detection/config";
+        assert_eq!((switch.topic.as_str(), switch.retained), (id, true));
+        let config = config(&switch);
+        assert_eq!(
+            config["command_topic"],
+            "lookdown/cameras/hall/detection/set"
+        );
+        assert_eq!(
+            config["availability"],
+            json!([{"topic": "lookdown/status"}])
+        );
+        let withdrawn = Discovery::switch_withdrawal(&topics(), "hall").unwrap();
+        assert_eq!(withdrawn, Message::forget(id.to_owned()));
     }
 
     #[test]

@@ -9,6 +9,13 @@ pub(super) const SENSOR: &str = "sensor";
 /// The component of states that are on or off.
 pub(super) const BINARY_SENSOR: &str = "binary_sensor";
 
+/// The component of events.
+pub(super) const EVENT: &str = "event";
+/// The component of images.
+pub(super) const IMAGE: &str = "image";
+/// The component of switches.
+pub(super) const SWITCH: &str = "switch";
+
 /// A device of Home Assistant: a camera or a site.
 pub(super) struct Device<'a> {
     /// The ID, unique in an installation.

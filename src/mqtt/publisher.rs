@@ -7,17 +7,22 @@ use jiff::Timestamp;
 use lookdown_detect::fairness::Client;
 use rumqttc::Publish;
 use tokio::{
-    sync::broadcast::{self, error::RecvError},
+    sync::{
+        broadcast::{self, error::RecvError},
+        mpsc,
+    },
     time::{Instant, MissedTickBehavior, interval, sleep, sleep_until},
 };
 
 use super::{
     Broker,
-    cameras::Cameras,
+    cameras::{self, Cameras},
     connector::Connector,
     discovery::{Discovery, OFFLINE, ONLINE},
+    images::{CameraImage, Images},
     message::Message,
     session::{Session, SessionError},
+    switches::Switches,
     topics::Topics,
 };
 use crate::{
@@ -34,7 +39,7 @@ const LISTEN_PAUSE: Duration = Duration::from_secs(1);
 /// Shortest time between two messages of the whole state. Any client of the broker can ask for it.
 const BIRTH_PAUSE: Duration = Duration::from_secs(10);
 
-/// Interval of the checks for followed numbers.
+/// Interval of the checks for followed numbers and for switches.
 const NUMBER_CHECK: Duration = Duration::from_secs(1);
 
 /// Interval of the checks for cameras that another server with the same result store has removed.
@@ -56,6 +61,8 @@ pub struct MqttOptions {
     pub max_cameras: NonZeroUsize,
     /// Time without a person until occupancy is off.
     pub hold: Duration,
+    /// Shortest time between two images of a camera. `None` publishes no images.
+    pub image_every: Option<Duration>,
     /// The parts of the announcements that the settings give.
     pub discovery: Discovery,
 }
@@ -72,6 +79,8 @@ struct Publication {
     results: Arc<dyn ResultStore>,
     metrics: Arc<Metrics>,
     topics: Topics,
+    /// The cameras of `lookdown run`, which have a switch for detection.
+    switched: Option<Arc<crate::cameras::Cameras>>,
 }
 
 type Queue = broadcast::Receiver<Arc<StoredReport>>;
@@ -96,6 +105,7 @@ impl Publisher {
             options,
             results,
             metrics,
+            switched: None,
         };
         Ok(Self {
             connector,
@@ -103,20 +113,43 @@ impl Publisher {
         })
     }
 
+    /// Publishes a switch for the detection of each of these cameras.
+    pub fn add_switches(&mut self, cameras: Arc<crate::cameras::Cameras>) {
+        self.publication.switched = Some(cameras);
+    }
+
     /// Publishes until the results end, and then publishes the status "offline".
     pub async fn run(self) {
         let (sender, queue) = broadcast::channel(QUEUE);
+        // One image waits for the broker, and the next one is drawn after it.
+        let (image_sender, images) = mpsc::channel(1);
         let publication = &self.publication;
+        let drawing = async {
+            if let Some(every) = publication.options.image_every {
+                let images = Images {
+                    results: Arc::clone(&publication.results),
+                    of: publication.options.discovery.images.clone(),
+                    every,
+                };
+                images.draw(image_sender).await;
+            }
+        };
         tokio::join!(
             hear(&publication.results, sender),
-            publication.publish(self.connector, queue)
+            drawing,
+            publication.publish(self.connector, queue, images)
         );
     }
 }
 
 impl Publication {
     /// Publishes in one session after the other, until the reports end.
-    async fn publish(&self, mut connector: Connector, mut queue: Queue) {
+    async fn publish(
+        &self,
+        mut connector: Connector,
+        mut queue: Queue,
+        mut images: mpsc::Receiver<CameraImage>,
+    ) {
         let mut cameras = Cameras::new(
             self.topics.clone(),
             self.options.discovery.clone(),
@@ -131,13 +164,19 @@ impl Publication {
             cameras.update(&report, persons, age, Instant::now());
         }
         let will = self.status(OFFLINE);
+        let mut switches = self.switched.clone().map(|cameras| {
+            let (topics, discovery) = (self.topics.clone(), self.options.discovery.clone());
+            Switches::new(topics, discovery, cameras)
+        });
         loop {
             let session = tokio::select! {
                 session = connector.session(&will) => session,
                 () = self.skip_reports(&mut cameras, &mut queue) => return,
             };
             self.metrics.mqtt_connected.set(1);
-            let ended = self.serve(session, &mut cameras, &mut queue).await;
+            let switches = switches.as_mut();
+            let ended = self.serve(session, &mut cameras, switches, &mut queue, &mut images);
+            let ended = ended.await;
             self.metrics.mqtt_connected.set(0);
             let Err(error) = ended else { return };
             connector.lost(&error);
@@ -168,7 +207,9 @@ impl Publication {
         &self,
         mut session: Session,
         cameras: &mut Cameras,
+        mut switches: Option<&mut Switches>,
         queue: &mut Queue,
+        images: &mut mpsc::Receiver<CameraImage>,
     ) -> Result<(), SessionError> {
         session.publish([self.status(ONLINE)]).await?;
         let birth = self.topics.birth();
@@ -178,9 +219,13 @@ impl Publication {
         let mut numbers = interval(NUMBER_CHECK);
         numbers.set_missed_tick_behavior(MissedTickBehavior::Delay);
         cameras.begin_connection(Instant::now());
-        session
-            .subscribe(topics.chain(self.topics.camera_filters()))
-            .await?;
+        let mut filters: Vec<_> = topics.chain(self.topics.camera_filters()).collect();
+        if let Some(switches) = &mut switches {
+            let unknown_for = cameras::unknown_for(&self.options.discovery);
+            switches.begin_connection(Instant::now(), unknown_for);
+            filters.extend(self.topics.switch_filters());
+        }
+        session.subscribe(filters).await?;
         session.publish(self.without_removed(cameras).await).await?;
         session.publish(cameras.all(Instant::now())).await?;
         let mut next_state: Option<Instant> = None;
@@ -190,6 +235,9 @@ impl Publication {
             tokio::select! {
                 message = session.next() => {
                     let message = message?;
+                    if switches.as_mut().is_some_and(|switches| switches.note(&message)) {
+                        continue;
+                    }
                     if let Some(answer) = cameras.compare(&message.topic, &message.payload, message.retain) {
                         session.publish([answer]).await?;
                     } else if self.is_birth(&message) {
@@ -203,6 +251,9 @@ impl Publication {
                     next_state = None;
                     not_before = Instant::now() + BIRTH_PAUSE;
                     session.publish(cameras.all(Instant::now())).await?;
+                    if let Some(switches) = &mut switches {
+                        switches.publish_again();
+                    }
                 }
                 () = sleep_until(next_change.unwrap_or(not_before)), if next_change.is_some() => {
                     session.publish(cameras.expire(Instant::now())).await?;
@@ -212,9 +263,15 @@ impl Publication {
                 }
                 _ = numbers.tick() => {
                     session.publish(self.followed(cameras).await).await?;
+                    if let Some(switches) = &mut switches {
+                        session.publish(switches.update(Instant::now()).await).await?;
+                    }
                 }
                 _ = checks.tick() => {
                     session.publish(self.without_removed(cameras).await).await?;
+                }
+                Some(CameraImage { camera, jpeg }) = images.recv() => {
+                    session.publish(cameras.image(&camera, jpeg)).await?;
                 }
                 report = queue.recv() => match report {
                     Ok(report) => {

@@ -74,6 +74,44 @@ impl Topics {
         format!("{}/attributes", self.of_camera(camera))
     }
 
+    /// The topic of a camera's latest image.
+    pub(super) fn image(&self, camera: &str) -> String {
+        format!("{}/image", self.of_camera(camera))
+    }
+
+    /// The topic of the state of a camera's switch for detection.
+    pub(super) fn detection(&self, camera: &str) -> String {
+        format!("{}/detection", self.of_camera(camera))
+    }
+
+    /// The topic of the commands of a camera's switch for detection.
+    pub(super) fn detection_command(&self, camera: &str) -> String {
+        format!("{}/set", self.detection(camera))
+    }
+
+    /// Filters for the topics that [`Topics::switch_topic`] recognises.
+    pub(super) fn switch_filters(&self) -> [String; 2] {
+        ["+/detection", "+/detection/set"].map(|rest| format!("{}/cameras/{rest}", self.prefix))
+    }
+
+    /// Recognises a topic of a camera's switch.
+    pub(super) fn switch_topic<'a>(&self, topic: &'a str) -> Option<SwitchTopic<'a>> {
+        let (camera, rest) = self.below_cameras(topic)?;
+        match rest {
+            "detection" => Some(SwitchTopic::State { camera }),
+            "detection/set" => Some(SwitchTopic::Command { camera }),
+            _ => None,
+        }
+    }
+
+    /// The level of a camera and the rest of one of its topics.
+    fn below_cameras<'a>(&self, topic: &'a str) -> Option<(&'a str, &'a str)> {
+        let topic = topic
+            .strip_prefix(&self.prefix)?
+            .strip_prefix("/cameras/")?;
+        topic.split_once('/')
+    }
+
     /// Filters for the topics that [`Topics::camera_topic`] recognises.
     pub(super) fn camera_filters(&self) -> [String; 3] {
         ["+/persons", "+/availability", "+/zones/+"]
@@ -82,10 +120,7 @@ impl Topics {
 
     /// Recognises a topic of a camera.
     pub(super) fn camera_topic<'a>(&self, topic: &'a str) -> Option<CameraTopic<'a>> {
-        let topic = topic
-            .strip_prefix(&self.prefix)?
-            .strip_prefix("/cameras/")?;
-        let (camera, rest) = topic.split_once('/')?;
+        let (camera, rest) = self.below_cameras(topic)?;
         match rest {
             "persons" => Some(CameraTopic::Persons { camera }),
             "availability" => Some(CameraTopic::Availability { camera }),
@@ -133,6 +168,15 @@ pub(super) enum CameraTopic<'a> {
     Availability { camera: &'a str },
     /// The number of persons in a zone.
     Zone { camera: &'a str, zone: &'a str },
+}
+
+/// A topic of a camera's switch, by the level of its name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum SwitchTopic<'a> {
+    /// The state.
+    State { camera: &'a str },
+    /// A command.
+    Command { camera: &'a str },
 }
 
 impl<'a> CameraTopic<'a> {
@@ -221,6 +265,23 @@ mod tests {
         ] {
             assert_eq!(topics.camera_topic(&other), None, "{other}");
         }
+    }
+
+    #[test]
+    fn topics_of_switches_are_recognised() {
+        let topics = Topics::new("home/lookdown", None);
+        let camera = "lobby";
+        for (topic, expected) in [
+            (topics.detection(camera), SwitchTopic::State { camera }),
+            (
+                topics.detection_command(camera),
+                SwitchTopic::Command { camera },
+            ),
+        ] {
+            assert_eq!(topics.switch_topic(&topic), Some(expected));
+            assert_eq!(topics.camera_topic(&topic), None);
+        }
+        assert_eq!(topics.switch_topic(&topics.persons(camera)), None);
     }
 
     #[test]

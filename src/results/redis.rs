@@ -129,12 +129,15 @@ impl ResultStore for RedisResults {
     }
 
     async fn latest_of_all(&self) -> Result<Vec<Arc<StoredReport>>, Unreachable> {
-        self.ask(async |mut reader| reader.latest_of_all().await)
+        let most = self.shared.limits.max_cameras;
+        self.ask(async |mut reader| reader.latest_of_all(most).await)
             .await
     }
 
     async fn cameras(&self) -> Result<Vec<String>, Unreachable> {
-        self.ask(async |mut reader| reader.cameras().await).await
+        let most = self.shared.limits.max_cameras;
+        self.ask(async |mut reader| reader.cameras(most).await)
+            .await
     }
 
     async fn delete(&self, camera: &str) -> Result<bool, Unreachable> {

@@ -11,7 +11,10 @@ use super::{
     declare::settings,
     form::{Form, count, optional, path, seconds, secret, text, web_address, zero_is_none},
 };
-use crate::mqtt::{Broker, BrokerError, Discovery, MqttOptions};
+use crate::{
+    mqtt::{Broker, BrokerError, Discovery, MqttOptions},
+    results::PicturesOf,
+};
 
 /// Most bytes of a prefix: a topic has 65,535.
 const MAX_PREFIX_BYTES: usize = 256;
@@ -45,6 +48,11 @@ settings! {
         /// The time without a person after which occupancy is off: single frames that miss a person
         /// change nothing. 0: each frame counts.
         hold as "hold_seconds": Duration = Duration::from_secs(5) => seconds(0..=3600);
+        /// The shortest time between two images of a camera that are published, for cameras in
+        /// `results.pictures`. Images show persons, unless `results.conceal_pictures` conceals them.
+        /// 0: no images.
+        image_every as "image_every_seconds": Option<Duration> = None
+            => zero_is_none(seconds(0..=86_400));
         /// The time without a report after which a camera is unavailable. It must be longer than
         /// the interval of its frames. Retained topics of removed cameras are withdrawn as long
         /// after a connection. 0: cameras stay available.
@@ -83,10 +91,13 @@ impl MqttKeys {
             discovery_prefix: self.discovery_prefix,
             max_cameras: self.max_cameras,
             hold: self.hold,
+            image_every: self.image_every,
             discovery: Discovery {
                 expire_after: self.expire_after,
                 configuration_url: self.configuration_url,
                 support_url: self.support_url,
+                // `results.pictures` says which, where all settings are known.
+                images: PicturesOf::default(),
             },
         }))
     }

@@ -9,6 +9,9 @@ const PREFIX: &str = "LOOKDOWN__";
 /// The prefix of variables with a single underscore, which are not settings, such as
 /// `LOOKDOWN_PORT=tcp://…`. Kubernetes sets it for a Service called `lookdown`.
 const NEARLY: &str = "LOOKDOWN_";
+/// The variable with the source of a camera for `lookdown run`, for containers: arguments are shown
+/// in lists of processes, and the URL may hold a password.
+pub const CAMERA_VARIABLE: &str = "LOOKDOWN_CAMERA";
 /// The separator of tables and keys.
 const SEPARATOR: &str = "__";
 
@@ -62,7 +65,7 @@ pub(super) fn ignored(
 ) -> Option<String> {
     let ignored = names.into_iter().filter(|name| {
         let upper = name.to_uppercase();
-        upper.starts_with(NEARLY) && !upper.starts_with(PREFIX)
+        upper.starts_with(NEARLY) && !upper.starts_with(PREFIX) && name != CAMERA_VARIABLE
     });
     let mut ignored: Vec<_> = ignored
         .map(|name| {

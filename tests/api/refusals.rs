@@ -124,6 +124,17 @@ async fn a_form_with_the_wrong_fields_is_refused_by_their_name() {
         .post_form(&[("img", &image), ("camera", &[b'x'; 2000])])
         .await;
     assert_refused(&endless, 422, "invalid-parameter", "camera: ");
+    // Characters that reorder or hide the others: a name must be what a reader sees.
+    for invisible in [
+        "\u{202e}gpj.exe",
+        "hall\u{200b}",
+        "a\u{2066}b",
+        "\u{feff}hall",
+    ] {
+        let fields = [("img", &image[..]), ("camera", invisible.as_bytes())];
+        let refused = service.post_form(&fields).await;
+        assert_refused(&refused, 422, "invalid-parameter", "camera: ");
+    }
     let many = [("profile", &b"fast"[..]); 25];
     assert_refused(
         &service.post_form(&many).await,

@@ -44,24 +44,32 @@ fn listed(repository: &Path) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// Answers one request with the weights. Returns the address and the path of the request.
-fn server() -> (String, thread::JoinHandle<String>) {
+/// Answers each request with the weights after this number of redirections. Returns the address, and
+/// the paths of the requests once the last one is answered.
+fn server(redirections: usize, location: &str) -> (String, thread::JoinHandle<Vec<String>>) {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = format!("http://{}/converted/", listener.local_addr().unwrap());
+    let moved = format!(
+        "HTTP/1.1 302 Found\r\nLocation: {location}\r\nContent-Length: 0\r\nConnection: close\r\n\r\n"
+    );
+    let found = format!(
+        "HTTP/1.1 200 OK\r\nContent-Length: {}\r\nConnection: close\r\n\r\n",
+        WEIGHTS.len()
+    );
+    let answers =
+        std::iter::repeat_n(moved.into_bytes(), redirections)
+            .chain([[found.as_bytes(), WEIGHTS].concat()]);
     let served = thread::Builder::new().name("file-server".to_owned());
     let served = served.spawn(move || {
-        let (mut stream, _) = listener.accept().unwrap();
-        let mut request = [0; 4096];
-        let length = stream.read(&mut request).unwrap();
-        let head = format!(
-            "HTTP/1.1 200 OK\r\nContent-Length: {}\r\n\r\n",
-            WEIGHTS.len()
-        );
-        stream
-            .write_all(&[head.as_bytes(), WEIGHTS].concat())
-            .unwrap();
-        let request = String::from_utf8_lossy(&request[..length]).into_owned();
-        request.split(' ').nth(1).unwrap().to_owned()
+        let answer_one = |answer: Vec<u8>| {
+            let (mut stream, _) = listener.accept().unwrap();
+            let mut request = [0; 4096];
+            let length = stream.read(&mut request).unwrap();
+            stream.write_all(&answer).unwrap();
+            let request = String::from_utf8_lossy(&request[..length]).into_owned();
+            request.split(' ').nth(1).unwrap().to_owned()
+        };
+        answers.map(answer_one).collect()
     });
     (address, served.unwrap())
 }
@@ -85,12 +93,40 @@ fn weights_are_fetched_from_a_folder() {
 
 #[test]
 fn weights_are_fetched_over_http() {
-    let (repository, (address, served)) = (repository(), server());
+    let (repository, (address, served)) = (repository(), server(0, ""));
     let output = fetch(repository.path(), "tiny", &address);
     assert!(output.status.success(), "{output:?}");
-    assert_eq!(served.join().unwrap(), "/converted/tiny/model.onnx");
+    assert_eq!(served.join().unwrap(), ["/converted/tiny/model.onnx"]);
     let weights = fs::read(repository.path().join("tiny/model.onnx"));
     assert_eq!(weights.unwrap(), WEIGHTS);
+}
+
+#[test]
+fn weights_are_fetched_from_another_path_of_the_same_host() {
+    let (repository, (address, served)) = (repository(), server(1, "/moved"));
+    let output = fetch(repository.path(), "tiny", &address);
+    assert!(output.status.success(), "{output:?}");
+    assert_eq!(
+        served.join().unwrap(),
+        ["/converted/tiny/model.onnx", "/moved"]
+    );
+}
+
+#[test]
+fn redirections_to_another_host_or_without_end_are_refused() {
+    let other = TcpListener::bind("127.0.0.1:0").unwrap();
+    other.set_nonblocking(true).unwrap();
+    let location = format!("http://{}/tiny/model.onnx", other.local_addr().unwrap());
+    let repository = repository();
+    let (address, _) = server(1, &location);
+    let output = fetch(repository.path(), "tiny", &address);
+    assert_fails_with(&output, &["redirects to another host"]);
+    assert!(other.accept().is_err(), "the other host got a request");
+    let (address, _) = server(100, "/moved");
+    let output = fetch(repository.path(), "tiny", &address);
+    assert_fails_with(&output, &["too many redirections"]);
+    let files = fs::read_dir(repository.path().join("tiny")).unwrap();
+    assert_eq!(files.count(), 1);
 }
 
 #[test]

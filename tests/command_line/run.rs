@@ -185,6 +185,22 @@ fn a_camera_is_counted_on_the_port_of_the_server() {
 }
 
 #[test]
+fn a_variable_has_the_source_of_a_camera() {
+    let folder = tempfile::tempdir().unwrap();
+    let frames = folder.path().join("frames");
+    fs::create_dir(&frames).unwrap();
+    let store = folder.path().join("counts.sqlite");
+    let arguments = ["run", "--every", "200ms", "--profile", "fast", "--store"];
+    let arguments = [&arguments[..], &[store.to_str().unwrap()]].concat();
+    let running = Running::start(&arguments, &[("LOOKDOWN_CAMERA", frames.to_str().unwrap())]);
+    running.until("/counts", "", "\"camera\"", drop_frames(&frames));
+    running.interrupt();
+    // Without a camera, flags of a camera are refused, as without the variable.
+    let refused = lookdown(&arguments, &[("LOOKDOWN_CAMERA", "")]);
+    assert_fails_with(&refused, &["flags of a single camera need a source"]);
+}
+
+#[test]
 fn cameras_of_the_settings_file_are_counted() {
     let folder = tempfile::tempdir().unwrap();
     let frames = folder.path().join("frames");

@@ -215,6 +215,32 @@ fn an_open_server_refuses_changes_and_warns_at_the_start() {
 }
 
 #[test]
+fn a_server_without_keys_names_its_clients_at_the_start() {
+    let server = Server::start("", &[NO_GRACE]);
+    let before = server.before_ready.join("\n");
+    for part in ["no API keys are set", "tunnel", "access.keys_file"] {
+        assert_eq!(before.matches(part).count(), 1, "{part}: {before}");
+    }
+    server.signal("TERM");
+    server.has_ended();
+}
+
+#[test]
+fn freed_memory_is_returned_unless_the_operator_decides() {
+    for given in [None, Some("65536")] {
+        let mut environment = vec![NO_GRACE];
+        environment.extend(given.map(|value| ("MALLOC_MMAP_THRESHOLD_", value)));
+        let server = Server::start("", &environment);
+        let environment = fs::read(format!("/proc/{}/environ", server.process.id())).unwrap();
+        let expected = format!("MALLOC_MMAP_THRESHOLD_={}", given.unwrap_or("131072"));
+        let mut variables = environment.split(|&byte| byte == 0);
+        assert!(variables.any(|variable| variable == expected.as_bytes()));
+        server.signal("TERM");
+        server.has_ended();
+    }
+}
+
+#[test]
 fn a_silent_calibration_store_does_not_delay_livez() {
     let bucket = TcpListener::bind("127.0.0.1:0").unwrap();
     let endpoint = format!("http://{}", bucket.local_addr().unwrap());
@@ -395,6 +421,17 @@ fn lookdown_key(name: &str) -> Key {
         key: next(),
         line: next(),
     }
+}
+
+#[test]
+fn signals_without_a_meaning_do_not_end_the_server() {
+    let server = Server::start("", &[NO_GRACE]);
+    for signal in ["USR1", "USR2", "PIPE", "HUP"] {
+        server.signal(signal);
+        assert!(server.get("/livez", "").contains(" 200 "), "{signal}");
+    }
+    server.signal("TERM");
+    server.has_ended();
 }
 
 #[test]

@@ -91,7 +91,6 @@ class Chain:
             "AWS_ALLOW_HTTP": "true",
             "AWS_ACCESS_KEY_ID": "lookdown",
             "AWS_SECRET_ACCESS_KEY": "of-the-test",
-            "MALLOC_MMAP_THRESHOLD_": "131072",
         }
         inside = host.inside
         if self._cores:

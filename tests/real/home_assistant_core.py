@@ -1,12 +1,14 @@
 """Home Assistant without a user interface: `home_assistant_core.py FOLDER PORT USER PASSWORD`.
 
 It runs in the environment of the tests' part `home_assistant`, connects to the broker at localhost, and writes its
-states and devices to `FOLDER/states.json` every half second. SIGTERM stops it.
+states and devices to `FOLDER/states.json` every half second, with its notifications and images. `FOLDER/automations.yaml`
+is a part of its configuration, and `FOLDER/press.json` turns a switch. SIGTERM stops it.
 """
 
 import asyncio
 import json
 import signal
+import socket
 import sys
 from pathlib import Path
 
@@ -19,7 +21,13 @@ INTERVAL_SECONDS = 0.5
 def prepare(folder: Path, port: int, user: str, password: str) -> None:
     """Writes the configuration: the integration for MQTT, as if set up in the user interface."""
     (folder / ".storage").mkdir(parents=True, exist_ok=True)
-    (folder / "configuration.yaml").write_text("homeassistant:\n  name: Test\n", encoding="utf-8")
+    automations = folder / "automations.yaml"
+    automation = automations.read_text(encoding="utf-8") if automations.exists() else ""
+    # The images of entities need its HTTP server.
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        http = f"http:\n  server_host: 127.0.0.1\n  server_port: {free.getsockname()[1]}\n"
+    text = f"homeassistant:\n  name: Test\n{http}{automation}"
+    (folder / "configuration.yaml").write_text(text, encoding="utf-8")
     entry = {
         "entry_id": "mqtt", "version": 1, "minor_version": 1, "domain": "mqtt", "title": "MQTT", "options": {},
         "data": {"broker": "localhost", "port": port, "username": user, "password": password, "discovery": True},
@@ -46,11 +54,36 @@ def snapshot(hass) -> dict:
             "state_class": (entry.capabilities or {}).get("state_class"),
             "calibration": state.attributes.get("calibration") if state else None,
             "profile": state.attributes.get("profile") if state else None,
+            "event": state.attributes.get("event_type") if state else None,
             "device": device.name if device else None,
             "sw_version": device.sw_version if device else None,
             "configuration_url": device.configuration_url if device else None,
         }
     return found
+
+
+def notifications(hass) -> list[str]:
+    """The messages of the notifications."""
+    return [notification["message"] for notification in hass.data.get("persistent_notification", {}).values()]
+
+
+async def press(hass, folder: Path) -> None:
+    """Turns the switch on or off that the file `press.json` names, and removes the file."""
+    file = folder / "press.json"
+    if file.exists():
+        wanted = json.loads(file.read_text(encoding="utf-8"))
+        file.unlink()
+        await hass.services.async_call("switch", wanted["service"], {"entity_id": wanted["entity"]}, blocking=True)
+
+
+async def images(hass) -> dict[str, int]:
+    """The sizes of the images of all image entities."""
+    component = hass.data.get("image")
+    sizes = {}
+    for entity in component.entities if component else ():
+        image = await entity.async_image()
+        sizes[entity.unique_id] = len(image or b"")
+    return sizes
 
 
 async def main(folder: Path) -> None:
@@ -64,7 +97,9 @@ async def main(folder: Path) -> None:
     await hass.async_start()
     file, unfinished = folder / "states.json", folder / "states.unfinished"
     while not ended.is_set():
-        unfinished.write_text(json.dumps(snapshot(hass)), encoding="utf-8")
+        await press(hass, folder)
+        state = snapshot(hass) | {"notifications": notifications(hass), "images": await images(hass)}
+        unfinished.write_text(json.dumps(state), encoding="utf-8")
         unfinished.replace(file)
         await asyncio.sleep(INTERVAL_SECONDS)
     await hass.async_stop(force=True)

@@ -1,5 +1,6 @@
 """`lookdown count` with a real server and a real MQTT broker."""
 
+import base64
 import contextlib
 import http.server
 import json
@@ -16,11 +17,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from harness.places import LOOKDOWN, ROOT, SAMPLES
-from harness.processes import free_ports
+from harness.processes import free_ports, running
 from mosquitto import PASSWORD, USER, broker
 from support.lookdown import lookdown
 from waiting import wait_until
 
+from cameras import http_camera
 from metrics import metric
 
 HERE = Path(__file__).resolve().parent
@@ -30,6 +32,7 @@ OTHER_SECRET = "whsec_QSBzZWNyZXQgdGhhdCBpcyBub3Qgb25l"
 OFFICE = (SAMPLES / "office.jpg").read_bytes()
 DETECT = "/detect?calibration=office&profile=fast"
 FRAMES = 12
+KILLS = 6
 ZONES = [{"name": "left", "frame_px": [[0, 0], [480, 0], [480, 960], [0, 960]]}]
 LINES = [{"name": "middle", "frame_px": [[480, 0], [480, 960]], "directions": ["east", "west"]}]
 TOPICS = "lookdown/counts/cameras/office"
@@ -102,9 +105,10 @@ class CountedCamera(unittest.TestCase):
         calibration |= {"zones": ZONES, "lines": LINES}
         (calibrations / "office.json").write_text(json.dumps(calibration), encoding="utf-8")
         self.broker = self.enterContext(broker(self.folder))
-        server = {"MODEL__PATH": "", "MQTT__URL": self.broker.url, "RESULTS__CAMERA_METRICS": "true"}
-        self.server = self.enterContext(lookdown(server, calibrations=calibrations))
         (self.port,) = free_ports(1)
+        server = {"MODEL__PATH": "", "MQTT__URL": self.broker.url, "RESULTS__CAMERA_METRICS": "true"}
+        server |= {"RESULTS__PICTURES": "office", "COUNTS__URL": f"http://127.0.0.1:{self.port}"}
+        self.server = self.enterContext(lookdown(server, calibrations=calibrations))
         password = self.folder / "password"
         password.write_text(PASSWORD + "\n", encoding="utf-8")
         self.settings, self.store = self.folder / "count.toml", self.folder / "counts.sqlite"
@@ -191,19 +195,57 @@ class Counts(CountedCamera):
             "frame over mqtt": float(retained.get("lookdown/cameras/office/frame_persons", "nan")),
         }
 
-    def test_every_place_shows_one_number(self):
+    def until_one_number(self, count: Count, wanted: float | None = None) -> dict[str, float]:
+        """Sends frames until every place shows one number, and returns all numbers."""
+
         def is_one(numbers: dict[str, float]) -> bool:
             places = [numbers[place] for place in ("results", "tracks", "metrics", "mqtt", "counts over mqtt")]
-            return len(set(places)) == 1 and places[0] > 0 and numbers["source"] == "tracks"
+            is_wanted = places[0] > 0 if wanted is None else places[0] == wanted
+            return len(set(places)) == 1 and is_wanted and numbers["source"] == "tracks"
 
+        deadline = time.monotonic() + 60
+        while not is_one(numbers := self.shown_numbers(count)):
+            self.assertLess(time.monotonic(), deadline, (wanted, numbers))
+            # Weak persons are in the frame only.
+            self.server.post(f"{DETECT}&score_threshold=0.06", OFFICE)
+        return numbers
+
+    def decide(self, method: str, thing: int) -> int:
+        """Confirms furniture of the camera or takes it back at the server, and returns the status."""
+        url = f"http://{self.server.address}/cameras/office/furniture/{thing}"
+        try:
+            with urllib.request.urlopen(urllib.request.Request(url, method=method), timeout=20) as answer:
+                return answer.status
+        except urllib.error.HTTPError as error:
+            return error.code
+
+    def test_every_place_subtracts_furniture(self):
         with self.counting() as count:
             wait_until(lambda: count.get("/counts") is not None, "lookdown count answers")
             self.server.post(DETECT, OFFICE)
-            deadline = time.monotonic() + 60
-            while not is_one(numbers := self.shown_numbers(count)):
-                self.assertLess(time.monotonic(), deadline, numbers)
-                # Weak persons are in the frame only.
-                self.server.post(f"{DETECT}&score_threshold=0.06", OFFICE)
+            persons = self.until_one_number(count)["results"]
+            deadline = time.monotonic() + 120
+            while (status := self.decide("PUT", 1)) != 204:
+                self.assertEqual(404, status)
+                self.assertLess(time.monotonic(), deadline, "nothing that stands for 30 s")
+                self.server.post(DETECT, OFFICE)
+            self.until_one_number(count, persons - 1)
+            things = json.loads(self.server.get("/cameras/office/furniture"))
+            states = {thing["id"]: (thing["state"], len(thing["outline_px"])) for thing in things}
+            self.assertEqual(("confirmed", 4), states[1])
+            count.stop(signal.SIGKILL)
+        with self.counting() as count:
+            wait_until(lambda: count.get("/counts") is not None, "lookdown count answers again")
+            self.until_one_number(count, persons - 1)
+            self.assertEqual(204, self.decide("DELETE", 1))
+            self.until_one_number(count, persons)
+            self.assertEqual(404, self.decide("DELETE", 1))
+
+    def test_every_place_shows_one_number(self):
+        with self.counting() as count:
+            wait_until(lambda: count.get("/counts") is not None, "lookdown count answers")
+            self.server.post(DETECT, OFFICE)
+            numbers = self.until_one_number(count)
             self.assertGreater(numbers["frame"], numbers["results"])
             self.assertEqual(numbers["frame"], numbers["frame over mqtt"])
             name = "homeassistant/sensor/lookdown_office_frame_persons/config"
@@ -255,14 +297,18 @@ class Counts(CountedCamera):
         secret = self.folder / "hook.secret"
         secret.write_text(SECRET + "\n", encoding="utf-8")
         with open(self.settings, "a", encoding="utf-8") as settings:
-            settings.write(f'[[webhooks]]\nurl = "{url}"\nsecret_file = "{secret}"\non = "occupancy"\n')
+            settings.write(f'[[webhooks]]\nurl = "{url}"\nsecret_file = "{secret}"\non = "occupancy"\nimage = true\n')
         with self.counting() as count:
             wait_until(lambda: count.get("/counts") is not None, "lookdown count answers")
             self.send_frames()
             message = wait_until(lambda: received and received[0], "a webhook is received")
         right = verified(SECRET, message)
         self.assertEqual(0, right.returncode, right.stderr)
-        self.assertEqual("occupancy.reached", json.loads(right.stdout)["type"])
+        event = json.loads(right.stdout)
+        self.assertEqual("occupancy.reached", event["type"])
+        image = event["data"]["image"]
+        self.assertEqual("image/jpeg", image["media_type"])
+        self.assertTrue(base64.b64decode(image["base64"]).startswith(b"\xff\xd8"))
         changed = message | {"body": message["body"].replace("office", "0ffice")}
         for secret, wrong in ((OTHER_SECRET, message), (SECRET, changed)):
             refused = verified(secret, wrong)
@@ -281,6 +327,68 @@ class Counts(CountedCamera):
                 ended = subprocess.run(command, capture_output=True, text=True, check=False, timeout=20)
                 self.assertEqual(1, ended.returncode)
                 self.assertIn(problem, ended.stderr)
+
+
+class KilledRun(unittest.TestCase):
+    """`lookdown run` with a camera, killed at any time."""
+
+    def setUp(self):
+        self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
+        calibrations = self.folder / "calibrations"
+        calibrations.mkdir()
+        calibration = json.loads((SAMPLES / "calibrations" / "office.json").read_text(encoding="utf-8"))
+        content = json.dumps(calibration | {"zones": ZONES, "lines": LINES})
+        (calibrations / "office.json").write_text(content, encoding="utf-8")
+        gray = "color=gray:size=960x960"
+        made = ["ffmpeg", "-v", "error", *("-f", "lavfi", "-i", gray), *("-frames:v", "1", "-f", "mjpeg", "-")]
+        empty = subprocess.run(made, capture_output=True, check=True).stdout
+        # Persons appear in the zone and are gone again, every twelve seconds.
+        self.camera = self.enterContext(http_camera([empty] * 24 + [OFFICE] * 24, 4.0))
+
+    @contextlib.contextmanager
+    def run_all(self):
+        """Runs all parts, and kills them at the end."""
+        (port,) = free_ports(1)
+        settings = {
+            "SERVER__LISTEN": f"127.0.0.1:{port}",
+            "CALIBRATIONS__PATH": str(self.folder / "calibrations"),
+            "COUNTS__PATH": str(self.folder / "counts.sqlite"),
+            "COUNTS__COMMIT_EVERY": "500ms",
+            "STATE__PATH": str(self.folder / "state"),
+        }
+        environment = {f"LOOKDOWN__{name}": value for name, value in settings.items()}
+        source = f"http://127.0.0.1:{self.camera}/stream"
+        flags = ["--name", "hall", "--calibration", "office", "--profile", "fast", "--every", "250ms"]
+        with running("killed", [str(LOOKDOWN), "run", source, *flags], port, "/readyz", environment) as server:
+            yield server
+            os.kill(server.pid, signal.SIGKILL)
+            server.process.wait(10)
+
+    def shown(self, server) -> tuple[float, float]:
+        """The entries into zones and the time with reports that a client sees."""
+        try:
+            counts = json.loads(server.get("/counts/hall?step=1h"))
+        except urllib.error.HTTPError:
+            # The counts are being started, or there is no report yet.
+            return (0, 0)
+        metrics = server.get("/metrics").decode().splitlines()
+        entries = [line for line in metrics if line.startswith("lookdown_count_zone_entries_total{")]
+        known = sum(step["known_seconds"] for step in counts["steps"])
+        return (sum(float(line.split()[-1]) for line in entries), known)
+
+    def test_a_kill_loses_no_count_that_was_shown(self):
+        shown = (0.0, 0.0)
+        for kill in range(KILLS):
+            with self.run_all() as server:
+                resumed = wait_until(lambda server=server: any(self.shown(server)) and self.shown(server), "counts", 60)
+                self.assertGreaterEqual(resumed, shown, f"kill {kill}")
+                self.assertGreaterEqual(resumed[1], shown[1], f"kill {kill}")
+                # Not a multiple of the interval of the transactions.
+                until = time.monotonic() + 3.0 + 0.37 * kill
+                while time.monotonic() < until:
+                    shown = self.shown(server)
+        self.assertGreater(shown[0], 0)
+        print(f"after {KILLS} kills: {shown[0]:.0f} entries, {shown[1]:.0f} s with reports", flush=True)
 
 
 if __name__ == "__main__":

@@ -11,14 +11,18 @@ import unittest
 from collections.abc import Iterator
 from pathlib import Path
 
-from harness.places import ROOT, SAMPLES
+from harness.places import LOOKDOWN, ROOT, SAMPLES
+from harness.processes import free_ports, running
 from mosquitto import PASSWORD, USER, Broker, broker
 from support.lookdown import lookdown
 from test_count import CountedCamera
 from waiting import wait_until
 
+from cameras import http_camera
+
 HERE = Path(__file__).resolve().parent
 PYTHON = ROOT / ".setup" / "real" / "home_assistant" / "bin" / "python"
+RECIPES = ROOT / "docs" / "home-automation.md"
 CARD = ROOT / "examples" / "home_assistant_card.yaml"
 OFFICE = (SAMPLES / "office.jpg").read_bytes()
 DETECT = "/detect?calibration=office&profile=fast"
@@ -40,7 +44,7 @@ class HomeAssistant:
 
     def __init__(self, folder: Path, of: Broker):
         self.folder, self.broker, self.process = folder, of, None
-        folder.mkdir()
+        folder.mkdir(exist_ok=True)
 
     def start(self) -> None:
         """Starts it and waits until it writes its states."""
@@ -56,9 +60,19 @@ class HomeAssistant:
         self.process.send_signal(signal.SIGTERM)
         self.process.wait(timeout=START_SECONDS)
 
+    def shown(self) -> dict:
+        """Everything that it has written."""
+        return json.loads((self.folder / "states.json").read_text(encoding="utf-8"))
+
     def entities(self) -> dict[str, dict]:
         """The entities by their unique IDs."""
-        return json.loads((self.folder / "states.json").read_text(encoding="utf-8"))
+        return {name: entity for name, entity in self.shown().items() if name not in ("notifications", "images")}
+
+    def press(self, entity: str, service: str) -> None:
+        """Turns a switch: `turn_on` or `turn_off`."""
+        unfinished = self.folder / "press.part"
+        unfinished.write_text(json.dumps({"entity": entity, "service": service}), encoding="utf-8")
+        unfinished.replace(self.folder / "press.json")
 
     def state(self, unique_id: str) -> str | None:
         """The state of an entity."""
@@ -174,6 +188,65 @@ class Entities(unittest.TestCase):
             self.assertEqual(self.home.state(PERSONS), "unavailable")
             wait_until(lambda: self.home.entities() == {}, "the camera is withdrawn", STALE_SECONDS)
             self.until_found(server)
+
+
+class RunEntities(unittest.TestCase):
+    """Entities of the cameras of `lookdown run`."""
+
+    def setUp(self):
+        self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
+        self.broker = self.enterContext(broker(self.folder))
+        home = self.folder / "home"
+        home.mkdir()
+        recipe = re.search(r"```yaml\n(automation:\n[^`]*persistent_notification[^`]*)```", RECIPES.read_text("utf-8"))
+        automation = recipe[1].replace("hall", "gate")
+        (home / "automations.yaml").write_text(automation, encoding="utf-8")
+        self.home = self.enterContext(home_assistant(home, self.broker))
+
+    def start(self, camera: int):
+        """Runs Lookdown with a camera."""
+        (port,) = free_ports(1)
+        settings = {
+            "SERVER__LISTEN": f"127.0.0.1:{port}",
+            "SHUTDOWN__GRACE_MILLIS": "0",
+            "STATE__PATH": str(self.folder / "state"),
+            "COUNTS__PATH": str(self.folder / "counts.sqlite"),
+            "MQTT__URL": self.broker.url,
+            "MQTT__IMAGE_EVERY_SECONDS": "1",
+            "RESULTS__PICTURES": "gate",
+            "CALIBRATIONS__PATH": str(SAMPLES / "calibrations"),
+        }
+        environment = {f"LOOKDOWN__{name}": value for name, value in settings.items()}
+        source = f"http://127.0.0.1:{camera}/stream"
+        command = [str(LOOKDOWN), "run", source, "--name", "gate", "--calibration", "office", "--profile", "fast"]
+        return running("run", command, port, "/readyz", environment)
+
+    def test_a_camera_has_an_image_a_switch_and_events(self):
+        gray = "color=gray:size=960x960"
+        made = ["ffmpeg", "-v", "error", *("-f", "lavfi", "-i", gray), *("-frames:v", "1", "-f", "mjpeg", "-")]
+        empty = subprocess.run(made, capture_output=True, check=True).stdout
+        # Half a minute without persons, and half a minute with some.
+        with http_camera([empty] * 30 + [OFFICE] * 30, 1.0) as camera:
+            with self.start(camera):
+                self.home.until({"lookdown_gate_detection": "on"}, START_SECONDS)
+                wait_until(lambda: self.home.shown()["images"].get("lookdown_gate_image", 0) > 1000, "an image", 60)
+                event = wait_until(
+                    lambda: self.home.entities().get("lookdown_gate_count_event", {}).get("event"), "", 120
+                )
+                self.assertEqual(event, "occupancy.reached")
+                wait_until(lambda: self.home.shown()["images"].get("lookdown_gate_count_event_image"), "its image")
+                wait_until(lambda: self.home.shown()["notifications"], "the notification of the recipe")
+                self.home.press("switch.gate_detection", "turn_off")
+                self.home.until({"lookdown_gate_detection": "off"})
+            # It stays off after a restart, and the page shows it.
+            with self.start(camera) as server:
+                self.home.until({"lookdown_gate_detection": "off"})
+                (shown,) = json.loads(server.get("/cameras"))
+                self.assertEqual((shown["name"], shown["paused"]), ("gate", True))
+                self.assertEqual(json.loads(server.get("/results")), [])
+                self.home.press("switch.gate_detection", "turn_on")
+                self.home.until({"lookdown_gate_detection": "on"})
+                wait_until(lambda: json.loads(server.get("/results")), "the camera is read again", 60)
 
 
 class CountEntities(CountedCamera):

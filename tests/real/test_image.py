@@ -3,18 +3,25 @@
 import json
 import os
 import re
+import shutil
 import stat
 import subprocess
+import tempfile
 import time
 import unittest
 from fnmatch import fnmatch
 from pathlib import Path
 
+from compose_file import environment, services
 from harness.places import LOOKDOWN, ROOT, SAMPLES
 from harness.processes import free_ports, running
 from image.build import build, remove
+from waiting import wait_until
 
-LARGEST_BYTES = 120_000_000
+from cameras import rtsp_camera
+
+LARGEST_BYTES = {"serve": 120_000_000, "run": 420_000_000}
+PACKAGES = ("libc6", "libgcc-s1", "libstdc++6", "ca-certificates")
 PROGRAM = "/opt/lookdown/lookdown"
 
 
@@ -23,8 +30,9 @@ class ContainerImage(unittest.TestCase):
     def setUpClass(cls):
         cls.addClassCleanup(remove)
         started = time.monotonic()
-        cls.image = build()
-        print(f"image: {cls.image.size() / 1e6:.1f} MB, built in {time.monotonic() - started:.0f} s", flush=True)
+        cls.image, cls.run_image = build("serve", "run")
+        sizes = " and ".join(f"{image.size() / 1e6:.1f} MB" for image in (cls.image, cls.run_image))
+        print(f"images: {sizes}, built in {time.monotonic() - started:.0f} s", flush=True)
 
     def test_its_configuration_describes_how_to_run_it(self):
         config = self.image.config
@@ -44,19 +52,25 @@ class ContainerImage(unittest.TestCase):
             self.assertTrue(labels[name], name)
 
     def test_it_is_small_and_has_no_other_program(self):
-        self.assertLess(self.image.size(), LARGEST_BYTES)
-        files = [file for file in self.image.root.rglob("*") if file.is_file() and os.access(file, os.X_OK)]
-        programs = {file.name for file in files if not file.name.startswith(("lib", "ld-"))}
-        self.assertEqual(programs, {"lookdown"})
-        writable = [file for file in self.image.root.rglob("*") if self.is_writable_by_the_user(file)]
-        self.assertEqual(
-            {str(file.relative_to(self.image.root)) for file in writable}, {"tmp", "opt/lookdown/calibrations"}
-        )
+        for image, name, expected in (
+            (self.image, "serve", {"lookdown"}),
+            (self.run_image, "run", {"lookdown", "ffmpeg", "ffprobe"}),
+        ):
+            self.assertLess(image.size(), LARGEST_BYTES[name])
+            files = [file for file in image.root.rglob("*") if file.is_file() and os.access(file, os.X_OK)]
+            programs = {file.name for file in files if not file.name.startswith(("lib", "ld-"))}
+            self.assertEqual(programs, expected)
+            writable = [file for file in image.root.rglob("*") if self.is_writable_by_the_user(file)]
+            self.assertEqual(
+                {str(file.relative_to(image.root)) for file in writable},
+                {"tmp", "opt/lookdown/calibrations", "var/lib/lookdown"},
+            )
 
     def test_third_party_software_has_its_licences(self):
-        for name in ("libc6", "libgcc-s1", "libstdc++6", "ca-certificates"):
-            self.assertTrue((self.image.root / "usr/share/doc" / name / "copyright").is_file(), name)
-            self.assertTrue((self.image.root / "var/lib/dpkg/status.d" / name).is_file(), name)
+        for image, packages in ((self.image, PACKAGES), (self.run_image, (*PACKAGES, "ffmpeg", "libavcodec59"))):
+            for name in packages:
+                self.assertTrue((image.root / "usr/share/doc" / name / "copyright").is_file(), name)
+                self.assertTrue((image.root / "var/lib/dpkg/status.d" / name).is_file(), name)
         for name in ("LICENSE", "NOTICE", "runtime/LICENSE", "runtime/ThirdPartyNotices.txt", "lookdown.cdx.json"):
             self.assertTrue((self.image.root / "opt/lookdown" / name).is_file(), name)
 
@@ -89,6 +103,36 @@ class ContainerImage(unittest.TestCase):
             server.process.terminate()
             self.assertEqual(server.process.wait(30), 0)
         self.assertEqual(self.health(variables).returncode, 1)
+
+    def test_one_variable_shows_the_camera_and_its_counts(self):
+        volume = Path(self.enterContext(tempfile.TemporaryDirectory()))
+        os.chown(volume, self.run_image.user(), -1)
+        frames = Path(self.enterContext(tempfile.TemporaryDirectory()))
+        shutil.copy(SAMPLES / "office.jpg", frames / "0.jpg")
+        camera = self.enterContext(rtsp_camera(frames, 5))
+        service = services(LOOKDOWN_CAMERA=f"rtsp://127.0.0.1:{camera}/stream")["lookdown"]
+        for _ in ("first start", "second start, with the same volume"):
+            (port,) = free_ports(1)
+            own = {"LOOKDOWN__SERVER__LISTEN": f"0.0.0.0:{port}", "LOOKDOWN__SHUTDOWN__GRACE_MILLIS": "0"}
+            variables = environment(service) | own | {"VOLUME": str(volume)}
+            config = self.run_image.config
+            self.assertEqual(config["Cmd"], service["command"])
+            command = self.run_image.inside(*config["Entrypoint"], *service["command"], **variables)
+            with running("image-run", command, port, "/readyz", {}) as server:
+                self.assertIn(b"<title>Lookdown</title>", server.get("/"))
+
+                def cameras(server=server) -> list:
+                    return json.loads(server.get("/counts"))["cameras"]
+
+                wait_until(cameras, "the camera is counted", 60)
+                self.assertEqual([counted["name"] for counted in cameras()], ["camera"])
+                (shown,) = json.loads(server.get("/cameras"))
+                self.assertEqual((shown["name"], shown["problem"]), ("camera", None))
+                report = json.loads(server.get("/results/camera/latest"))
+                self.assertGreater(len(report["persons"]), 3)
+                server.process.terminate()
+                self.assertEqual(server.process.wait(60), 0)
+            self.assertTrue((volume / "counts.sqlite").is_file())
 
     def health(self, variables: dict[str, str]) -> subprocess.CompletedProcess:
         """The result of the image's health check with these variables."""

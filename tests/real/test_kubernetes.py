@@ -9,7 +9,12 @@ from harness.places import LOOKDOWN, ROOT
 from harness.processes import free_ports
 from kubernetes.tools import PYTHON, VALIDATE, Refused, manifests, only, read_yaml, run
 
-OVERLAYS = ("overlays/cpu", "overlays/gpu", "overlays/ha", "overlays/keda", "examples/gateway", "examples/ingress")
+OVERLAYS = (
+    *("overlays/cpu", "overlays/gpu", "overlays/ha", "overlays/keda", "overlays/run"),
+    *("examples/gateway", "examples/ingress"),
+)
+# The overlays whose number of pods is fixed.
+UNSCALED = ("base", "overlays/gpu", "overlays/run")
 
 
 class Manifests(unittest.TestCase):
@@ -78,6 +83,18 @@ class Manifests(unittest.TestCase):
             self.assertEqual(checked.returncode, 0, f"{folder}: {checked.stderr}")
             self.assertIn("1 calibrations can be used", checked.stdout)
 
+    def test_one_pod_runs_all_parts_with_its_state_in_a_volume(self):
+        documents = self.all["overlays/run"]
+        deployment, container = only(documents, "Deployment")["spec"], self.container(documents)
+        self.assertEqual((deployment["replicas"], deployment["strategy"]), (1, {"type": "Recreate"}))
+        self.assertEqual(container["args"], ["run"])
+        mounts = {mount["mountPath"]: mount["name"] for mount in container["volumeMounts"]}
+        volumes = {volume["name"]: volume for volume in deployment["template"]["spec"]["volumes"]}
+        claim = volumes[mounts["/var/lib/lookdown"]]["persistentVolumeClaim"]["claimName"]
+        self.assertEqual(claim, only(documents, "PersistentVolumeClaim")["metadata"]["name"])
+        for folder in set(OVERLAYS) - {"overlays/run"}:
+            self.assertEqual(self.container(self.all[folder])["args"], ["serve"], folder)
+
     def test_the_autoscaler_uses_the_metric_of_the_adapter(self):
         (rule,) = read_yaml(ROOT / "k8s" / "monitoring" / "prometheus-adapter.yaml")["rules"]
         metrics = only(self.all["overlays/ha"], "HorizontalPodAutoscaler")["spec"]["metrics"]
@@ -88,7 +105,7 @@ class Manifests(unittest.TestCase):
         for folder, documents in self.all.items():
             kinds = ("HorizontalPodAutoscaler", "ScaledObject")
             found = [document["kind"] for document in documents if document["kind"] in kinds]
-            self.assertEqual(len(found), 0 if folder in ("base", "overlays/gpu") else 1, f"{folder}: {found}")
+            self.assertEqual(len(found), 0 if folder in UNSCALED else 1, f"{folder}: {found}")
         scaled = only(self.all["overlays/keda"], "ScaledObject")["spec"]
         autoscaler = only(self.all["overlays/ha"], "HorizontalPodAutoscaler")["spec"]
         self.assertEqual(scaled["scaleTargetRef"]["name"], autoscaler["scaleTargetRef"]["name"])

@@ -15,7 +15,7 @@ from kubernetes.tools import PYTHON, manifests, only, read_yaml, run
 from waiting import wait_until
 
 MONITORING = ROOT / "k8s" / "monitoring"
-DASHBOARDS = ("dashboard.json", "occupancy.json")
+DASHBOARDS = ("dashboard.json", "occupancy.json", "counts.json")
 UNIT_TESTS = Path(__file__).with_name("kubernetes") / "alerts_test.yaml"
 SELECTOR = re.compile(r"\b(lookdown_\w+|process_\w+)(?:\{([^}]*)\})?")
 MATCHER = re.compile(r'(\w+)="([^"]+)"')
@@ -105,7 +105,7 @@ class Monitoring(unittest.TestCase):
         run(["promtool", "test", "rules", self.folder / "test.yaml"])
 
     def test_every_queried_metric_and_label_is_in_a_scrape(self):
-        scrape = self.scrape() + self.scrape_without_the_inference_server()
+        scrape = self.scrape() + self.scrape_without_the_inference_server() + self.scrape_of_all_parts()
         queries = [rule["expr"] for rule in self.rules] + self.panels
         queries += [self.adapter["seriesQuery"], self.adapter["metricsQuery"], self.keda_query()]
         asked = {found.groups() for query in queries for found in SELECTOR.finditer(query)}
@@ -156,13 +156,34 @@ class Monitoring(unittest.TestCase):
             self.assertEqual(connection.getresponse().status, 200)
             return server.get("/metrics").decode()
 
+    def scrape_of_all_parts(self) -> str:
+        """The metrics of `lookdown run` that has counted a frame of a camera."""
+        (port,) = free_ports(1)
+        frames = self.folder / "frames"
+        frames.mkdir()
+        settings = {
+            "SERVER__LISTEN": f"127.0.0.1:{port}",
+            "SHUTDOWN__GRACE_MILLIS": "0",
+            "CALIBRATIONS__PATH": str(self.folder / "calibrations"),
+            "COUNTS__PATH": str(self.folder / "counts.sqlite"),
+            "STATE__PATH": str(self.folder / "state"),
+        }
+        environment = {f"LOOKDOWN__{name}": value for name, value in settings.items()}
+        command = [str(LOOKDOWN), "run", str(frames), "--calibration", "office", "--profile", "fast"]
+        with running("counting", command, port, "/readyz", environment) as server:
+            shutil.copy(SAMPLES / "office.jpg", frames)
+            wait_until(lambda: b"lookdown_count_crossings_total{" in server.get("/metrics"), "the frame is counted")
+            return server.get("/metrics").decode()
+
     def calibrations(self) -> Path:
-        """A folder with the calibration of the sample, which has a zone."""
+        """A folder with the calibration of the sample, which has a zone and a line."""
         folder = self.folder / "calibrations"
         folder.mkdir()
         calibration = json.loads((SAMPLES / "calibrations" / "office.json").read_text(encoding="utf-8"))
         zones = [{"name": "left", "frame_px": [[0, 0], [480, 0], [480, 960], [0, 960]]}]
-        (folder / "office.json").write_text(json.dumps(calibration | {"zones": zones}), encoding="utf-8")
+        lines = [{"name": "middle", "frame_px": [[480, 0], [480, 960]]}]
+        content = calibration | {"zones": zones, "lines": lines}
+        (folder / "office.json").write_text(json.dumps(content), encoding="utf-8")
         return folder
 
     def scrape_without_the_inference_server(self) -> str:

@@ -15,6 +15,7 @@ sys.path.append(str(Path(__file__).resolve().parents[2] / "lab/benches"))
 from harness.machine import made  # noqa: E402
 from harness.processes import BenchError  # noqa: E402
 from proofs import (  # noqa: E402
+    cameras,
     clock,
     companions,
     contract,
@@ -52,6 +53,7 @@ PARTS = (
     companions,
     planted,
     streams,
+    cameras,
     rude,
     floods,
     drawing,

@@ -1,5 +1,5 @@
 //! Calls that belong in few places: opening files to read them, starting processes, comparing API
-//! keys, and reading the clock, which jumps.
+//! keys, reading the clock, which jumps, and making HTTP clients.
 
 use std::{
     fs,
@@ -24,7 +24,7 @@ const READERS: [&str; 6] = [
     // Creates the file that locks the store.
     "crates/lookdown-count/src/store.rs",
     // Writes a password.
-    "src/cameras.rs",
+    "src/cameras/state_folder.rs",
     // Tests of generated documentation.
     "src/api/parameters/reference.rs",
     "src/settings/reference.rs",
@@ -81,6 +81,22 @@ const CLOCK_READERS: [&str; 18] = [
     "src/telemetry/request_trace.rs",
     // The validity of certificates.
     "src/tls.rs",
+];
+
+/// Calls that make HTTP clients. That of `http_transport.rs` bounds the provisional responses of its
+/// peers; the others end every request at a timeout.
+const CLIENTS: [&str; 3] = [
+    "Client::builder()",
+    "Client::new()",
+    "legacy::Client::builder(",
+];
+/// The files that may make them.
+const CLIENT_MAKERS: [&str; 5] = [
+    "crates/lookdown-common/src/http_transport.rs",
+    "crates/lookdown-detect/src/inference/fetch/source.rs",
+    "crates/lookdown-detect/src/inference/remote/connection.rs",
+    "src/probe.rs",
+    "src/telemetry/collector.rs",
 ];
 
 /// The source files of all crates without those of tests.
@@ -155,5 +171,14 @@ fn only_listed_files_read_the_clock() {
     assert!(
         found.is_empty(),
         "use the monotonic clock, or state what holds when the clock jumps: {found:#?}"
+    );
+}
+
+#[test]
+fn only_listed_files_make_http_clients() {
+    let found = callers(&CLIENTS, &CLIENT_MAKERS);
+    assert!(
+        found.is_empty(),
+        "use lookdown_common::HttpClient, which bounds provisional responses: {found:#?}"
     );
 }

@@ -1,44 +1,35 @@
 //! HTTP requests to the server, with its key, its authorities and limits.
 
-use std::{sync::OnceLock, time::Duration};
+use std::time::Duration;
 
 use http_body::Body as _;
 use reqwest::{
-    Body, Certificate, Client, RequestBuilder, Response, Url,
+    Body, RequestBuilder, Response, Url,
     header::{AUTHORIZATION, CONTENT_LENGTH, HOST, HeaderMap, HeaderValue, RETRY_AFTER},
-    redirect,
 };
 use secrecy::ExposeSecret;
 use serde::Deserialize;
 
 use crate::{
     InProcess, ServerOptions,
+    http_transport::{ClientError, HttpClient, HttpError},
     text::{one_line, with_causes},
 };
 
-/// Connect timeout.
-const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
-/// Idle time after which a connection is closed: less than the keep-alive of common servers.
-const IDLE_TIMEOUT: Duration = Duration::from_secs(20);
 /// Longest `Retry-After` that is honoured.
 const MAX_RETRY_AFTER: Duration = Duration::from_mins(1);
 /// Largest problem document that is read.
 const MAX_PROBLEM_BYTES: usize = 64 << 10;
 
-/// A reason why there is no HTTP client.
-#[derive(Debug, thiserror::Error)]
-#[error(
-    "upstream.authorities: {0}: give a PEM file with the authorities of the server's certificate"
-)]
-pub struct ClientError(String);
-
 /// The requests to a server.
 #[derive(Debug, Clone)]
 pub struct ServerClient {
-    client: Client,
+    client: HttpClient,
     url: Url,
-    /// The server in this process, with the header of its key.
-    in_process: Option<(InProcess, HeaderMap)>,
+    /// The header of the key.
+    headers: HeaderMap,
+    /// The server in this process.
+    in_process: Option<InProcess>,
 }
 
 /// The parts of a problem document that are used.
@@ -46,34 +37,6 @@ pub struct ServerClient {
 struct Problem {
     #[serde(default)]
     detail: String,
-}
-
-/// Starts an HTTP client with a connect timeout, without redirections and proxies. On a system
-/// without certificates of authorities it trusts none: plain HTTP works, and HTTPS needs
-/// authorities of its own.
-pub fn client_builder() -> reqwest::ClientBuilder {
-    static SYSTEM_HAS_AUTHORITIES: OnceLock<bool> = OnceLock::new();
-    // Fails when a provider is already installed, which has the same effect.
-    let _ = rustls::crypto::ring::default_provider().install_default();
-    if *SYSTEM_HAS_AUTHORITIES.get_or_init(|| bare_builder().build().is_ok()) {
-        bare_builder()
-    } else {
-        bare_builder().tls_certs_only([])
-    }
-}
-
-fn bare_builder() -> reqwest::ClientBuilder {
-    Client::builder()
-        .connect_timeout(CONNECT_TIMEOUT)
-        .pool_idle_timeout(IDLE_TIMEOUT)
-        .redirect(redirect::Policy::none())
-        .no_proxy()
-}
-
-impl From<reqwest::Error> for ClientError {
-    fn from(error: reqwest::Error) -> Self {
-        Self(with_causes(&error))
-    }
 }
 
 impl ServerClient {
@@ -91,14 +54,11 @@ impl ServerClient {
             key.set_sensitive(true);
             headers.insert(AUTHORIZATION, key);
         }
-        let mut builder = client_builder().default_headers(headers.clone());
-        if let Some(pem) = &options.authorities {
-            builder = builder.tls_certs_only(Certificate::from_pem_bundle(pem)?);
-        }
         Ok(Self {
-            client: builder.build()?,
+            client: HttpClient::new(options.authorities.as_deref())?,
             url: options.url.clone(),
-            in_process: options.in_process.clone().map(|server| (server, headers)),
+            headers,
+            in_process: options.in_process.clone(),
         })
     }
 
@@ -128,18 +88,23 @@ impl ServerClient {
         self.client.post(url)
     }
 
+    /// Starts a DELETE request.
+    pub fn delete(&self, url: Url) -> RequestBuilder {
+        self.client.delete(url)
+    }
+
     /// Sends a request of this client.
     ///
     /// # Errors
     /// If the connection fails. A server in this process always answers.
-    pub async fn send(&self, request: RequestBuilder) -> reqwest::Result<Response> {
-        let Some((server, own_headers)) = &self.in_process else {
-            return request.send().await;
+    pub async fn send(&self, request: RequestBuilder) -> Result<Response, HttpError> {
+        let request = request.headers(self.headers.clone());
+        let Some(server) = &self.in_process else {
+            return self.client.send(request).await;
         };
         let mut request: http::Request<Body> = request.build()?.try_into()?;
         let length = request.body().size_hint().exact();
         let headers = request.headers_mut();
-        headers.extend(own_headers.clone());
         headers.insert(HOST, HeaderValue::from_static("localhost"));
         headers.extend(length.map(|length| (CONTENT_LENGTH, HeaderValue::from(length))));
         Ok(Response::from(server.answer(request).await))
@@ -166,11 +131,11 @@ impl ServerClient {
 
     /// Describes a request without a response.
     #[must_use]
-    pub fn failure(&self, error: reqwest::Error) -> String {
+    pub fn failure(&self, error: &HttpError) -> String {
         format!(
             "the server {} cannot be reached: {}: start it, or correct upstream.url",
             self.address(),
-            with_causes(&error.without_url())
+            with_causes(error)
         )
     }
 }
@@ -186,7 +151,7 @@ pub fn retry_after(headers: &HeaderMap) -> Option<Duration> {
 ///
 /// # Errors
 /// If the connection fails.
-pub async fn read_body(mut response: Response, max_bytes: usize) -> reqwest::Result<Vec<u8>> {
+pub async fn read_body(mut response: Response, max_bytes: usize) -> Result<Vec<u8>, HttpError> {
     let mut body = Vec::new();
     while let Some(chunk) = response.chunk().await? {
         body.extend_from_slice(&chunk);

@@ -16,6 +16,8 @@ pub mod files;
 #[cfg(feature = "companion")]
 mod http_client;
 #[cfg(feature = "companion")]
+mod http_transport;
+#[cfg(feature = "companion")]
 mod in_process;
 mod log_once;
 pub mod plain_name;
@@ -37,7 +39,8 @@ pub use {
     backoff::Backoff,
     config::{ConfigError, parse_toml, read_file, read_secret},
     duration::{optional_duration, parse_duration},
-    http_client::{ClientError, ServerClient, client_builder, read_body, retry_after},
+    http_client::{ServerClient, read_body, retry_after},
+    http_transport::{ClientError, HttpClient, HttpError},
     in_process::InProcess,
     reload::Reload,
     secret::Secret,

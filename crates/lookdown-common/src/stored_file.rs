@@ -13,7 +13,7 @@ pub enum StoredFile {
     Calibration,
     /// The cameras of `lookdown run` that are added over HTTP.
     Cameras,
-    /// The counts: `user_version` of an SQLite file.
+    /// The counts: `user_version` of the `SQLite` file.
     Counts,
     /// The state of a tracker in the counts: its first byte.
     Tracks,
@@ -28,7 +28,7 @@ impl StoredFile {
     pub const fn version(self) -> u8 {
         match self {
             Self::Settings | Self::Calibration | Self::Cameras | Self::Counts => 1,
-            Self::Tracks => 2,
+            Self::Tracks => 3,
         }
     }
 

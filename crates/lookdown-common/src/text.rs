@@ -42,6 +42,15 @@ pub fn is_invisible(character: char) -> bool {
         )
 }
 
+/// Most characters of the name of a camera.
+pub const MAX_CAMERA_CHARS: usize = 128;
+
+/// Returns true if a camera may have this name.
+#[must_use]
+pub fn is_camera_name(name: &str) -> bool {
+    (1..=MAX_CAMERA_CHARS).contains(&name.chars().count()) && !name.contains(is_invisible)
+}
+
 /// Formats a text as one line of at most 300 characters, so that it can neither forge nor fill log
 /// lines.
 #[must_use]
@@ -85,6 +94,7 @@ mod tests {
     fn characters_that_reorder_a_line_are_replaced() {
         assert_eq!(one_line("a\u{202e}b\u{feff}c\nd"), "a b c d");
         assert!(!is_invisible('ä') && !is_invisible('走') && !is_invisible(' '));
+        assert!(is_camera_name("Eingang, 2. OG") && !is_camera_name("\u{202e}llah"));
     }
 
     #[test]

@@ -142,12 +142,12 @@ impl Calibrations {
 async fn request(client: &ServerClient, id: &str) -> Result<Option<Vec<u8>>, String> {
     let url = client.route(["calibrations", id]);
     let sent = client.send(client.get(url).timeout(TIMEOUT)).await;
-    let response = sent.map_err(|error| client.failure(error))?;
+    let response = sent.map_err(|error| client.failure(&error))?;
     match response.status() {
         StatusCode::OK => {
             let has_tag = response.headers().contains_key(ETAG);
             let body = read_body(response, CalibrationFile::MAX_BYTES).await;
-            let body = body.map_err(|error| client.failure(error))?;
+            let body = body.map_err(|error| client.failure(&error))?;
             if has_tag {
                 Ok(Some(body))
             } else {

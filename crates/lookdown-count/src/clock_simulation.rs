@@ -191,7 +191,7 @@ impl World {
             format!(
                 r#"{{"score": 0.95, "floor": {{"x_m": {x}, "y_m": 1.0}},
                 "bearing": {{"azimuth_deg": {}, "off_axis_deg": {}}},
-                "oriented_box": {{"cx": 100, "cy": 100, "height": 40, "angle_deg": 0}}}}"#,
+                "oriented_box": {{"cx": 100, "cy": 100, "width": 20, "height": 40, "angle_deg": 0}}}}"#,
                 1_f64.atan2(*x).to_degrees() + 90.0,
                 x.hypot(1.0).atan2(1.9).to_degrees(),
             )

@@ -5,6 +5,7 @@ use lookdown_lens::{
     geometry::{
         CountingLine, LineEnds, Pixel, Polygon, ZoneArea,
         floor::{FloorPosition, floor_position, pixel_of},
+        oriented_box::vertical_in_frame,
         polygon::MAX_CORNERS,
     },
 };
@@ -13,6 +14,8 @@ use lookdown_tracking::{
     lines::{DEFAULT_BAND_M, Line},
     zones::Zone,
 };
+
+use nalgebra::Vector2;
 
 use crate::definition_key::DefinitionKey;
 
@@ -124,6 +127,21 @@ impl CameraDefinition {
             key,
             geometry: Some(geometry),
         }
+    }
+
+    /// Returns true if another definition is for frames of the same size.
+    pub(crate) fn has_frames_of(&self, other: &Self) -> bool {
+        let size = |definition: &Self| (definition.key.width, definition.key.height);
+        size(self) == size(other)
+    }
+
+    /// Returns the direction in the frame, at a pixel, of what is up.
+    pub(crate) fn up_at(&self, pixel: Pixel) -> Vector2<f64> {
+        if let Some(camera) = &self.geometry {
+            return vertical_in_frame(pixel, &camera.lens, &camera.mount);
+        }
+        let (width, height) = (self.key.width, self.key.height);
+        pixel - Pixel::new(f64::from(width) / 2.0, f64::from(height) / 2.0)
     }
 
     /// Returns the frame pixel of a place on the floor of the tracker; `None` where the lens does not

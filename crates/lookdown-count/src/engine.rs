@@ -1,5 +1,7 @@
 //! All cameras and sites, the sums that are not stored yet, and the totals.
 
+mod furniture;
+
 use std::{
     collections::{BTreeMap, BTreeSet},
     sync::Arc,
@@ -16,7 +18,8 @@ use crate::{
     drops::{DropReason, Drops},
     now::{LogPause, Now},
     report::Report,
-    scene::{NamedCrossing, Scene, SceneState},
+    scene::{ReportTime, Scene, SceneState},
+    scene_camera::NamedCrossing,
     sums::{DAY_MS, Owner, Sums, Totals},
 };
 
@@ -205,7 +208,11 @@ impl Engine {
         let owner = owner.ok_or(DropReason::TooManyCameras)?;
         self.changed.insert(owner.clone());
         let is_on_site = definition.site.is_some();
-        let time = (report.at_ms(is_on_site), self.options.longest_gap_ms);
+        let time = ReportTime {
+            at_ms: report.at_ms(is_on_site),
+            longest_gap_ms: self.options.longest_gap_ms,
+            now: now.instant,
+        };
         let (scene, index) = self.scene_at(&owner, &report.camera)?;
         scene.cameras[index].last_report = Some(key);
         if let Some(ahead_ms) = report.clock_difference_ms(is_on_site) {
@@ -304,6 +311,7 @@ impl Engine {
         if is_full || site.is_some_and(|site| site.cameras.len() >= MAX_CAMERAS) {
             return None;
         }
+        let furniture = self.furniture(camera).cloned();
         if let Some(before) = before {
             self.rebuild(&before, |cameras| drop(cameras.remove(camera)));
         }
@@ -311,6 +319,7 @@ impl Engine {
             cameras.insert(camera.to_owned(), Arc::clone(definition));
         });
         self.owners.insert(camera.to_owned(), owner.clone());
+        self.restore_furniture(camera, furniture);
         Some(owner)
     }
 
@@ -364,6 +373,7 @@ impl Engine {
                         .and_then(|before| before.camera(&camera.name));
                     camera.last_report = before.and_then(|(_, before)| before.last_report);
                 }
+                scene.keep_furniture(before.as_ref());
                 self.scenes.insert(owner.clone(), scene);
             }
             Err(problem) => tracing::warn!("{owner} is not followed: {problem}"),

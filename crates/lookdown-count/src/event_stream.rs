@@ -40,7 +40,7 @@ impl<'a> EventStream<'a> {
         }
         let response = match timeout(CONNECT_TIMEOUT, client.send(request)).await {
             Ok(Ok(response)) => response,
-            Ok(Err(error)) => return Err(StreamError::new(client.failure(error))),
+            Ok(Err(error)) => return Err(StreamError::new(client.failure(&error))),
             Err(_) => {
                 let address = client.address();
                 return Err(StreamError::new(format!(
@@ -77,7 +77,7 @@ impl<'a> EventStream<'a> {
             match timeout(SILENCE, self.response.chunk()).await {
                 Ok(Ok(Some(chunk))) => self.parser.push(&chunk),
                 Ok(Ok(None)) => return Err(self.ended("has ended the stream")),
-                Ok(Err(error)) => return Err(StreamError::new(self.client.failure(error))),
+                Ok(Err(error)) => return Err(StreamError::new(self.client.failure(&error.into()))),
                 Err(_) => return Err(self.ended("was silent for 45 s")),
             }
         }

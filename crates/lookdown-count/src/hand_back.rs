@@ -60,7 +60,7 @@ async fn send(client: &ServerClient, snapshot: &Snapshot, sent: &mut Sent) -> Re
         let request = request.header(CONTENT_TYPE, "application/json");
         let body = format!("{{\"persons\":{persons}}}");
         let response = client.send(request.body(body)).await;
-        let response = response.map_err(|error| client.failure(error))?;
+        let response = response.map_err(|error| client.failure(&error))?;
         match response.status() {
             StatusCode::NO_CONTENT => {}
             // The reports of the camera were deleted.

@@ -4,6 +4,7 @@ mod counts;
 mod document;
 mod floor;
 mod frame_heat_map;
+mod furniture;
 mod heat_map;
 mod operation;
 mod shared;
@@ -45,6 +46,8 @@ fn routes() -> OpenApiRouter<Shared> {
         .routes(routes!(cameras))
         .routes(routes!(counts::of_camera))
         .routes(routes!(tracks::of_camera))
+        .routes(routes!(furniture::list))
+        .routes(routes!(furniture::confirm, furniture::take_back))
         .routes(routes!(heat_map::json_of_camera))
         .routes(routes!(heat_map::png_of_camera))
         .routes(routes!(frame_heat_map::png))

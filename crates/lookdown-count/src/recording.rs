@@ -145,6 +145,13 @@ impl Recording {
         Ok(())
     }
 
+    /// Returns the persons at the last report.
+    #[must_use]
+    pub fn persons(&self) -> u64 {
+        let scene = self.engine.scene_of(&self.camera);
+        scene.map_or(0, |scene| scene.presence().persons)
+    }
+
     /// Returns the crossings of the lines of the camera since the store was created.
     #[must_use]
     pub fn lines(&self) -> Vec<LineSnapshot> {

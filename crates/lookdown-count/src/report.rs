@@ -1,10 +1,8 @@
 //! The parts of a report of the server that are used.
 
 use jiff::Timestamp;
-use lookdown_lens::{
-    calibration::CalibrationId,
-    geometry::{Pixel, oriented_box::vertical_in_frame},
-};
+use lookdown_common::text::is_camera_name;
+use lookdown_lens::{calibration::CalibrationId, geometry::Pixel};
 use lookdown_tracking::Observation;
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
@@ -19,8 +17,7 @@ const MAX_BEHIND_MS: i64 = 3_600_000;
 const MAX_AHEAD_ON_SITE_MS: i64 = 500;
 const MAX_BEHIND_ON_SITE_MS: i64 = 1_000;
 
-/// The server's limits of names.
-const MAX_CAMERA_CHARS: usize = 128;
+/// The server's limit of revisions.
 const MAX_REVISION_BYTES: usize = 128;
 
 /// A report of the server.
@@ -74,6 +71,7 @@ pub(crate) struct Person {
 struct OrientedBox {
     cx: f64,
     cy: f64,
+    width: f64,
     height: f64,
     angle_deg: f64,
 }
@@ -100,10 +98,10 @@ impl Report {
         }
     }
 
-    /// Returns true if the names are as long as the server permits at most.
+    /// Returns true if the server permits such names.
     pub(crate) fn has_valid_names(&self) -> bool {
         let used = &self.calibration;
-        self.camera.chars().count() <= MAX_CAMERA_CHARS
+        is_camera_name(&self.camera)
             && (used.assumed || used.id.parse::<CalibrationId>().is_ok())
             && used.revision.len() <= MAX_REVISION_BYTES
     }
@@ -157,49 +155,45 @@ impl Report {
         let margin = self.margin.iter().map(|person| (person, true));
         persons
             .chain(margin)
-            .filter_map(|(person, is_in_margin)| self.observation(person, is_in_margin, definition))
+            .filter_map(|(person, is_in_margin)| observation(person, is_in_margin, definition))
             .collect()
     }
+}
 
-    fn observation(
-        &self,
-        person: &Person,
-        is_in_margin: bool,
-        definition: &CameraDefinition,
-    ) -> Option<Observation> {
-        let bearing = person.bearing?;
-        let OrientedBox {
-            cx,
-            cy,
-            height,
-            angle_deg,
-        } = person.oriented_box;
-        let centre = Pixel::new(cx, cy);
-        // The angle does not tell the head from the foot.
-        let vertical = if let Some(camera) = &definition.geometry {
-            vertical_in_frame(centre, &camera.lens, &camera.mount)
-        } else {
-            let Image { width, height } = self.image;
-            centre - Pixel::new(f64::from(width) / 2.0, f64::from(height) / 2.0)
-        };
-        let (sin, cos) = angle_deg.to_radians().sin_cos();
-        let axis = Vector2::new(sin, -cos);
-        let up = if axis.dot(&vertical) < 0.0 {
-            -axis
-        } else {
-            axis
-        };
-        let foot = centre - up * (height / 2.0);
-        Some(Observation {
-            floor_m: person.floor.map(|floor| [floor.x_m, floor.y_m]),
-            azimuth_deg: bearing.azimuth_deg,
-            off_axis_deg: bearing.off_axis_deg,
-            centre_px: [cx, cy],
-            foot_px: [foot.x, foot.y],
-            score: person.score,
-            is_in_margin,
-        })
-    }
+fn observation(
+    person: &Person,
+    is_in_margin: bool,
+    definition: &CameraDefinition,
+) -> Option<Observation> {
+    let bearing = person.bearing?;
+    let OrientedBox {
+        cx,
+        cy,
+        width,
+        height,
+        angle_deg,
+    } = person.oriented_box;
+    let centre = Pixel::new(cx, cy);
+    // The angle does not tell the head from the foot.
+    let vertical = definition.up_at(centre);
+    let (sin, cos) = angle_deg.to_radians().sin_cos();
+    let axis = Vector2::new(sin, -cos);
+    let up = if axis.dot(&vertical) < 0.0 {
+        -axis
+    } else {
+        axis
+    };
+    let foot = centre - up * (height / 2.0);
+    Some(Observation {
+        floor_m: person.floor.map(|floor| [floor.x_m, floor.y_m]),
+        azimuth_deg: bearing.azimuth_deg,
+        off_axis_deg: bearing.off_axis_deg,
+        centre_px: [cx, cy],
+        size_px: [width, height],
+        foot_px: [foot.x, foot.y],
+        score: person.score,
+        is_in_margin,
+    })
 }
 
 fn is_plausible(ahead_ms: i64, is_on_site: bool) -> bool {
@@ -256,6 +250,8 @@ mod tests {
         };
         assert!(change(|_| ()));
         assert!(!change(|report| report.camera = "n".repeat(129)));
+        assert!(!change(|report| report.camera = String::new()));
+        assert!(!change(|report| report.camera = "\u{202e}llah".to_owned()));
         assert!(!change(
             |report| report.calibration.id = "../results".to_owned()
         ));

@@ -126,7 +126,13 @@ pub async fn count(
     let _handing_back = AbortOnDrop(handing_back.abort_handle());
     let (stop_sender, stop_receiver) = watch::channel(false);
     let mut follower = Follower {
-        deliveries: Deliveries::start(&options.webhooks, resumed.messages, &store, &metrics)?,
+        deliveries: Deliveries::start(
+            &options.webhooks,
+            resumed.messages,
+            &client,
+            &store,
+            &metrics,
+        )?,
         conditions,
         client,
         engine,

@@ -1,35 +1,20 @@
 //! A tracker with the cameras that it follows: one camera, or all cameras of a site.
 
-use std::{
-    collections::BTreeMap,
-    sync::Arc,
-    time::{Duration, Instant},
-};
+use std::{collections::BTreeMap, sync::Arc, time::Instant};
 
-use lookdown_common::text::one_line;
 use lookdown_tracking::{
-    Observation, RefusedReport, SiteError, Track, Tracker, TrackerSettings,
+    Observation, RefusedReport, SiteError, Track, Tracker, TrackerSettings, furniture::Furniture,
     heat_map::HeatMap,
-    lines::{Direction, LineCounter, LineState},
-    zones::{DEFAULT_HOLD_S, ZoneCounter, ZoneEvent, ZoneState},
 };
 use serde::{Deserialize, Serialize};
 
 use crate::{
     definition::CameraDefinition,
     definition_key::DefinitionKey,
-    now::{LogPause, Now},
     presence::Presence,
-    report::ReportKey,
-    sums::{DAY_MS, LineDirection, MINUTE_MS, Owner, Sums, ZoneOf, minutes},
+    scene_camera::{CameraState, NamedCrossing, SceneCamera},
+    sums::{DAY_MS, Owner, Sums},
 };
-
-/// Reports of a camera that are late for this long mean that a clock was set back: tracks begin again
-/// at its time.
-pub(crate) const LATE_LIMIT: Duration = Duration::from_secs(10);
-
-/// Pause between two log lines about the clock of a camera.
-const LOG_PAUSE: Duration = Duration::from_hours(1);
 
 /// A tracker, the counters of its cameras, and the state of their sums.
 pub(crate) struct Scene {
@@ -43,22 +28,6 @@ pub(crate) struct Scene {
     pub(crate) may_begin_again: bool,
 }
 
-/// A camera of a scene.
-pub(crate) struct SceneCamera {
-    pub(crate) name: String,
-    pub(crate) definition: Arc<CameraDefinition>,
-    lines: LineCounter,
-    zones: ZoneCounter,
-    presence: Presence,
-    /// Persons in each zone at the last report of this camera.
-    zone_persons: Vec<u64>,
-    /// The last report of this camera, counted or not.
-    pub(crate) last_report: Option<ReportKey>,
-    /// Arrival of the first of the late reports since the last one in order.
-    late_since: Option<Instant>,
-    clock_log: LogPause,
-}
-
 /// The state of a scene as it is stored.
 #[derive(Serialize, Deserialize)]
 pub(crate) struct SceneState {
@@ -69,145 +38,15 @@ pub(crate) struct SceneState {
     cameras: Vec<CameraState>,
 }
 
-#[derive(Serialize, Deserialize)]
-struct CameraState {
-    name: String,
-    key: DefinitionKey,
-    lines: LineState,
-    zones: ZoneState,
-    presence: Presence,
-    zone_persons: Vec<u64>,
-    last_report: Option<ReportKey>,
-}
-
-/// A crossing with its names.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct NamedCrossing {
-    pub(crate) of: LineDirection,
+/// The time of a report.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ReportTime {
+    /// Time of its frame, milliseconds since the Unix epoch.
     pub(crate) at_ms: i64,
-}
-
-impl SceneCamera {
-    fn new(name: &str, definition: Arc<CameraDefinition>) -> Self {
-        Self {
-            name: name.to_owned(),
-            lines: line_counter(&definition, LineState::default()),
-            zones: zone_counter(&definition, ZoneState::default()),
-            presence: Presence::default(),
-            zone_persons: vec![0; definition.zones.len()],
-            last_report: None,
-            late_since: None,
-            clock_log: LogPause::default(),
-            definition,
-        }
-    }
-
-    /// Changes what is counted. Visits and approaches begin again.
-    fn redefine(&mut self, definition: Arc<CameraDefinition>) {
-        *self = Self {
-            presence: self.presence,
-            last_report: self.last_report,
-            late_since: self.late_since,
-            clock_log: self.clock_log,
-            ..Self::new(&self.name, definition)
-        };
-    }
-
-    /// Returns true if a refused report shows that a clock was set back: no report of this camera was
-    /// in order for [`LATE_LIMIT`].
-    pub(crate) fn is_set_back(&mut self, now: Instant) -> bool {
-        let since = *self.late_since.get_or_insert(now);
-        now.saturating_duration_since(since) >= LATE_LIMIT
-    }
-
-    /// Logs that the capture times of the camera are not used.
-    pub(crate) fn warn_of_clock(&mut self, ahead_ms: i64, now: Now) {
-        if self.clock_log.is_over(LOG_PAUSE, now) {
-            let camera = one_line(&self.name);
-            let seconds = Duration::from_millis(ahead_ms.unsigned_abs()).as_secs_f64();
-            let side = if ahead_ms > 0 { "ahead" } else { "behind" };
-            tracing::warn!(
-                "captured_at of {camera} is {seconds} s {side}, so the arrival is its time: set the \
-                 clock of the camera's client"
-            );
-        }
-    }
-
-    pub(crate) fn presence(&self) -> &Presence {
-        &self.presence
-    }
-
-    /// Returns each zone with its persons now.
-    pub(crate) fn occupancy(&self) -> impl Iterator<Item = (&str, usize)> {
-        let names = self.zones.zones().iter().map(|zone| zone.name.as_str());
-        names.zip(self.zones.occupancy())
-    }
-
-    fn zone_of(&self, index: usize) -> ZoneOf {
-        let zone = self.zones.zones().get(index);
-        ZoneOf {
-            camera: self.name.clone(),
-            zone: zone.map(|zone| zone.name.clone()).unwrap_or_default(),
-        }
-    }
-
-    /// Adds the crossings, entries and visits of the tracks to the sums.
-    /// Lines have all tracks, zones those that count.
-    fn count(&mut self, [tracks, counted]: [&[&Track]; 2], sums: &mut Sums) -> Vec<NamedCrossing> {
-        let mut named = Vec::new();
-        for crossing in self.lines.update(tracks.iter().copied()) {
-            let line = &self.lines.lines()[crossing.line];
-            let direction = match crossing.direction {
-                Direction::In => 0,
-                Direction::Out => 1,
-            };
-            let at_ms = milliseconds(crossing.at_s);
-            let of = LineDirection {
-                camera: self.name.clone(),
-                line: line.name.clone(),
-                direction: self.definition.directions[crossing.line][direction].clone(),
-            };
-            let key = (of.clone(), at_ms.div_euclid(MINUTE_MS));
-            *sums.crossings.entry(key).or_default() += 1;
-            named.push(NamedCrossing { of, at_ms });
-        }
-        for event in self.zones.update(counted.iter().copied()) {
-            let (ZoneEvent::Entered { zone, at_s, .. } | ZoneEvent::Left { zone, at_s, .. }) =
-                event;
-            let minute = milliseconds(at_s).div_euclid(MINUTE_MS);
-            let sum = sums.zones.entry((self.zone_of(zone), minute)).or_default();
-            match event {
-                ZoneEvent::Entered { .. } => sum.entries += 1,
-                ZoneEvent::Left { dwell_s, .. } => {
-                    sum.visits += 1;
-                    sum.visit_ms += milliseconds(dwell_s).unsigned_abs();
-                }
-            }
-        }
-        named
-    }
-
-    /// Adds the time since the last report of this camera to its zones.
-    fn advance_zones(&mut self, at_ms: i64, longest_gap_ms: i64, sums: &mut Sums) {
-        let since = self.presence.known_since(at_ms, longest_gap_ms);
-        let occupancy = self.zones.occupancy();
-        for (index, persons) in occupancy.into_iter().enumerate() {
-            let persons = persons as u64;
-            let zone = self.zone_of(index);
-            let before = std::mem::replace(&mut self.zone_persons[index], persons);
-            let parts = since.map(|since| minutes(since, at_ms));
-            for (minute, length_ms) in parts.into_iter().flatten().filter(|_| before > 0) {
-                let sum = sums.zones.entry((zone.clone(), minute)).or_default();
-                sum.person_ms += length_ms * before;
-                sum.most = sum.most.max(before);
-            }
-            if persons > 0 {
-                let minute = at_ms.div_euclid(MINUTE_MS);
-                let sum = sums.zones.entry((zone, minute)).or_default();
-                sum.most = sum.most.max(persons);
-            }
-        }
-    }
+    /// Longest time between two reports of a camera that is known, milliseconds.
+    pub(crate) longest_gap_ms: i64,
+    /// Its arrival, by a clock that never jumps.
+    pub(crate) now: Instant,
 }
 
 impl Scene {
@@ -240,20 +79,8 @@ impl Scene {
         mut definition: impl FnMut(DefinitionKey) -> Arc<CameraDefinition>,
     ) -> Self {
         let cameras = state.cameras.into_iter().map(|camera| {
-            let definition = definition(camera.key);
-            let mut zone_persons = camera.zone_persons;
-            zone_persons.resize(definition.zones.len(), 0);
-            SceneCamera {
-                name: camera.name,
-                lines: line_counter(&definition, camera.lines),
-                zones: zone_counter(&definition, camera.zones),
-                presence: camera.presence,
-                zone_persons,
-                last_report: camera.last_report,
-                late_since: None,
-                clock_log: LogPause::default(),
-                definition,
-            }
+            let definition = definition(camera.key.clone());
+            SceneCamera::resumed(camera, definition)
         });
         let cameras: Vec<_> = cameras.collect();
         let mut tracker = state.tracker;
@@ -273,20 +100,40 @@ impl Scene {
     /// Changes what is counted of a camera. Visits and approaches begin again.
     pub(crate) fn redefine(&mut self, camera: usize, definition: Arc<CameraDefinition>) {
         self.tracker.limit(camera, definition.areas.clone());
+        let before = &self.cameras[camera].definition;
+        if !before.has_frames_of(&definition)
+            && let Some(furniture) = self.tracker.furniture_mut(camera)
+        {
+            *furniture = Furniture::default();
+        }
         self.cameras[camera].redefine(definition);
+    }
+
+    /// Takes the furniture of the cameras of another scene.
+    pub(crate) fn keep_furniture(&mut self, other: Option<&Self>) {
+        let names: Vec<String> = self.cameras.iter().map(|one| one.name.clone()).collect();
+        for (index, name) in names.iter().enumerate() {
+            let kept = other.and_then(|other| other.furniture(name));
+            if let (Some(kept), Some(own)) = (kept, self.tracker.furniture_mut(index)) {
+                own.clone_from(kept);
+            }
+        }
+    }
+
+    /// Returns the furniture of a camera.
+    pub(crate) fn furniture(&self, camera: &str) -> Option<&Furniture> {
+        self.tracker.furniture(self.camera(camera)?.0)
+    }
+
+    /// Returns the furniture of a camera to change it.
+    pub(crate) fn furniture_mut(&mut self, camera: &str) -> Option<&mut Furniture> {
+        let (index, _) = self.camera(camera)?;
+        self.tracker.furniture_mut(index)
     }
 
     /// Returns the state to be stored.
     pub(crate) fn state(&self) -> SceneState {
-        let cameras = self.cameras.iter().map(|camera| CameraState {
-            name: camera.name.clone(),
-            key: camera.definition.key.clone(),
-            lines: camera.lines.state().clone(),
-            zones: camera.zones.state().clone(),
-            presence: camera.presence,
-            zone_persons: camera.zone_persons.clone(),
-            last_report: camera.last_report,
-        });
+        let cameras = self.cameras.iter().map(SceneCamera::state);
         SceneState {
             owner: self.owner.clone(),
             tracker: self.tracker.clone(),
@@ -300,11 +147,18 @@ impl Scene {
     pub(crate) fn accept(
         &mut self,
         camera: usize,
-        (at_ms, longest_gap_ms): (i64, i64),
+        time: ReportTime,
         persons: &[Observation],
         sums: &mut Sums,
     ) -> Result<Vec<NamedCrossing>, RefusedReport> {
-        self.tracker.update(camera, seconds(at_ms), persons)?;
+        let ReportTime {
+            at_ms,
+            longest_gap_ms,
+            now,
+        } = time;
+        let elapsed_s = self.cameras[camera].elapsed_s(now);
+        self.tracker
+            .update_after(elapsed_s, camera, seconds(at_ms), persons)?;
         let tracks: Vec<&Track> = self.tracker.tracks().collect();
         let mut crossings = Vec::new();
         // A line at the edge of an area counts those who cross it from the margin.
@@ -369,31 +223,10 @@ impl Scene {
     }
 }
 
-// The definition was checked: counters accept it. Without it, nothing is counted.
-fn line_counter(definition: &CameraDefinition, state: LineState) -> LineCounter {
-    LineCounter::resumed(definition.lines.clone(), state).unwrap_or_else(|error| {
-        tracing::warn!("the lines of {:?} are not counted: {error}", definition.key);
-        LineCounter::default()
-    })
-}
-
-fn zone_counter(definition: &CameraDefinition, state: ZoneState) -> ZoneCounter {
-    ZoneCounter::resumed(definition.zones.clone(), DEFAULT_HOLD_S, state).unwrap_or_else(|error| {
-        tracing::warn!("the zones of {:?} are not counted: {error}", definition.key);
-        ZoneCounter::default()
-    })
-}
-
 fn seconds(milliseconds: i64) -> f64 {
     #[expect(clippy::cast_precision_loss, reason = "exact for 285,000 years")]
     let milliseconds = milliseconds as f64;
     milliseconds / 1000.0
-}
-
-fn milliseconds(seconds: f64) -> i64 {
-    #[expect(clippy::cast_possible_truncation, reason = "times of reports")]
-    let milliseconds = (seconds * 1000.0).round() as i64;
-    milliseconds
 }
 
 #[cfg(test)]

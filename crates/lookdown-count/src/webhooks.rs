@@ -34,6 +34,8 @@ pub struct WebhookEntry {
     zone: Option<String>,
     at_least: Option<u64>,
     after: Option<String>,
+    #[serde(default)]
+    image: bool,
 }
 
 /// The kind of a condition.
@@ -52,6 +54,8 @@ pub(crate) struct Webhook {
     pub(crate) key: SigningKey,
     pub(crate) camera: Option<String>,
     pub(crate) condition: Condition,
+    /// True if its messages have the latest image of the camera.
+    pub(crate) with_image: bool,
 }
 
 /// The condition of a webhook.
@@ -104,6 +108,11 @@ impl WebhookEntry {
         is_for("zone", self.zone.is_some(), &[Occasion::Occupancy])?;
         is_for("at_least", self.at_least.is_some(), &[Occasion::Occupancy])?;
         is_for("after", self.after.is_some(), &[Occasion::Silent])?;
+        is_for(
+            "image",
+            self.image,
+            &[Occasion::Crossing, Occasion::Occupancy],
+        )?;
         let condition = match self.on {
             Occasion::Crossing => Condition::Crossing {
                 line: self.line,
@@ -133,6 +142,7 @@ impl WebhookEntry {
             key,
             camera: self.camera,
             condition,
+            with_image: self.image,
         })
     }
 }

@@ -11,9 +11,9 @@ use std::{
 };
 
 use events::{CALIBRATION, START_MS, Server, event, person, walks};
-use lookdown_common::ServerEntry;
+use lookdown_common::{HttpClient, ServerEntry};
 use lookdown_count::{CountEntry, Snapshot, WebhookEntry, count};
-use reqwest::Client;
+use reqwest::RequestBuilder;
 use serde_json::{Value, json};
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt},
@@ -27,13 +27,17 @@ const PATIENCE: Duration = Duration::from_secs(20);
 /// A running companion.
 struct Companion {
     url: String,
-    client: Client,
+    client: HttpClient,
 }
 
 impl Companion {
+    fn request(&self, path: &str) -> RequestBuilder {
+        let url = format!("{}{path}", self.url);
+        self.client.get(url.parse().unwrap())
+    }
+
     async fn get(&self, path: &str) -> (u16, String) {
-        let response = self.client.get(format!("{}{path}", self.url)).send().await;
-        let response = response.unwrap();
+        let response = self.client.send(self.request(path)).await.unwrap();
         (response.status().as_u16(), response.text().await.unwrap())
     }
 
@@ -106,14 +110,17 @@ async fn with_companion<T>(
     let (snapshots, _receiver) = watch::channel(Snapshot::default());
     let companion = Companion {
         url: format!("http://{address}"),
-        client: lookdown_common::client_builder().build().unwrap(),
+        client: HttpClient::new(None).unwrap(),
     };
     let mut outcome = None;
     let stop = async {
         companion
             .until("the companion answers", async |companion: &Companion| {
-                let url = format!("{}/livez", companion.url);
-                companion.client.get(url).send().await.ok()
+                companion
+                    .client
+                    .send(companion.request("/livez"))
+                    .await
+                    .ok()
             })
             .await;
         outcome = Some(test(companion).await);
@@ -356,8 +363,8 @@ async fn a_key_of_the_settings_is_required() {
         assert_eq!(companion.get("/livez").await.0, 200);
         assert_eq!(companion.get("/counts").await.0, 401);
         for (key, status) in [("0123456789abcdef", 200), ("0123456789abcdeg", 401)] {
-            let request = companion.client.get(format!("{}/counts", companion.url));
-            let response = request.bearer_auth(key).send().await.unwrap();
+            let request = companion.request("/counts").bearer_auth(key);
+            let response = companion.client.send(request).await.unwrap();
             assert_eq!(response.status().as_u16(), status);
         }
     })

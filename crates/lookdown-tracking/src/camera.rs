@@ -4,7 +4,7 @@ use lookdown_lens::geometry::Polygon;
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 
-use crate::CameraPose;
+use crate::{CameraPose, furniture::Furniture};
 
 /// Radius of the floor in which a camera is expected to see a person, in heights of the camera.
 const VISIBLE_HEIGHTS: f64 = 4.0;
@@ -14,6 +14,8 @@ const VISIBLE_HEIGHTS: f64 = 4.0;
 pub(super) struct Camera {
     pub pose: CameraPose,
     pub last_report_s: Option<f64>,
+    /// The things that stand in its frame.
+    pub furniture: Furniture,
     /// The areas of its reports on the site's floor; everywhere if there are none.
     #[serde(skip)]
     pub areas: Vec<Polygon>,

@@ -8,6 +8,9 @@
 //! * A thing that stands still looks the same in every frame. However often it is seen, it counts as
 //!   a few reports of its mean score, and what it did before fades. A poster with a score of .3 thus
 //!   never becomes a person, not even when the track of a passer-by stays on it.
+//!
+//! A thing with a higher score is a person for this test. What stands for hours is left to
+//! [`furniture`](crate::furniture), which continues with tracks that never left their first place.
 
 use serde::{Deserialize, Serialize};
 

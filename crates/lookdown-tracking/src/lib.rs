@@ -1,12 +1,14 @@
 #![doc = include_str!("../README.md")]
 //!
 //! [`Tracker`] turns [`Observation`]s into tracks, [`lines`] counts crossings, [`zones`] occupancy and
-//! dwell times, [`heat_map`] seconds of presence.
+//! dwell times, [`heat_map`] seconds of presence. [`furniture`] is what never moves.
 
 mod assignment;
 mod camera;
+mod candidates;
 mod duplicates;
 mod evidence;
+pub mod furniture;
 pub mod heat_map;
 mod kalman;
 pub mod lines;
@@ -24,6 +26,7 @@ mod track_id;
 mod tracker;
 pub mod zones;
 
+pub use candidates::MAX_PERSONS;
 pub use evidence::EvidenceSettings;
 pub use observation::Observation;
 pub use plane::Plane;
@@ -31,7 +34,7 @@ pub use settings::{MeasurementNoise, PlaneSettings, TrackerSettings};
 pub use site::CameraPose;
 pub use track::{MAX_TAIL_POINTS, PersonOfReport, TailPoint, Track};
 pub use track_id::TrackId;
-pub use tracker::{MAX_CAMERAS, MAX_PERSONS, RefusedReport, SiteError, Tracker};
+pub use tracker::{MAX_CAMERAS, RefusedReport, SiteError, Tracker};
 
 #[cfg(test)]
 mod tests;

@@ -11,6 +11,8 @@ pub struct Observation {
     pub off_axis_deg: f64,
     /// Centre of the oriented box in frame pixels (x, y).
     pub centre_px: [f64; 2],
+    /// Width and height of the oriented box in frame pixels.
+    pub size_px: [f64; 2],
     /// Middle of the oriented box's lower side in frame pixels (x, y): lines and zones in the frame
     /// count this point.
     pub foot_px: [f64; 2],

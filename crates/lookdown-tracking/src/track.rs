@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::Observation;
 use crate::{
-    Plane, TrackId, TrackerSettings, evidence::Evidence, measurement::Measurement, motion::Motion,
+    Plane, TrackId, TrackerSettings, evidence::Evidence, furniture::START_AFTER_S,
+    measurement::Measurement, motion::Motion,
 };
 
 /// Most places that a track keeps.
@@ -23,6 +24,8 @@ pub struct Track {
     pub(super) evidence: Evidence,
     /// The place at which the present evidence began.
     evidence_place: [f64; 3],
+    /// True once the evidence has begun again at another place.
+    has_moved: bool,
     pub(super) missed: u32,
     confirmed: bool,
     last_person: PersonOfReport,
@@ -84,6 +87,7 @@ impl Track {
         let mut track = Self {
             id,
             evidence_place: motion.place().into(),
+            has_moved: false,
             motion,
             first_seen_s: seen.at_s,
             seen_s: seen.at_s,
@@ -108,6 +112,7 @@ impl Track {
         let here = self.motion.place();
         if (here - Vector3::from(self.evidence_place)).norm() >= plane.independent_distance {
             self.evidence_place = here.into();
+            self.has_moved = true;
             self.evidence.move_on(settings);
         }
         self.evidence
@@ -143,6 +148,12 @@ impl Track {
     #[must_use]
     pub fn is_confirmed(&self) -> bool {
         self.confirmed
+    }
+
+    /// Returns true if a confirmed track has been at its first place since it began, for a while.
+    pub(super) fn stands(&self) -> bool {
+        let seen_s = self.seen_s - self.first_seen_s;
+        self.confirmed && !self.has_moved && !self.in_margin && seen_s >= START_AFTER_S
     }
 
     /// Returns true if the track counts: it is confirmed, and its last person was not in the margin

@@ -1,5 +1,7 @@
 //! The tracker: association of each report's persons with the tracks.
 
+use std::collections::BTreeSet;
+
 use lookdown_lens::geometry::Polygon;
 use serde::{Deserialize, Serialize};
 
@@ -8,16 +10,16 @@ use crate::{
     Track, TrackId, TrackerSettings,
     assignment::best_pairs,
     camera::Camera,
+    candidates::{Candidate, Separated, candidates, separate},
     duplicates::end_duplicates,
     evidence::log_odds,
+    furniture::Furniture,
     measurement::Measurement,
     track::{PersonOfReport, Sighting},
 };
 
 /// Most cameras of a tracker.
 pub const MAX_CAMERAS: usize = 64;
-/// Most persons of a report that are considered: those with the highest scores.
-pub const MAX_PERSONS: usize = 300;
 /// Squared Mahalanobis distance beyond which a person never continues a track: the 99.9 % quantile
 /// of the chi-squared distribution with two degrees of freedom.
 const GATE: f64 = 13.8;
@@ -63,13 +65,6 @@ pub enum RefusedReport {
     Late(f64),
 }
 
-/// A person of the current report with its measurement.
-struct Candidate<'a> {
-    index: usize,
-    person: &'a Observation,
-    measured: Measurement,
-}
-
 impl Tracker {
     /// Returns a tracker for `cameras`: on the floor where every camera has its height, else in
     /// bearing space.
@@ -88,6 +83,7 @@ impl Tracker {
         let camera = |&pose| Camera {
             pose,
             last_report_s: None,
+            furniture: Furniture::default(),
             areas: Vec::new(),
         };
         Ok(Self {
@@ -108,8 +104,36 @@ impl Tracker {
         }
     }
 
+    /// Returns the things that stand in the frame of a camera.
+    #[must_use]
+    pub fn furniture(&self, camera: usize) -> Option<&Furniture> {
+        Some(&self.cameras.get(camera)?.furniture)
+    }
+
+    /// Returns the same to change it, or to restore that of another tracker.
+    #[must_use]
+    pub fn furniture_mut(&mut self, camera: usize) -> Option<&mut Furniture> {
+        Some(&mut self.cameras.get_mut(camera)?.furniture)
+    }
+
+    /// Updates the tracks as [`Tracker::update_after`] does, with the time between the reports.
+    ///
+    /// # Errors
+    /// As for [`Tracker::update_after`].
+    pub fn update(
+        &mut self,
+        camera: usize,
+        at_s: f64,
+        persons: &[Observation],
+    ) -> Result<Vec<Track>, RefusedReport> {
+        self.update_after(f64::INFINITY, camera, at_s, persons)
+    }
+
     /// Updates the tracks with the persons of one frame of the camera number `camera`, captured at
     /// `at_s` (seconds since the Unix epoch). Returns the confirmed tracks that ended.
+    ///
+    /// `elapsed_s` is the time since the camera's last report by a clock that never jumps: furniture
+    /// is observed no longer than that.
     ///
     /// Reports of several cameras may arrive in any order within
     /// [`TrackerSettings::max_lateness_s`]; those of one camera are in order of time.
@@ -117,21 +141,32 @@ impl Tracker {
     /// # Errors
     /// [`RefusedReport`] for an unknown camera, a time that is not finite, or a report that is too
     /// old. Nothing changes then.
-    pub fn update(
+    pub fn update_after(
         &mut self,
+        elapsed_s: f64,
         camera: usize,
         at_s: f64,
         persons: &[Observation],
     ) -> Result<Vec<Track>, RefusedReport> {
         self.check(camera, at_s)?;
-        let candidates = self.candidates(camera, persons);
+        let pose = &self.cameras[camera].pose;
+        let candidates = candidates(persons, (pose, self.on_floor), &self.settings);
         let report = Report {
             camera,
             at_s,
             interval_s: self.interval_s(camera, at_s),
         };
+        let observed_s = report.interval_s.min(elapsed_s);
+        let seen: Vec<&Observation> = candidates.iter().map(|one| one.person).collect();
+        let shown = self.cameras[camera].furniture.update(&seen, observed_s);
+        let Separated {
+            candidates,
+            furniture,
+            unknown,
+        } = separate(candidates, &shown);
         let used = self.associate(&report, &candidates);
-        self.start_tracks(&report, &candidates, &used);
+        self.start_tracks(&report, (&candidates, &furniture), &used);
+        self.start_things(&report, persons, &unknown);
         self.count_misses(&report);
         self.cameras[camera].last_report_s = Some(at_s);
         let now_s = self.newest_report_s.map_or(at_s, |newest| newest.max(at_s));
@@ -170,62 +205,6 @@ impl Tracker {
     fn interval_s(&self, camera: usize, at_s: f64) -> f64 {
         let last = self.cameras[camera].last_report_s;
         last.map_or(f64::INFINITY, |last| at_s - last)
-    }
-
-    /// The persons that count, in an order that does not depend on the report's.
-    fn candidates<'a>(&self, camera: usize, persons: &'a [Observation]) -> Vec<Candidate<'a>> {
-        let pose = &self.cameras[camera].pose;
-        let noise = &self.settings.noise;
-        let measure = |person| match pose.height_m {
-            Some(height_m) if self.on_floor => Measurement::on_floor(person, pose, height_m, noise),
-            _ => Measurement::of_bearing(person, noise),
-        };
-        let mut candidates: Vec<_> = persons
-            .iter()
-            .enumerate()
-            .filter(|(_, person)| person.score >= self.settings.low_score)
-            .filter_map(|(index, person)| {
-                let measured = measure(person)?;
-                Some(Candidate {
-                    index,
-                    person,
-                    measured,
-                })
-            })
-            .collect();
-        let key = |candidate: &Candidate| {
-            let person = candidate.person;
-            let [foot_x, foot_y] = person.foot_px;
-            [
-                -person.score,
-                foot_x,
-                foot_y,
-                person.off_axis_deg,
-                person.azimuth_deg,
-            ]
-        };
-        candidates.sort_by(|a, b| {
-            let pairs = key(a).into_iter().zip(key(b));
-            pairs.fold(std::cmp::Ordering::Equal, |order, (a, b)| {
-                order.then(a.total_cmp(&b))
-            })
-        });
-        candidates.truncate(MAX_PERSONS);
-        self.drop_parts(candidates)
-    }
-
-    /// Drops weak persons that may be a part of a stronger one, or the same one again. They come in
-    /// order of falling scores.
-    fn drop_parts<'a>(&self, candidates: Vec<Candidate<'a>>) -> Vec<Candidate<'a>> {
-        let mut kept: Vec<Candidate> = Vec::new();
-        for candidate in candidates {
-            let one = &candidate.measured;
-            let is_weak = one.score < self.settings.least_score_in_line;
-            if !is_weak || !kept.iter().any(|other| one.is_part_of(&other.measured)) {
-                kept.push(candidate);
-            }
-        }
-        kept
     }
 
     /// Continues tracks with persons in the three steps of `ByteTrack`: high scores, low scores, then
@@ -276,9 +255,32 @@ impl Tracker {
         innovation.log_density() - plane.clutter_density.ln() + is_person + is_there
     }
 
-    fn start_tracks(&mut self, report: &Report, candidates: &[Candidate], used: &[bool]) {
+    /// Starts things where confirmed tracks have stood for a while.
+    fn start_things(
+        &mut self,
+        report: &Report,
+        persons: &[Observation],
+        unknown: &BTreeSet<usize>,
+    ) {
+        let tracks = self.tracks.iter();
+        let standing = tracks.filter(|track| report.shows(track) && track.stands());
+        let indices = standing.map(|track| track.last_person().person);
+        let furniture = &mut self.cameras[report.camera].furniture;
+        for index in indices.filter(|index| unknown.contains(index)) {
+            furniture.start(&persons[index]);
+        }
+    }
+
+    fn start_tracks(
+        &mut self,
+        report: &Report,
+        (candidates, furniture): (&[Candidate], &[Measurement]),
+        used: &[bool],
+    ) {
         for (candidate, _) in candidates.iter().zip(used).filter(|(_, used)| !**used) {
-            let least = if self.is_taken(report, &candidate.measured) {
+            let measured = &candidate.measured;
+            let is_part = furniture.iter().any(|thing| measured.is_part_of(thing));
+            let least = if is_part || self.is_taken(report, measured) {
                 self.settings.new_track_score_in_line
             } else {
                 self.settings.new_track_score

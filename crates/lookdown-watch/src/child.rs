@@ -18,8 +18,8 @@ const ENCODER_MEMORY: u64 = 2 << 30;
 const MAX_FILES: u64 = 64;
 /// The priority below that of this process and of the server.
 const NICE: i32 = 5;
-/// The prefix of variables with settings of the server, which may be secret.
-const SECRET_VARIABLES: &str = "LOOKDOWN__";
+/// The prefix of variables with settings of the server and of a camera, which may be secret.
+const SECRET_VARIABLES: &str = "LOOKDOWN_";
 
 /// The task of a child process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -15,7 +15,7 @@ use reqwest::Url;
 use tokio::{
     io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt},
     net::{TcpListener, TcpStream},
-    time::timeout,
+    time::{sleep, timeout},
 };
 
 use self::{
@@ -30,6 +30,8 @@ const PORTS: (u16, u16) = (554, 322);
 const CHUNK_BYTES: usize = 64 << 10;
 /// Longest time for the first request of a connection to the relay.
 const FIRST_REQUEST: Duration = Duration::from_secs(5);
+/// Pause after the system has refused a connection, for example for lack of file descriptors.
+const PAUSE: Duration = Duration::from_millis(100);
 /// Random bytes of the token in the URL of the relay.
 const TOKEN_BYTES: usize = 16;
 
@@ -170,6 +172,7 @@ async fn connect(url: &Url) -> std::io::Result<(Box<dyn Connection>, IpAddr)> {
 async fn accept(listener: &TcpListener, inner: &str) -> (TcpStream, BytesMut) {
     loop {
         let Ok((mut connection, _)) = listener.accept().await else {
+            sleep(PAUSE).await;
             continue;
         };
         let first = timeout(FIRST_REQUEST, first_line(&mut connection));

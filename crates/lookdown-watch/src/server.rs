@@ -2,10 +2,8 @@
 
 use std::time::Duration;
 
-use lookdown_common::{
-    ClientError, ServerClient, ServerOptions, client_builder, read_body, retry_after,
-};
-use reqwest::{Client, Response, StatusCode, Url, header::CONTENT_TYPE};
+use lookdown_common::{ClientError, ServerClient, ServerOptions, read_body, retry_after};
+use reqwest::{Response, StatusCode, Url, header::CONTENT_TYPE};
 
 use crate::{Camera, Frame};
 
@@ -33,14 +31,6 @@ pub(crate) enum Answer {
     Failed(String),
 }
 
-/// Creates an HTTP client for cameras.
-///
-/// # Errors
-/// [`ClientError`] if the system's certificates cannot be used.
-pub(crate) fn camera_client() -> Result<Client, ClientError> {
-    Ok(client_builder().build()?)
-}
-
 impl Server {
     /// Creates the client. Sends nothing.
     ///
@@ -62,7 +52,7 @@ impl Server {
         let request = request.header(CONTENT_TYPE, frame.format.media_type());
         match self.client.send(request.body(frame.image.clone())).await {
             Ok(response) => self.answer(response).await,
-            Err(error) => Answer::Failed(self.client.failure(error)),
+            Err(error) => Answer::Failed(self.client.failure(&error)),
         }
     }
 
@@ -72,7 +62,7 @@ impl Server {
             // The rest is read so that the connection can be used again.
             return match read_body(response, MAX_REPORT_BYTES).await {
                 Ok(_) => Answer::Report,
-                Err(error) => Answer::Failed(self.client.failure(error)),
+                Err(error) => Answer::Failed(self.client.failure(&error)),
             };
         }
         let retry_after = retry_after(response.headers());

@@ -13,14 +13,13 @@ pub use standard_input::ImageReader;
 use std::{convert::Infallible, time::Duration};
 
 use parking_lot::Mutex;
-use reqwest::Client;
 use tokio::time::sleep;
 
 use crate::{
     Camera, Frame, Location, Metrics, SourceError, credentials::Login, metrics::CameraMetrics,
-    server::camera_client, slot::Slot,
+    slot::Slot,
 };
-use lookdown_common::{Backoff, LogOnce};
+use lookdown_common::{Backoff, HttpClient, LogOnce};
 
 /// First and longest pause before a source is started again.
 const PAUSES: (Duration, Duration) = (Duration::from_millis(500), Duration::from_secs(10));
@@ -31,7 +30,7 @@ const LOGIN_PAUSES: (Duration, Duration) = (Duration::from_secs(10), Duration::f
 /// never.
 pub(crate) async fn supervise(
     camera: &Camera,
-    client: &Client,
+    client: &HttpClient,
     slot: &Slot<Frame>,
     metrics: &CameraMetrics,
 ) {
@@ -77,7 +76,8 @@ pub(crate) async fn supervise(
 /// # Errors
 /// [`SourceError`].
 pub async fn first_frame(camera: &Camera, limit: Duration) -> Result<Frame, SourceError> {
-    let client = camera_client().map_err(|error| SourceError::Unreachable(error.to_string()))?;
+    let client =
+        HttpClient::new(None).map_err(|error| SourceError::Unreachable(error.to_string()))?;
     let all = Metrics::new().map_err(|error| SourceError::Stream(error.to_string()))?;
     let metrics = all.add(&camera.name, camera.location.to_string());
     let (slot, log) = (Slot::default(), Mutex::new(LogOnce::default()));
@@ -98,7 +98,7 @@ pub async fn first_frame(camera: &Camera, limit: Duration) -> Result<Frame, Sour
 /// Reads frames until the source ends.
 async fn run(
     camera: &Camera,
-    client: &Client,
+    client: &HttpClient,
     login: &mut Login,
     sink: &Sink<'_>,
 ) -> Result<(), SourceError> {

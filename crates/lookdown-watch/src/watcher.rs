@@ -2,7 +2,6 @@
 
 use std::{collections::HashMap, future::Future, sync::Arc, time::Duration};
 
-use reqwest::Client;
 use tokio::{task::JoinHandle, time::timeout};
 use tracing::Instrument as _;
 
@@ -10,11 +9,11 @@ use crate::{
     Camera, Metrics, WatchOptions,
     metrics::CameraMetrics,
     sender,
-    server::{Server, camera_client},
+    server::Server,
     slot::{Slot, Writer},
     source,
 };
-use lookdown_common::{ClientError, ConfigError, LogOnce, Reload};
+use lookdown_common::{ClientError, ConfigError, HttpClient, LogOnce, Reload};
 
 /// Longest time that the end waits for the reports of frames that were sent.
 const LAST_REPORTS: Duration = Duration::from_secs(5);
@@ -71,7 +70,7 @@ pub async fn watch(
 struct Watcher {
     options: WatchOptions,
     server: Arc<Server>,
-    client: Client,
+    client: HttpClient,
     metrics: Arc<Metrics>,
     running: HashMap<String, Running>,
 }
@@ -91,7 +90,7 @@ impl Watcher {
         let server = Arc::new(Server::new(&options.server)?);
         let mut watcher = Self {
             server,
-            client: camera_client()?,
+            client: HttpClient::new(None)?,
             metrics,
             running: HashMap::new(),
             options,

@@ -27,7 +27,6 @@ def lookdown(settings: dict[str, str] | None = None, calibrations: Path = SAMPLE
     wanted = {"SERVER__LISTEN": f"127.0.0.1:{port}", "CALIBRATIONS__PATH": str(calibrations), "LOG__FILTER": "warn"}
     wanted |= settings or {}
     environment = {f"LOOKDOWN__{name}": value for name, value in wanted.items()}
-    environment["MALLOC_MMAP_THRESHOLD_"] = "131072"
     with running("lookdown", [str(LOOKDOWN), "serve"], port, "/readyz", environment) as server:
         # The server is ready when the model of the default profile is loaded; others may still be loading.
         camera = next(calibrations.glob("*.json")).stem

@@ -11,7 +11,7 @@ use axum::{
     },
     response::{IntoResponse, Response},
 };
-use lookdown_common::Secret;
+use lookdown_common::{ConfigError, Secret};
 use serde::{Deserialize, Serialize};
 use tokio::task::spawn_blocking;
 use utoipa::ToSchema;
@@ -277,9 +277,9 @@ async fn change<T: Send + 'static>(
 
 async fn rows(cameras: Arc<Cameras>) -> Result<Vec<CameraInfo>, Problem> {
     let read = Arc::clone(&cameras);
-    let stored = spawn_blocking(move || read.stored()).await;
-    let stored = stored.map_err(Problem::internal)?;
-    let stored = stored.map_err(Problem::internal)?;
+    let stored = spawn_blocking(move || Ok((read.stored()?, read.paused_of_settings()?))).await;
+    let stored: Result<_, ConfigError> = stored.map_err(Problem::internal)?;
+    let (stored, paused) = stored.map_err(Problem::internal)?;
     let mut rows: Vec<_> = cameras
         .states(&stored)
         .into_iter()
@@ -294,6 +294,14 @@ async fn rows(cameras: Arc<Cameras>) -> Result<Vec<CameraInfo>, Problem> {
             ..CameraInfo::default()
         })
         .collect();
+    // A camera that has just been paused may still be watched.
+    rows.retain(|row| !paused.contains_key(&row.name));
+    rows.extend(paused.into_iter().map(|(name, source)| CameraInfo {
+        name,
+        source,
+        paused: true,
+        ..CameraInfo::default()
+    }));
     for (name, camera) in stored {
         let index = rows.iter().position(|row| row.name == name);
         let index = index.unwrap_or_else(|| {

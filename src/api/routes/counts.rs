@@ -1,4 +1,4 @@
-//! Counts on the port of the server: those of this process, or of a `lookdown count` on another host.
+//! Counts and furniture on the port of the server: those of this process, or of a `lookdown count` on another host.
 
 use std::time::Duration;
 
@@ -7,13 +7,14 @@ use axum::{
     body::{Body, to_bytes},
     extract::{Request, State},
     http::{
-        HeaderValue, StatusCode, Uri,
+        Method, StatusCode, Uri,
         header::{ACCEPT, CACHE_CONTROL, CONTENT_TYPE},
     },
     response::Response,
-    routing::get,
+    routing::{get, put},
 };
 use lookdown_common::ServerClient;
+use reqwest::RequestBuilder;
 use serde::Deserialize;
 use tower::ServiceExt;
 use url::Url;
@@ -22,7 +23,7 @@ use crate::api::{
     ApiState,
     companions::Counts,
     http::problem::{Problem, ProblemKind},
-    require_scope::RequireRead,
+    require_scope::{RequireAdmin, RequireRead},
 };
 
 /// Longest time for an answer of another host.
@@ -37,27 +38,43 @@ struct Failure {
     detail: String,
 }
 
-/// Returns the routes of the counts. docs/count.md describes them.
+/// Returns the routes of the counts and the furniture. docs/count.md describes them.
 pub(in crate::api) fn router() -> Router<ApiState> {
     let paths = ["/counts", "/counts/{*path}", "/sites/{*path}"];
-    paths.into_iter().fold(Router::new(), |router, path| {
-        router.route(path, get(answer))
-    })
+    let router = paths
+        .into_iter()
+        .fold(Router::new(), |router, path| router.route(path, get(read)));
+    let thing = "/cameras/{camera}/furniture/{thing}";
+    router
+        .route("/cameras/{camera}/furniture", get(read))
+        .route(thing, put(change).delete(change))
 }
 
-async fn answer(
+async fn read(
     State(state): State<ApiState>,
     _reader: RequireRead,
     request: Request,
 ) -> Result<Response, Problem> {
+    answer(&state, request).await
+}
+
+async fn change(
+    State(state): State<ApiState>,
+    _admin: RequireAdmin,
+    request: Request,
+) -> Result<Response, Problem> {
+    answer(&state, request).await
+}
+
+async fn answer(state: &ApiState, request: Request) -> Result<Response, Problem> {
     let response = match state.options.companions.counts() {
         Counts::Here(routes) => match routes.oneshot(without_extensions(request)).await {
             Ok(response) => response,
             Err(never) => match never {},
         },
         Counts::Elsewhere(client) => {
-            let accept = request.headers().get(ACCEPT).cloned();
-            forward(&client, url(&client, request.uri()), accept).await?
+            let outgoing = outgoing(&client, &request);
+            forward(&client, outgoing).await?
         }
         Counts::Starting => return Err(unavailable("the counts are being started: retry")),
         Counts::None => {
@@ -82,19 +99,26 @@ fn without_extensions(request: Request) -> Request {
     request
 }
 
+/// Returns the request to another host.
+fn outgoing(client: &ServerClient, request: &Request) -> RequestBuilder {
+    let url = url(client, request.uri());
+    let outgoing = match *request.method() {
+        Method::PUT => client.put(url),
+        Method::DELETE => client.delete(url),
+        _ => client.get(url),
+    };
+    let outgoing = outgoing.timeout(TIMEOUT);
+    match request.headers().get(ACCEPT) {
+        Some(accept) => outgoing.header(ACCEPT, accept),
+        None => outgoing,
+    }
+}
+
 /// Requests the counts of another host with the key of that host: the key of the caller was checked
 /// here.
-async fn forward(
-    client: &ServerClient,
-    url: Url,
-    accept: Option<HeaderValue>,
-) -> Result<Response, Problem> {
-    let mut outgoing = client.get(url).timeout(TIMEOUT);
-    if let Some(accept) = accept {
-        outgoing = outgoing.header(ACCEPT, accept);
-    }
+async fn forward(client: &ServerClient, outgoing: RequestBuilder) -> Result<Response, Problem> {
     let answered = client.send(outgoing).await.map_err(|error| {
-        tracing::warn!("counts.url: {}", client.failure(error));
+        tracing::warn!("counts.url: {}", client.failure(&error));
         unavailable("the counts do not respond: the log of the server has the reason; retry")
     })?;
     let mut response = Response::new(Body::empty());

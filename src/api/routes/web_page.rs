@@ -56,6 +56,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "panels.css" from "web",
         "zones.css" from "web",
         "icon.svg" from "web",
+        "furniture.js" from "web",
         "ignore_place.js" from "web",
         "main.js" from "web",
         "dom.js" from "web",

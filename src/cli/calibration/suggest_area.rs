@@ -72,8 +72,8 @@ async fn heat_map(arguments: &Arguments) -> anyhow::Result<HeatMap> {
     if let Some(from) = &arguments.from {
         url.query_pairs_mut().append_pair("from", from);
     }
-    let sent = client.get(url).timeout(TIMEOUT).send().await;
-    let response = sent.map_err(|error| anyhow::anyhow!(client.failure(error)))?;
+    let sent = client.send(client.get(url).timeout(TIMEOUT)).await;
+    let response = sent.map_err(|error| anyhow::anyhow!(client.failure(&error)))?;
     if !response.status().is_success() {
         bail!(
             "{}: give the address of `lookdown count` with --server, such as \

@@ -3,7 +3,7 @@ use std::collections::BTreeSet;
 use jiff::Timestamp;
 
 use super::*;
-use crate::results::{NewReport, ReportId};
+use crate::results::{NewReport, PicturesOf, ReportId};
 
 const HOLD: Duration = Duration::from_secs(5);
 const EXPIRY: Duration = Duration::from_mins(10);
@@ -18,6 +18,10 @@ fn cameras(most: usize) -> Cameras {
         expire_after: Some(EXPIRY),
         ..Discovery::default()
     };
+    cameras_with(discovery, most)
+}
+
+fn cameras_with(discovery: Discovery, most: usize) -> Cameras {
     let most = NonZeroUsize::new(most).unwrap();
     Cameras::new(topics(), discovery, HOLD, most)
 }
@@ -182,7 +186,11 @@ fn occupancy_ends_after_the_hold_availability_at_expiry() {
 
 #[test]
 fn removed_cameras_are_withdrawn() {
-    let mut cameras = cameras(10);
+    let discovery = Discovery {
+        images: PicturesOf::All,
+        ..Discovery::default()
+    };
+    let mut cameras = cameras_with(discovery, 10);
     let zones = ",\"zones\":[{\"name\":\"door\",\"persons\":1}]";
     let announced = update(&mut cameras, &report("lobby", 1, zones));
     update(&mut cameras, &report("gate", 1, ""));
@@ -230,6 +238,7 @@ fn unknown_retained_cameras_are_withdrawn_after_a_time() {
         "homeassistant/binary_sensor/lookdown_lobby_zone_gone_occupancy/config",
         "homeassistant/binary_sensor/lookdown_old_occupancy/config",
         "homeassistant/binary_sensor/lookdown_old_zone_door_occupancy/config",
+        "homeassistant/image/lookdown_old_image/config",
         "homeassistant/sensor/lookdown_lobby_zone_gone/config",
         "homeassistant/sensor/lookdown_old_frame_persons/config",
         "homeassistant/sensor/lookdown_old_persons/config",

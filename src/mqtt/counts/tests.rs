@@ -1,3 +1,4 @@
+use lookdown_common::ServerOptions;
 use lookdown_count::{CameraSnapshot, LineSnapshot, SiteSnapshot, ZoneSnapshot};
 
 use super::*;
@@ -9,9 +10,17 @@ fn publisher() -> CountsPublisher {
         topic_prefix: "lookdown".to_owned(),
         discovery_prefix: Some("homeassistant".to_owned()),
         unknown_for: Duration::from_secs(10),
+        image_every: Some(Duration::from_secs(1)),
     };
     let (_, snapshots) = watch::channel(Snapshot::default());
-    CountsPublisher::new(options, snapshots).unwrap()
+    let server = ServerOptions {
+        url: "http://127.0.0.1:1".parse().unwrap(),
+        api_key: None,
+        authorities: None,
+        in_process: None,
+    };
+    let server = ServerClient::new(&server).unwrap();
+    CountsPublisher::new(options, snapshots, server).unwrap()
 }
 
 fn snapshot(persons: Option<u64>) -> Snapshot {

@@ -6,7 +6,7 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio_util::codec::Framed;
 
 use super::*;
-use crate::results::{MemoryResults, NewReport, ResultLimits};
+use crate::results::{MemoryResults, NewPicture, NewReport, PicturesOf, ResultLimits};
 
 type Client = Framed<TcpStream, Codec>;
 
@@ -18,6 +18,10 @@ struct Setup {
 }
 
 async fn setup() -> Setup {
+    setup_with(None).await
+}
+
+async fn setup_with(image_every: Option<Duration>) -> Setup {
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let port = listener.local_addr().unwrap().port();
     let results = Arc::new(MemoryResults::new(ResultLimits::default(), Arc::default()));
@@ -31,7 +35,14 @@ async fn setup() -> Setup {
         discovery_prefix: Some("homeassistant".to_owned()),
         max_cameras: NonZeroUsize::MIN,
         hold: Duration::ZERO,
-        discovery: Discovery::default(),
+        image_every,
+        discovery: Discovery {
+            images: match image_every {
+                Some(_) => PicturesOf::All,
+                None => PicturesOf::default(),
+            },
+            ..Discovery::default()
+        },
     };
     let store = Arc::clone(&results) as Arc<dyn ResultStore>;
     Setup {
@@ -148,7 +159,7 @@ async fn a_connection_begins_with_a_will_and_ends_with_a_farewell() {
     }
     // Home Assistant withdraws a camera whose reports are deleted.
     assert!(setup.results.delete("lobby").await.unwrap());
-    for _ in 0..8 {
+    for _ in 0..9 {
         let (_, payload, is_retained) = heard(&mut client).await;
         assert!(payload.is_empty() && is_retained);
     }
@@ -163,6 +174,36 @@ async fn a_connection_begins_with_a_will_and_ends_with_a_farewell() {
     assert_eq!(setup.metrics.mqtt_reports_sent.get(), 1);
     assert_eq!(setup.metrics.mqtt_reports_dropped.get(), 0);
     assert_eq!(setup.metrics.mqtt_connected.get(), 0);
+}
+
+#[tokio::test]
+async fn each_new_image_is_published_and_not_retained() {
+    let setup = setup_with(Some(Duration::from_millis(10))).await;
+    let running = tokio::spawn(setup.publisher.run());
+    let (mut client, _) = accept(&setup.listener).await;
+    welcome(&mut client).await;
+    let sketch = r#"{"frame_width":1680,"marks":[],"views":[],"zones":[],"timestamp":""}"#;
+    let picture = NewPicture {
+        frame: Bytes::from_static(include_bytes!("../../../samples/office.jpg")),
+        sketch: Bytes::from_static(sketch.as_bytes()),
+    };
+    setup.results.publish(report(1), Some(picture.clone()));
+    let mut images = 0;
+    while images < 2 {
+        let Packet::Publish(said) = client.next().await.unwrap().unwrap() else {
+            continue;
+        };
+        if said.topic == "lookdown/cameras/lobby/image" {
+            images += 1;
+            assert!(!said.retain);
+            assert!(said.payload.starts_with(&[0xff, 0xd8]) && said.payload.len() <= 1 << 20);
+            if images == 1 {
+                setup.results.publish(report(1), Some(picture.clone()));
+            }
+        }
+    }
+    setup.results.listeners().end();
+    running.await.unwrap();
 }
 
 #[tokio::test]

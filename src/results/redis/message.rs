@@ -1,6 +1,7 @@
 //! The messages on the channels: new reports, as `record.lua` publishes them.
 
 use bytes::Bytes;
+use lookdown_common::text::is_camera_name;
 
 use crate::results::{NewReport, StoredReport};
 
@@ -14,7 +15,8 @@ pub(super) fn parse(message: Vec<u8>) -> Option<StoredReport> {
     let persons = text(parts.next()?)?.parse().ok()?;
     let json = parts.next()?;
     let camera = text(parts.next()?)?.to_owned();
-    is_one_line(json).then(|| StoredReport {
+    let is_report = is_one_line(json) && is_camera_name(&camera);
+    is_report.then(|| StoredReport {
         id,
         report: NewReport {
             camera,
@@ -40,10 +42,10 @@ mod tests {
 
     #[test]
     fn message_of_the_script_is_a_report() {
-        let message = "7\n2026-11-22T09:30:00Z\n2\n{\"persons\":[]}\nhall\nof mirrors";
+        let message = "7\n2026-11-22T09:30:00Z\n2\n{\"persons\":[]}\nhall of mirrors";
         let stored = parse(message.into()).unwrap();
         assert_eq!(stored.id.to_string(), "7");
-        assert_eq!(stored.report.camera, "hall\nof mirrors");
+        assert_eq!(stored.report.camera, "hall of mirrors");
         assert_eq!(stored.report.persons, 2);
         assert_eq!(&stored.report.json[..], b"{\"persons\":[]}");
     }
@@ -58,6 +60,8 @@ mod tests {
             "7\nyesterday\n2\n{}\nhall",
             "7\n2026-11-22T09:30:00Z\n-2\n{}\nhall",
             "7\n2026-11-22T09:30:00Z\n2\n{}\r\nhall",
+            "7\n2026-11-22T09:30:00Z\n2\n{}\nhall\nof mirrors",
+            "7\n2026-11-22T09:30:00Z\n2\n{}\n\u{202e}llah",
         ] {
             assert!(parse(message.into()).is_none(), "{message:?}");
         }

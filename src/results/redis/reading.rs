@@ -5,6 +5,7 @@ use std::{num::NonZeroUsize, sync::Arc};
 
 use bytes::Bytes;
 use jiff::Timestamp;
+use lookdown_common::text::is_camera_name;
 use redis::{
     FromRedisValue, Pipeline, RedisResult, Script, Value,
     aio::MultiplexedConnection,
@@ -39,10 +40,16 @@ impl Reader<'_> {
         Ok(reports(camera, found).pop())
     }
 
-    pub(super) async fn cameras(&mut self) -> RedisResult<Vec<String>> {
-        let mut all = cmd("ZRANGE");
-        all.arg(self.keys.cameras()).arg(0).arg(-1);
-        all.query_async(&mut self.connection).await
+    /// The cameras with the latest reports, at most `most`: those that other programs added beyond
+    /// the limit are not read, nor those with names that the server refuses.
+    pub(super) async fn cameras(&mut self, most: NonZeroUsize) -> RedisResult<Vec<String>> {
+        let mut last = cmd("ZRANGE");
+        last.arg(self.keys.cameras())
+            .arg(format!("-{most}"))
+            .arg(-1);
+        let mut cameras: Vec<String> = last.query_async(&mut self.connection).await?;
+        cameras.retain(|camera| is_camera_name(camera));
+        Ok(cameras)
     }
 
     /// Deletes all reports of a camera. Returns false if it had none.
@@ -59,8 +66,11 @@ impl Reader<'_> {
         call.invoke_async(&mut self.connection).await
     }
 
-    pub(super) async fn latest_of_all(&mut self) -> RedisResult<Vec<Arc<StoredReport>>> {
-        let cameras = self.cameras().await?;
+    pub(super) async fn latest_of_all(
+        &mut self,
+        most: NonZeroUsize,
+    ) -> RedisResult<Vec<Arc<StoredReport>>> {
+        let cameras = self.cameras(most).await?;
         let mut each = atomic();
         for camera in &cameras {
             let last = each.cmd("XREVRANGE").arg(self.keys.camera(camera));
@@ -263,7 +273,7 @@ fn report(camera: &str, mut entry: StreamId) -> Option<Arc<StoredReport>> {
     let Value::BulkString(json) = entry.map.remove("json")? else {
         return None;
     };
-    if !is_one_line(&json) {
+    if !is_one_line(&json) || !is_camera_name(camera) {
         return None;
     }
     Some(Arc::new(StoredReport {

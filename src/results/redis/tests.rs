@@ -204,6 +204,15 @@ async fn a_flood_of_messages_of_redis_ends_the_connection() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn cameras_with_names_that_are_refused_are_skipped() {
+    let long = "n".repeat(129);
+    let names = ["hall", "", "\u{202e}llah", "a\nb", &long];
+    let reply = names.map(|name| format!("${}\r\n{name}\r\n", name.len()));
+    let redis = EvilRedis::start(Evil::once(&format!("*5\r\n{}", reply.concat())));
+    assert_eq!(redis.store().await.cameras().await.unwrap(), ["hall"]);
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_report_with_line_ends_is_skipped() {
     let entry = |json: &str| {
         let fields = [

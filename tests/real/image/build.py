@@ -41,23 +41,32 @@ class Image:
         isolated = ["/usr/bin/unshare", "--mount", "/bin/sh", str(INSIDE), str(self.root)]
         return ["env", "-i", *assignments, *isolated, *command]
 
+    def user(self) -> int:
+        """The number of its user."""
+        return int(self.config["User"].split(":")[0])
+
     def size(self) -> int:
         """The total size of all files, bytes."""
         files = (file for file in self.root.rglob("*") if file.is_file() and not file.is_symlink())
         return sum(file.stat().st_size for file in files)
 
 
-def build() -> Image:
-    """Builds the image, which stays until `remove` is called."""
+def build(*targets: str) -> list[Image]:
+    """Builds an image for each target of the Dockerfile. They stay until `remove` is called."""
     remove()
     _run([sys.executable, ROOT / "scripts" / "dist.py", LOOKDOWN])
     _import_base("debian:12-slim")
+    return [_build(target) for target in targets]
+
+
+def _build(target: str) -> Image:
     _buildah(
-        *("bud", "--isolation=chroot", "--pull-never", "--format=docker"),
+        # Layers are kept, so that the second target starts with those of the first.
+        *("bud", "--isolation=chroot", "--pull-never", "--format=docker", "--layers", f"--target={target}"),
         *(f"--build-arg={name}={value}" for name, value in BUILD_ARGUMENTS.items()),
-        *(f"--file={ROOT}/docker/Dockerfile", "--tag=lookdown", ROOT),
+        *(f"--file={ROOT}/docker/Dockerfile", f"--tag=lookdown-{target}", ROOT),
     )
-    container = _buildah("from", "--pull-never", "lookdown")
+    container = _buildah("from", "--pull-never", f"lookdown-{target}")
     root = Path(_buildah("mount", container))
     # Container engines mount these.
     for place in ("dev", "proc"):

@@ -34,8 +34,6 @@ def lookdown(
     port = port or free_ports(1)[0]
     wanted = {"SERVER__LISTEN": f"127.0.0.1:{port}", "CALIBRATIONS__PATH": str(calibrations), **AT_ONCE, **settings}
     variables = {f"LOOKDOWN__{name}": value for name, value in wanted.items()} | (environment or {})
-    # Like `make serve`.
-    variables["MALLOC_MMAP_THRESHOLD_"] = "131072"
     with running("lookdown", [*inside, str(LOOKDOWN), "serve"], port, "/readyz", variables) as server:
         yield server
 

@@ -1,7 +1,7 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::scene::LATE_LIMIT;
+use crate::scene_camera::LATE_LIMIT;
 
 fn jump() -> impl Strategy<Value = i64> {
     let second = 1000_i64;

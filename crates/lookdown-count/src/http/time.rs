@@ -124,14 +124,12 @@ impl Day {
 
 fn timestamp(name: &str, text: Option<&str>) -> Result<Option<i64>, Problem> {
     let Some(text) = text else { return Ok(None) };
-    match text.parse::<Timestamp>() {
-        Ok(time) => Ok(Some(time.as_millisecond())),
-        Err(_) => {
-            let remedy = "a time: write it like 2026-11-22T10:00:00Z, with + as %2B; `from` may be \
-                          today, yesterday or week";
-            Err(is_not(name, text, remedy))
-        }
-    }
+    let time: Timestamp = text.parse().map_err(|_| {
+        let remedy = "a time: write it like 2026-11-22T10:00:00Z, with + as %2B; `from` may be \
+                      today, yesterday or week";
+        is_not(name, text, remedy)
+    })?;
+    Ok(Some(time.as_millisecond()))
 }
 
 /// Returns the problem of a value. `remedy` completes "… is not".

@@ -12,11 +12,15 @@ use lookdown_tracking::{Plane, TailPoint, Track};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::shared::{Shared, check_known, now_ms};
+use super::{
+    furniture::{Thing, things},
+    shared::{Shared, check_known, now_ms, rounded},
+};
 use crate::{
     engine::Engine,
     now::time_of,
-    scene::{Scene, SceneCamera},
+    scene::Scene,
+    scene_camera::SceneCamera,
     snapshot::{LineSnapshot, ZoneSnapshot},
     sums::Owner,
 };
@@ -41,6 +45,9 @@ pub(super) struct Tracks {
     lines: Vec<LineRow>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     zones: Vec<ZoneRow>,
+    /// The things that stand in the frame of the camera, furniture and candidates.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    furniture: Vec<Thing>,
 }
 
 /// A line of a camera.
@@ -152,6 +159,7 @@ fn tracks(engine: &Engine, scene: &Scene, camera: Option<&str>) -> Tracks {
         is_current,
         lines: of_camera.map_or_else(Vec::new, |(_, camera)| line_rows(camera, &lines)),
         zones: of_camera.map_or_else(Vec::new, |(_, camera)| zone_rows(camera, &zones)),
+        furniture: camera.map_or_else(Vec::new, |camera| things(scene, camera)),
     }
 }
 
@@ -164,6 +172,7 @@ impl Tracks {
             tracks: Vec::new(),
             lines: Vec::new(),
             zones: Vec::new(),
+            furniture: Vec::new(),
         }
     }
 }
@@ -255,10 +264,6 @@ fn row(track: &Track, camera: Option<&SceneCamera>) -> TrackRow {
         tail: tail.map(rounded).collect(),
         tail_px,
     }
-}
-
-fn rounded(place: [f64; 2]) -> [f64; 2] {
-    place.map(|value| (value * 1000.0).round() / 1000.0)
 }
 
 fn time(seconds: f64) -> Timestamp {

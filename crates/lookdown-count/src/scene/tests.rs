@@ -1,6 +1,10 @@
+use std::{sync::LazyLock, time::Duration};
+
 use lookdown_lens::calibration::CalibrationFile;
 
 use super::*;
+
+static START: LazyLock<Instant> = LazyLock::new(Instant::now);
 
 /// A surely seen person at a place of the floor, 3 m below the camera.
 fn person(x: f64, y: f64) -> Observation {
@@ -10,6 +14,7 @@ fn person(x: f64, y: f64) -> Observation {
         azimuth_deg: y.atan2(x).to_degrees() + 90.0,
         off_axis_deg: x.hypot(y).atan2(3.0).to_degrees(),
         centre_px: px,
+        size_px: [40.0, 80.0],
         foot_px: px,
         score: 0.95,
         is_in_margin: false,
@@ -40,6 +45,15 @@ fn scene() -> Scene {
     Scene::new(owner, vec![("hall".to_owned(), definition)]).unwrap()
 }
 
+/// The time of a report that arrives at once.
+fn time(at_ms: i64) -> ReportTime {
+    ReportTime {
+        at_ms,
+        longest_gap_ms: 10_000,
+        now: *START + Duration::from_millis(at_ms.unsigned_abs()),
+    }
+}
+
 #[test]
 fn door_at_the_edge_of_an_area_loses_no_crossing() {
     let (mut scene, mut sums) = (scene(), Sums::default());
@@ -57,7 +71,7 @@ fn door_at_the_edge_of_an_area_loses_no_crossing() {
             ..person(x, 0.5)
         };
         let at_ms = 200 * i64::from(frame);
-        let found = scene.accept(0, (at_ms, 10_000), &[seen], &mut sums);
+        let found = scene.accept(0, time(at_ms), &[seen], &mut sums);
         crossings += found.unwrap().len();
         let zone = scene.cameras[0]
             .occupancy()

@@ -8,7 +8,8 @@ use super::{Condition, Webhook};
 use crate::{
     message::{HeldCondition, Message},
     now::time_of,
-    scene::{NamedCrossing, Scene},
+    scene::Scene,
+    scene_camera::NamedCrossing,
 };
 
 /// The conditions and whether they hold.

@@ -1,10 +1,18 @@
 //! Delivers messages: each receiver has a task, so that one never slows another.
 
-use std::{collections::BTreeMap, sync::Arc, time::Duration};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::Arc,
+    time::Duration,
+};
 
+use base64::{Engine as _, engine::general_purpose::STANDARD};
 use jiff::Timestamp;
-use lookdown_common::{AbortOnDrop, ClientError, LogOnce, client_builder, text::with_causes};
-use reqwest::{Client, StatusCode, Url, header::CONTENT_TYPE};
+use lookdown_common::{
+    AbortOnDrop, ClientError, HttpClient, LogOnce, ServerClient, text::with_causes,
+};
+use reqwest::{StatusCode, Url, header::CONTENT_TYPE};
+use serde_json::{Value, json};
 use tokio::{
     sync::mpsc::{self, error::TrySendError},
     task::spawn_blocking,
@@ -12,12 +20,15 @@ use tokio::{
 };
 
 use super::{Webhook, signature::SigningKey};
-use crate::{message::Message, metrics::Metrics, store::Store};
+use crate::{event_image::latest_image, message::Message, metrics::Metrics, store::Store};
 
 /// Most messages that wait for a receiver.
 const QUEUE: usize = 256;
 /// Longest time of an attempt.
 const TIMEOUT: Duration = Duration::from_secs(15);
+/// Greatest age of a message that gets an image, seconds. The latest image of the camera would show
+/// another time.
+const IMAGE_AGE_S: i64 = 10;
 /// Pauses before further attempts.
 const PAUSES: [Duration; 4] = [
     Duration::from_secs(2),
@@ -37,12 +48,21 @@ pub(crate) struct Deliveries {
 
 /// A receiver of messages.
 struct Receiver {
-    client: Client,
+    client: HttpClient,
     key: SigningKey,
     url: Url,
     /// The scheme, the host and the port: the path may be a secret.
     address: String,
     log: LogOnce,
+    images: Images,
+}
+
+/// The images of messages.
+#[derive(Clone)]
+struct Images {
+    server: ServerClient,
+    /// The digests of the webhooks whose messages have an image.
+    webhooks: Arc<BTreeSet<String>>,
 }
 
 /// The outcome of an attempt.
@@ -58,10 +78,16 @@ impl Deliveries {
     pub(crate) fn start(
         webhooks: &[Webhook],
         waiting: Vec<Message>,
+        server: &ServerClient,
         store: &Store,
         metrics: &Arc<Metrics>,
     ) -> Result<Self, ClientError> {
-        let client = client_builder().timeout(TIMEOUT).build()?;
+        let client = HttpClient::new(None)?;
+        let with_image = webhooks.iter().filter(|webhook| webhook.with_image);
+        let images = Images {
+            server: server.clone(),
+            webhooks: Arc::new(with_image.map(Webhook::digest).collect()),
+        };
         let mut receivers = BTreeMap::new();
         let mut of_urls = BTreeMap::<&Url, mpsc::Sender<Message>>::new();
         let mut tasks = Vec::new();
@@ -77,6 +103,7 @@ impl Deliveries {
                 url: webhook.url.clone(),
                 address: webhook.url.origin().ascii_serialization(),
                 log: LogOnce::default(),
+                images: images.clone(),
             };
             let (store, metrics) = (store.clone(), Arc::clone(metrics));
             let task = tokio::spawn(receiver.run(queue, store, metrics));
@@ -136,8 +163,9 @@ impl Receiver {
     /// Returns true if the message was delivered.
     async fn deliver(&mut self, message: &Message) -> bool {
         let mut pauses = PAUSES.into_iter();
+        let body = self.images.added_to(message).await;
         loop {
-            let problem = match self.attempt(message).await {
+            let problem = match self.attempt(&message.id, &body).await {
                 Attempt::Delivered => {
                     self.log.clear();
                     return true;
@@ -161,19 +189,20 @@ impl Receiver {
         }
     }
 
-    async fn attempt(&self, message: &Message) -> Attempt {
+    async fn attempt(&self, id: &str, body: &str) -> Attempt {
         let timestamp_s = Timestamp::now().as_second();
-        let signature = self.key.sign(&message.id, timestamp_s, &message.body);
+        let signature = self.key.sign(id, timestamp_s, body);
         let request = self
             .client
             .post(self.url.clone())
+            .timeout(TIMEOUT)
             .header(CONTENT_TYPE, "application/json")
-            .header("webhook-id", &message.id)
+            .header("webhook-id", id)
             .header("webhook-timestamp", timestamp_s)
             .header("webhook-signature", signature)
-            .body(message.body.clone());
+            .body(body.to_owned());
         let address = &self.address;
-        match request.send().await {
+        match self.client.send(request).await {
             Ok(response) if response.status().is_success() => Attempt::Delivered,
             Ok(response) if response.status() == StatusCode::GONE => Attempt::Refused(format!(
                 "the webhook at {address} answered 410 Gone: remove it from the settings"
@@ -184,9 +213,30 @@ impl Receiver {
             )),
             Err(error) => Attempt::Failed(format!(
                 "the webhook at {address} cannot be reached: {}: start it, or correct its URL",
-                with_causes(&error.without_url())
+                with_causes(&error)
             )),
         }
+    }
+}
+
+impl Images {
+    /// Returns the body of a message, with the latest image of its camera if the webhook wants one and
+    /// the message is recent. Images are not stored.
+    async fn added_to(&self, message: &Message) -> String {
+        let age_s = Timestamp::now().as_second() - message.created_s;
+        if !self.webhooks.contains(&message.webhook) || age_s > IMAGE_AGE_S {
+            return message.body.clone();
+        }
+        let Ok(mut body) = serde_json::from_str::<Value>(&message.body) else {
+            return message.body.clone();
+        };
+        let camera = body["data"]["camera"].as_str().unwrap_or_default();
+        let image = latest_image(&self.server, camera).await;
+        body["data"]["image"] = image.map_or(
+            Value::Null,
+            |jpeg| json!({ "media_type": "image/jpeg", "base64": STANDARD.encode(jpeg) }),
+        );
+        body.to_string()
     }
 }
 
@@ -195,3 +245,6 @@ fn remove(store: &Store, id: &str) {
         tracing::warn!("{problem}");
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -5,6 +5,7 @@
 use std::time::Duration;
 
 use jiff::Timestamp;
+use lookdown_common::text::MAX_CAMERA_CHARS;
 use lookdown_lens::calibration::CalibrationId;
 use strum::VariantNames;
 
@@ -53,7 +54,9 @@ parameter_table! {
     };
     CAMERA = ParameterSpec {
         name: "camera",
-        kind: ParameterKind::Name { max_chars: 128 },
+        kind: ParameterKind::Name {
+            max_chars: MAX_CAMERA_CHARS,
+        },
         default: ParameterDefault::Described("the ID of the calibration"),
         help: "Name of the camera, under which its results are kept.",
         example: Some("lobby-north"),

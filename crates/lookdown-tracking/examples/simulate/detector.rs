@@ -229,6 +229,7 @@ impl Camera {
                 azimuth_deg: (seen.azimuth.to_degrees() + 90.0).rem_euclid(360.0),
                 off_axis_deg: seen.off_axis.to_degrees(),
                 centre_px: [oriented.center.x, oriented.center.y],
+                size_px: [oriented.width, oriented.height],
                 foot_px: [foot.x, foot.y],
                 score,
                 is_in_margin: false,

@@ -117,6 +117,19 @@ mod tests {
     }
 
     #[test]
+    fn a_decoder_that_uses_more_cores_than_it_needs_ends() {
+        let cpu_seconds = read(std::process::id()).unwrap().1;
+        let usage = |cpu_seconds| Usage {
+            pid: std::process::id(),
+            since: Instant::now().checked_sub(WINDOW).unwrap(),
+            cpu_seconds,
+        };
+        assert!(usage(cpu_seconds).check().is_ok());
+        let busy = usage(cpu_seconds - 1.1 * MAX_CORES * WINDOW.as_secs_f64()).check();
+        assert!(matches!(busy, Err(SourceError::DecoderTime(cores)) if cores > MAX_CORES));
+    }
+
+    #[test]
     fn a_running_process_has_memory_and_time() {
         let (resident, seconds) = read(std::process::id()).unwrap();
         assert!(resident > 1 << 20 && seconds >= 0.0);

@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, path::PathBuf, time::Duration};
 use serde::Deserialize;
 
 use crate::{Camera, Credentials, Location, Transport, VideoOptions};
-use lookdown_common::{ConfigError, Secret, optional_duration, read_secret, text::is_invisible};
+use lookdown_common::{ConfigError, Secret, optional_duration, read_secret, text::is_camera_name};
 
 /// Shortest interval between two frames.
 const MIN_EVERY: Duration = Duration::from_millis(40);
@@ -18,8 +18,6 @@ const MIN_STALL: Duration = Duration::from_secs(1);
 /// Time without a frame after which a source is started again, if none is given, and as a multiple
 /// of the interval between two frames.
 const DEFAULT_STALL: (Duration, u32) = (Duration::from_secs(10), 3);
-/// Most characters of a camera's name, as the server accepts it.
-const MAX_NAME_CHARS: usize = 128;
 /// Parameters that have keys of their own, or that the watcher sets.
 const OWN_PARAMETERS: [&str; 6] = [
     "camera",
@@ -170,8 +168,7 @@ impl CameraEntry {
             let problem = "a name is missing: give a name or a calibration";
             return Err(ConfigError::problem(field, &problem));
         };
-        let length = name.chars().count();
-        if length == 0 || length > MAX_NAME_CHARS || name.chars().any(is_invisible) {
+        if !is_camera_name(name) {
             let remedy =
                 "is not a name of 1 to 128 characters without control and invisible characters";
             return Err(ConfigError::value(field, name, remedy));

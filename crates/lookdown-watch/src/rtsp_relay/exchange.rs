@@ -1,6 +1,10 @@
 //! The requests of `ffmpeg` in flight, and the changes to messages on their way.
 
-use std::{collections::VecDeque, net::IpAddr};
+use std::{
+    collections::VecDeque,
+    net::IpAddr,
+    time::{Duration, Instant},
+};
 
 use bytes::BytesMut;
 
@@ -11,6 +15,10 @@ use crate::{SourceError, credentials::Login};
 const MAX_PENDING: usize = 16;
 /// Requests for one response: the second one answers the challenge of the first.
 const ATTEMPTS: u32 = 2;
+/// Most messages within [`UNASKED_PERIOD`] that answer no request. Cameras send one or two a minute.
+const MAX_UNASKED: u32 = 100;
+/// The period in which such messages are counted.
+const UNASKED_PERIOD: Duration = Duration::from_secs(10);
 /// The redirection to another server, as a request of the camera (RFC 2326, section 10.10).
 const REDIRECT: &str = "REDIRECT";
 
@@ -25,6 +33,8 @@ pub(super) struct Exchange<'a> {
     pub(super) login: &'a mut Login,
     pending: VecDeque<Pending>,
     next_sequence: u32,
+    /// The messages that answer no request, and the start of their period.
+    unasked: (u32, Instant),
 }
 
 /// A request without a response.
@@ -44,6 +54,7 @@ impl<'a> Exchange<'a> {
             login,
             pending: VecDeque::new(),
             next_sequence: 1,
+            unasked: (0, Instant::now()),
         }
     }
 
@@ -101,6 +112,7 @@ impl<'a> Exchange<'a> {
             if method == REDIRECT {
                 return Err(SourceError::Redirect);
             }
+            self.count_unasked()?;
             let sequence = message.sequence().unwrap_or_default();
             let answer = format!("RTSP/1.0 200 OK\r\nCSeq: {sequence}\r\n\r\n");
             to_camera.extend_from_slice(answer.as_bytes());
@@ -109,7 +121,7 @@ impl<'a> Exchange<'a> {
         let sequence = message.sequence();
         let is_answered = |pending: &Pending| pending.message.sequence() == sequence;
         let Some(found) = self.pending.iter().position(is_answered) else {
-            return Ok(());
+            return self.count_unasked();
         };
         let Some(request) = self.pending.remove(found) else {
             return Ok(());
@@ -132,6 +144,22 @@ impl<'a> Exchange<'a> {
             request.sequence.map(|sequence| sequence.to_string()),
         );
         message.write(to_ffmpeg);
+        Ok(())
+    }
+
+    /// Counts a message that answers no request: one after another would keep a core busy.
+    fn count_unasked(&mut self) -> Result<(), SourceError> {
+        let (count, since) = &mut self.unasked;
+        if since.elapsed() >= UNASKED_PERIOD {
+            (*count, *since) = (0, Instant::now());
+        }
+        *count += 1;
+        if *count > MAX_UNASKED {
+            return Err(SourceError::Stream(format!(
+                "the camera sent more than {MAX_UNASKED} RTSP messages within {UNASKED_PERIOD:?} that \
+                 answer no request: check that it is a camera"
+            )));
+        }
         Ok(())
     }
 }

@@ -168,6 +168,22 @@ async fn large_descriptions_end_the_relay() {
 }
 
 #[tokio::test]
+async fn messages_that_answer_no_request_end_the_relay() {
+    for message in [
+        "RTSP/1.0 100 Continue\r\n\r\n",
+        "OPTIONS * RTSP/1.0\r\n\r\n",
+    ] {
+        let answer = format!("RTSP/1.0 200 OK\r\n\r\n{}", message.repeat(101));
+        let (url, _serving) = camera(&[&answer]).await;
+        let requests = ["OPTIONS URL RTSP/1.0\r\nCSeq: 1\r\n\r\n"; 2];
+        let (_, error) = exchange(&url, &mut login(), &requests).await;
+        let is_flood =
+            matches!(&error, Some(SourceError::Stream(problem)) if problem.contains("100 RTSP"));
+        assert!(is_flood, "{message}: {error:?}");
+    }
+}
+
+#[tokio::test]
 async fn connections_without_the_token_get_nothing() {
     let (url, _serving) = camera(&["RTSP/1.0 200 OK\r\n"]).await;
     let relay = Relay::connect(&url, PATIENCE).await.unwrap();

@@ -3,11 +3,10 @@
 
 use std::convert::Infallible;
 
-use lookdown_common::text::with_causes;
-
 use bytes::{Bytes, BytesMut};
+use lookdown_common::{HttpClient, HttpError, text::with_causes};
 use reqwest::{
-    Client, Response, StatusCode, Url,
+    Response, StatusCode, Url,
     header::{AUTHORIZATION, CONTENT_TYPE, ETAG, HeaderValue, IF_NONE_MATCH},
 };
 use tokio::time::{MissedTickBehavior, interval};
@@ -22,7 +21,7 @@ const ATTEMPTS: usize = 2;
 pub(super) async fn run(
     camera: &Camera,
     url: &Url,
-    client: &Client,
+    client: &HttpClient,
     login: &mut Login,
     sink: &Sink<'_>,
 ) -> Result<Infallible, SourceError> {
@@ -52,7 +51,7 @@ pub(super) async fn run(
 
 /// Sends a request, and answers the camera's challenge.
 async fn get(
-    client: &Client,
+    client: &HttpClient,
     url: &Url,
     login: &mut Login,
     entity_tag: Option<&HeaderValue>,
@@ -65,7 +64,7 @@ async fn get(
         if let Some(authorization) = login.authorization(url) {
             request = request.header(AUTHORIZATION, authorization);
         }
-        let response = request.send().await.map_err(unreachable)?;
+        let response = client.send(request).await.map_err(unreachable)?;
         match response.status() {
             StatusCode::UNAUTHORIZED => {
                 login.accept_challenge(response.headers())?;
@@ -127,6 +126,6 @@ fn content_type(response: &Response) -> String {
     }
 }
 
-fn unreachable(error: reqwest::Error) -> SourceError {
-    SourceError::Unreachable(with_causes(&error.without_url()))
+fn unreachable(error: impl Into<HttpError>) -> SourceError {
+    SourceError::Unreachable(with_causes(&error.into()))
 }

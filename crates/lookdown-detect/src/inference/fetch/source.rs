@@ -7,7 +7,10 @@ use std::{
     time::Duration,
 };
 
-use lookdown_common::files::{self, Links};
+use lookdown_common::{
+    files::{self, Links},
+    text::with_causes,
+};
 use reqwest::{
     blocking::Client,
     redirect::{Action, Attempt, Policy},
@@ -115,7 +118,7 @@ pub(super) fn get(place: String, redirect: Policy) -> Result<(String, Box<dyn Re
         Ok(response) => Ok((place, Box::new(response))),
         Err(error) => Err(FetchError::Unreadable {
             place,
-            problem: error.without_url().to_string(),
+            problem: with_causes(&error.without_url()),
         }),
     }
 }

@@ -1,0 +1,250 @@
+//! A camera of a scene: its lines and zones, and what is known of its last report.
+
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use lookdown_common::text::one_line;
+use lookdown_tracking::{
+    Track,
+    lines::{Direction, LineCounter, LineState},
+    zones::{DEFAULT_HOLD_S, ZoneCounter, ZoneEvent, ZoneState},
+};
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    definition::CameraDefinition,
+    definition_key::DefinitionKey,
+    now::{LogPause, Now},
+    presence::Presence,
+    report::ReportKey,
+    sums::{LineDirection, MINUTE_MS, Sums, ZoneOf, minutes},
+};
+
+/// Reports of a camera that are late for this long mean that a clock was set back: tracks begin again
+/// at its time.
+pub(crate) const LATE_LIMIT: Duration = Duration::from_secs(10);
+
+/// Pause between two log lines about the clock of a camera.
+const LOG_PAUSE: Duration = Duration::from_hours(1);
+
+/// A camera of a scene.
+pub(crate) struct SceneCamera {
+    pub(crate) name: String,
+    pub(crate) definition: Arc<CameraDefinition>,
+    lines: LineCounter,
+    zones: ZoneCounter,
+    pub(crate) presence: Presence,
+    /// Persons in each zone at the last report of this camera.
+    zone_persons: Vec<u64>,
+    /// The last report of this camera, counted or not.
+    pub(crate) last_report: Option<ReportKey>,
+    /// Arrival of the last counted report at this process.
+    arrived: Option<Instant>,
+    /// Arrival of the first of the late reports since the last one in order.
+    pub(crate) late_since: Option<Instant>,
+    clock_log: LogPause,
+}
+
+/// The state of a camera as it is stored.
+#[derive(Serialize, Deserialize)]
+pub(crate) struct CameraState {
+    name: String,
+    pub(crate) key: DefinitionKey,
+    lines: LineState,
+    zones: ZoneState,
+    presence: Presence,
+    zone_persons: Vec<u64>,
+    last_report: Option<ReportKey>,
+}
+
+/// A crossing with its names.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct NamedCrossing {
+    pub(crate) of: LineDirection,
+    pub(crate) at_ms: i64,
+}
+
+impl SceneCamera {
+    pub(crate) fn new(name: &str, definition: Arc<CameraDefinition>) -> Self {
+        Self {
+            name: name.to_owned(),
+            lines: line_counter(&definition, LineState::default()),
+            zones: zone_counter(&definition, ZoneState::default()),
+            presence: Presence::default(),
+            zone_persons: vec![0; definition.zones.len()],
+            last_report: None,
+            arrived: None,
+            late_since: None,
+            clock_log: LogPause::default(),
+            definition,
+        }
+    }
+
+    /// Returns the camera of a stored state.
+    pub(crate) fn resumed(state: CameraState, definition: Arc<CameraDefinition>) -> Self {
+        let mut zone_persons = state.zone_persons;
+        zone_persons.resize(definition.zones.len(), 0);
+        Self {
+            lines: line_counter(&definition, state.lines),
+            zones: zone_counter(&definition, state.zones),
+            presence: state.presence,
+            zone_persons,
+            last_report: state.last_report,
+            ..Self::new(&state.name, definition)
+        }
+    }
+
+    /// Returns the state to be stored.
+    pub(crate) fn state(&self) -> CameraState {
+        CameraState {
+            name: self.name.clone(),
+            key: self.definition.key.clone(),
+            lines: self.lines.state().clone(),
+            zones: self.zones.state().clone(),
+            presence: self.presence,
+            zone_persons: self.zone_persons.clone(),
+            last_report: self.last_report,
+        }
+    }
+
+    /// Changes what is counted. Visits and approaches begin again.
+    pub(crate) fn redefine(&mut self, definition: Arc<CameraDefinition>) {
+        *self = Self {
+            presence: self.presence,
+            last_report: self.last_report,
+            arrived: self.arrived,
+            late_since: self.late_since,
+            clock_log: self.clock_log,
+            ..Self::new(&self.name, definition)
+        };
+    }
+
+    /// Returns true if a refused report shows that a clock was set back: no report of this camera was
+    /// in order for [`LATE_LIMIT`].
+    pub(crate) fn is_set_back(&mut self, now: Instant) -> bool {
+        let since = *self.late_since.get_or_insert(now);
+        now.saturating_duration_since(since) >= LATE_LIMIT
+    }
+
+    /// Returns the seconds since the last counted report, 0 for the first one of this process.
+    pub(crate) fn elapsed_s(&mut self, now: Instant) -> f64 {
+        let last = self.arrived.replace(now).unwrap_or(now);
+        now.saturating_duration_since(last).as_secs_f64()
+    }
+
+    /// Logs that the capture times of the camera are not used.
+    pub(crate) fn warn_of_clock(&mut self, ahead_ms: i64, now: Now) {
+        if self.clock_log.is_over(LOG_PAUSE, now) {
+            let camera = one_line(&self.name);
+            let seconds = Duration::from_millis(ahead_ms.unsigned_abs()).as_secs_f64();
+            let side = if ahead_ms > 0 { "ahead" } else { "behind" };
+            tracing::warn!(
+                "captured_at of {camera} is {seconds} s {side}, so the arrival is its time: set the \
+                 clock of the camera's client"
+            );
+        }
+    }
+
+    pub(crate) fn presence(&self) -> &Presence {
+        &self.presence
+    }
+
+    /// Returns each zone with its persons now.
+    pub(crate) fn occupancy(&self) -> impl Iterator<Item = (&str, usize)> {
+        let names = self.zones.zones().iter().map(|zone| zone.name.as_str());
+        names.zip(self.zones.occupancy())
+    }
+
+    fn zone_of(&self, index: usize) -> ZoneOf {
+        let zone = self.zones.zones().get(index);
+        ZoneOf {
+            camera: self.name.clone(),
+            zone: zone.map(|zone| zone.name.clone()).unwrap_or_default(),
+        }
+    }
+
+    /// Adds the crossings, entries and visits of the tracks to the sums.
+    /// Lines have all tracks, zones those that count.
+    pub(crate) fn count(
+        &mut self,
+        [tracks, counted]: [&[&Track]; 2],
+        sums: &mut Sums,
+    ) -> Vec<NamedCrossing> {
+        let mut named = Vec::new();
+        for crossing in self.lines.update(tracks.iter().copied()) {
+            let line = &self.lines.lines()[crossing.line];
+            let direction = match crossing.direction {
+                Direction::In => 0,
+                Direction::Out => 1,
+            };
+            let at_ms = milliseconds(crossing.at_s);
+            let of = LineDirection {
+                camera: self.name.clone(),
+                line: line.name.clone(),
+                direction: self.definition.directions[crossing.line][direction].clone(),
+            };
+            let key = (of.clone(), at_ms.div_euclid(MINUTE_MS));
+            *sums.crossings.entry(key).or_default() += 1;
+            named.push(NamedCrossing { of, at_ms });
+        }
+        for event in self.zones.update(counted.iter().copied()) {
+            let (ZoneEvent::Entered { zone, at_s, .. } | ZoneEvent::Left { zone, at_s, .. }) =
+                event;
+            let minute = milliseconds(at_s).div_euclid(MINUTE_MS);
+            let sum = sums.zones.entry((self.zone_of(zone), minute)).or_default();
+            match event {
+                ZoneEvent::Entered { .. } => sum.entries += 1,
+                ZoneEvent::Left { dwell_s, .. } => {
+                    sum.visits += 1;
+                    sum.visit_ms += milliseconds(dwell_s).unsigned_abs();
+                }
+            }
+        }
+        named
+    }
+
+    /// Adds the time since the last report of this camera to its zones.
+    pub(crate) fn advance_zones(&mut self, at_ms: i64, longest_gap_ms: i64, sums: &mut Sums) {
+        let since = self.presence.known_since(at_ms, longest_gap_ms);
+        let occupancy = self.zones.occupancy();
+        for (index, persons) in occupancy.into_iter().enumerate() {
+            let persons = persons as u64;
+            let zone = self.zone_of(index);
+            let before = std::mem::replace(&mut self.zone_persons[index], persons);
+            let parts = since.map(|since| minutes(since, at_ms));
+            for (minute, length_ms) in parts.into_iter().flatten().filter(|_| before > 0) {
+                let sum = sums.zones.entry((zone.clone(), minute)).or_default();
+                sum.person_ms += length_ms * before;
+                sum.most = sum.most.max(before);
+            }
+            if persons > 0 {
+                let minute = at_ms.div_euclid(MINUTE_MS);
+                let sum = sums.zones.entry((zone, minute)).or_default();
+                sum.most = sum.most.max(persons);
+            }
+        }
+    }
+}
+
+// The definition was checked: counters accept it. Without it, nothing is counted.
+fn line_counter(definition: &CameraDefinition, state: LineState) -> LineCounter {
+    LineCounter::resumed(definition.lines.clone(), state).unwrap_or_else(|error| {
+        tracing::warn!("the lines of {:?} are not counted: {error}", definition.key);
+        LineCounter::default()
+    })
+}
+
+fn zone_counter(definition: &CameraDefinition, state: ZoneState) -> ZoneCounter {
+    ZoneCounter::resumed(definition.zones.clone(), DEFAULT_HOLD_S, state).unwrap_or_else(|error| {
+        tracing::warn!("the zones of {:?} are not counted: {error}", definition.key);
+        ZoneCounter::default()
+    })
+}
+
+fn milliseconds(seconds: f64) -> i64 {
+    #[expect(clippy::cast_possible_truncation, reason = "times of reports")]
+    let milliseconds = (seconds * 1000.0).round() as i64;
+    milliseconds
+}

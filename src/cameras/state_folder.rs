@@ -1,0 +1,87 @@
+//! The files of the state folder, which only this user can read.
+
+use std::{
+    fs, io,
+    io::Write,
+    os::unix::fs::{DirBuilderExt, OpenOptionsExt},
+    path::{Path, PathBuf},
+};
+
+use lookdown_common::{ConfigError, read_file};
+use serde::de::DeserializeOwned;
+
+use super::error::CameraError;
+
+/// The folder of the passwords in the state folder.
+const PASSWORDS: &str = "passwords";
+
+/// The state folder, which may be missing.
+pub(super) struct StateFolder(PathBuf);
+
+impl StateFolder {
+    pub(super) fn new(path: PathBuf) -> Self {
+        Self(path)
+    }
+
+    /// Returns the path of a file.
+    pub(super) fn file(&self, name: &str) -> PathBuf {
+        self.0.join(name)
+    }
+
+    /// Returns the path of the file with the password of a camera.
+    pub(super) fn password(&self, camera: &str) -> PathBuf {
+        self.0.join(PASSWORDS).join(camera)
+    }
+
+    /// Reads a JSON file. A missing file is empty.
+    pub(super) fn read<T: Default + DeserializeOwned>(&self, name: &str) -> Result<T, ConfigError> {
+        let path = self.file(name);
+        if !path.exists() {
+            return Ok(T::default());
+        }
+        let content = read_file("state.path", &path)?;
+        serde_json::from_slice(&content).map_err(|error| self.malformed(name, &error))
+    }
+
+    /// Returns the error of a file with another content.
+    pub(super) fn malformed(&self, name: &str, error: &serde_json::Error) -> ConfigError {
+        self.refused(name, &format!("is not a file of cameras: {error}"))
+    }
+
+    /// Returns the error of a file with this problem, the end of a sentence.
+    pub(super) fn refused(&self, name: &str, problem: &str) -> ConfigError {
+        let problem = format!("{} {problem}", self.file(name).display());
+        ConfigError::problem("state.path", &problem)
+    }
+
+    /// Writes a file that only this user can read: beside the old one, synced and renamed.
+    pub(super) fn write(&self, path: &Path, content: &str) -> Result<(), CameraError> {
+        let unfinished = path.with_extension("part");
+        let written = || {
+            fs::DirBuilder::new()
+                .recursive(true)
+                .mode(0o700)
+                .create(self.0.join(PASSWORDS))?;
+            let mut file = fs::OpenOptions::new()
+                .create(true)
+                .write(true)
+                .truncate(true)
+                .mode(0o600)
+                .open(&unfinished)?;
+            writeln!(file, "{content}")?;
+            file.sync_all()?;
+            fs::rename(&unfinished, path)
+        };
+        written().map_err(|error| CameraError::Folder(path.to_owned(), error))
+    }
+
+    /// Removes a file, if it exists.
+    pub(super) fn remove(path: &Path) -> Result<(), CameraError> {
+        match fs::remove_file(path) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                Err(CameraError::Folder(path.to_owned(), error))
+            }
+            _ => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,53 @@
+use lookdown_count::{LineSnapshot, ZoneSnapshot};
+
+use super::*;
+
+fn snapshot(crossings: u64, persons: Option<u64>) -> Snapshot {
+    Snapshot {
+        cameras: vec![CameraSnapshot {
+            name: "hall".to_owned(),
+            last_report_ms: 1_000,
+            persons,
+            lines: vec![LineSnapshot {
+                line: "door".to_owned(),
+                direction: "in".to_owned(),
+                crossings,
+            }],
+            zones: vec![ZoneSnapshot {
+                zone: "till".to_owned(),
+                persons,
+                entries: 0,
+                person_ms: 0,
+            }],
+        }],
+        sites: Vec::new(),
+    }
+}
+
+#[test]
+fn each_new_crossing_is_an_event() {
+    let found = events(&snapshot(12, Some(1)), &snapshot(14, Some(1)));
+    let body = json!({
+        "event_type": "crossing", "camera": "hall", "timestamp": "1970-01-01T00:00:01Z",
+        "line": "door", "direction": "in",
+    });
+    assert_eq!(found.len(), 2);
+    assert!(found.iter().all(|event| event.body == body), "{found:?}");
+    // The totals of the store are no events.
+    assert!(events(&Snapshot::default(), &snapshot(14, Some(1))).is_empty());
+    assert_eq!(
+        events(&snapshot(0, None), &snapshot(u64::MAX, None)).len(),
+        MAX_EVENTS
+    );
+}
+
+#[test]
+fn the_first_person_after_none_is_an_event() {
+    let found = events(&snapshot(0, Some(0)), &snapshot(0, Some(2)));
+    let zones: Vec<_> = found.iter().map(|event| &event.body["zone"]).collect();
+    assert_eq!(zones, [&Value::Null, &json!("till")]);
+    assert_eq!(found[0].body["event_type"], "occupancy.reached");
+    for (before, now) in [(Some(1), Some(2)), (None, Some(2)), (Some(0), None)] {
+        assert!(events(&snapshot(0, before), &snapshot(0, now)).is_empty());
+    }
+}
