@@ -368,9 +368,8 @@ impl Engine {
         match Scene::new(owner.clone(), cameras) {
             Ok(mut scene) => {
                 for camera in &mut scene.cameras {
-                    let before = before
-                        .as_ref()
-                        .and_then(|before| before.camera(&camera.name));
+                    let before = before.as_ref();
+                    let before = before.and_then(|before| before.camera(&camera.name));
                     camera.last_report = before.and_then(|(_, before)| before.last_report);
                 }
                 scene.keep_furniture(before.as_ref());
