@@ -200,15 +200,14 @@ fn operations_that_need_a_key_declare_it() {
 }
 
 #[test]
-fn all_counts_need_a_key_or_the_scope_read() {
+fn all_counts_need_a_key_with_the_scope_of_their_use() {
     let [_, (_, document)] = documents();
-    let read = serde_json::json!([{}, {"bearer": ["read"]}, {"api_key": ["read"]}]);
+    let needs = |scope: &str| serde_json::json!([{}, {"bearer": [scope]}, {"api_key": [scope]}]);
     for (path, operation) in operations(&document) {
-        let is_public = path == "/livez";
-        let expected = if is_public {
-            serde_json::json!([{}])
-        } else {
-            read.clone()
+        let expected = match path.as_str() {
+            "/livez" => serde_json::json!([{}]),
+            "/cameras/{camera}/furniture/{thing}" => needs("admin"),
+            _ => needs("read"),
         };
         assert_eq!(operation["security"], expected, "{path}");
     }
