@@ -91,10 +91,12 @@ const CLIENTS: [&str; 3] = [
     "legacy::Client::builder(",
 ];
 /// The files that may make them.
-const CLIENT_MAKERS: [&str; 5] = [
+const CLIENT_MAKERS: [&str; 6] = [
     "crates/lookdown-common/src/http_transport.rs",
     "crates/lookdown-detect/src/inference/fetch/source.rs",
     "crates/lookdown-detect/src/inference/remote/connection.rs",
+    // The calculation of digests.
+    "crates/lookdown-watch/src/credentials.rs",
     "src/probe.rs",
     "src/telemetry/collector.rs",
 ];

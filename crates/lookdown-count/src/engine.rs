@@ -372,7 +372,7 @@ impl Engine {
                 }
                 self.scenes.insert(owner.clone(), scene);
             }
-            Err(problem) => tracing::warn!("{owner:?} is not followed: {problem}"),
+            Err(problem) => tracing::warn!("{owner} is not followed: {problem}"),
         }
     }
 

@@ -1,7 +1,8 @@
 //! Sums per minute that are added to the store.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, fmt};
 
+use lookdown_common::text::one_line;
 use lookdown_tracking::heat_map::Cell;
 use serde::{Deserialize, Serialize};
 
@@ -16,6 +17,17 @@ pub enum Owner {
     Camera(String),
     /// A site.
     Site(String),
+}
+
+/// `camera hall`
+impl fmt::Display for Owner {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (kind, name) = match self {
+            Self::Camera(name) => ("camera", name),
+            Self::Site(name) => ("site", name),
+        };
+        write!(f, "{kind} {}", one_line(name))
+    }
 }
 
 /// The minute or the day of a sum: its number since the Unix epoch.

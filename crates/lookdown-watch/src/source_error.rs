@@ -105,3 +105,45 @@ impl SourceError {
         )
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_error_ends_with_a_remedy() {
+        let text = || "a.b".to_owned();
+        let errors = [
+            SourceError::CredentialsRefused { user: text() },
+            SourceError::CredentialsMissing,
+            SourceError::UnknownAuthentication,
+            SourceError::BasicAfterDigest,
+            SourceError::Status(404),
+            SourceError::Redirect,
+            SourceError::ContentType(text()),
+            SourceError::TooLarge,
+            SourceError::Memory,
+            SourceError::DecoderMemory,
+            SourceError::DecoderTime(1.5),
+            SourceError::NotAVideo,
+            SourceError::Stalled(Duration::from_secs(1)),
+            SourceError::Closed,
+            SourceError::Unreachable(text()),
+            SourceError::NoFfmpeg {
+                program: text(),
+                problem: text(),
+            },
+            SourceError::Ffmpeg(text()),
+            SourceError::Unreadable(text(), text()),
+        ];
+        let verbs = [
+            "check", "correct", "give", "install", "reduce", "select", "set",
+        ];
+        for error in errors {
+            let message = error.to_string();
+            let (_, remedy) = message.rsplit_once(": ").unwrap();
+            let verb = remedy.split(' ').next().unwrap();
+            assert!(verbs.contains(&verb), "{message}");
+        }
+    }
+}

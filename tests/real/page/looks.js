@@ -53,6 +53,10 @@ for (const [device, viewport] of [["wide", WIDE], ["phone", PHONE]]) {
       await assertFits(page);
       await assertAccessible(page);
       await keep("detect");
+      if (device === "phone") {
+        const [persons, timings] = await Promise.all(["#persons", "#timings"].map((of) => page.locator(of).boundingBox()));
+        assert.ok(persons.y < timings.y, "the persons are above the times");
+      }
       for (const [section, sign] of Object.entries(SECTIONS)) {
         await page.getByRole("navigation").getByRole("link", { name: section }).click();
         await page.locator(sign).first().waitFor();
