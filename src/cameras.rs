@@ -11,11 +11,12 @@ use std::{
     time::Duration,
 };
 
-use lookdown_common::{ConfigError, Secret, plain_name};
+use lookdown_common::{ConfigError, Secret, StoredFile, plain_name};
 use lookdown_watch::{CameraEntry, CameraState, Frame, Location, Metrics, first_frame};
 use parking_lot::{Mutex, RwLock};
 use secrecy::ExposeSecret;
 use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
 use state_folder::StateFolder;
 
 pub use error::CameraError;
@@ -70,6 +71,14 @@ fn shown_source(url: &str) -> String {
 
 /// Stored cameras by name.
 pub type Stored = BTreeMap<String, StoredCamera>;
+
+/// The content of the file of the cameras.
+#[derive(Serialize)]
+struct CameraFile<'a> {
+    version: u8,
+    #[serde(flatten)]
+    cameras: &'a Stored,
+}
 
 /// The cameras of this process.
 pub struct Cameras {
@@ -193,7 +202,13 @@ impl Cameras {
     /// # Errors
     /// [`ConfigError`].
     pub fn stored(&self) -> Result<Stored, ConfigError> {
-        self.folder.read(FILE)
+        let mut cameras: Map<String, Value> = self.folder.read(FILE)?;
+        if let Some(version) = cameras.remove(StoredFile::KEY) {
+            let checked = StoredFile::Cameras.check(&version.to_string());
+            checked.map_err(|problem| self.folder.refused(FILE, &problem))?;
+        }
+        Stored::deserialize(Value::Object(cameras))
+            .map_err(|error| self.folder.malformed(FILE, &error))
     }
 
     /// Returns the names of the paused cameras of the settings, possibly also of earlier settings.
@@ -300,8 +315,9 @@ impl Cameras {
     }
 
     fn check(&self, name: &str, camera: &StoredCamera) -> Result<(), CameraError> {
-        if !plain_name::is_plain(name) || name == TEST {
-            let remedy = "is not a name of 1 to 64 of a-z, 0-9, '_' and '-', and not test";
+        if !plain_name::is_plain(name) || [TEST, StoredFile::KEY].contains(&name) {
+            let remedy =
+                "is not a name of 1 to 64 of a-z, 0-9, '_' and '-', and not test or version";
             return Err(ConfigError::value("name", name, remedy).into());
         }
         if self.configured.read().contains_key(name) {
@@ -320,8 +336,12 @@ impl Cameras {
     }
 
     fn store(&self, stored: &Stored) -> Result<(), CameraError> {
-        let content = serde_json::to_string_pretty(stored).unwrap_or_default();
-        self.folder.write(&self.folder.file(FILE), &content)
+        let content = serde_json::to_string_pretty(&CameraFile {
+            version: StoredFile::Cameras.version(),
+            cameras: stored,
+        });
+        self.folder
+            .write(&self.folder.file(FILE), &content.unwrap_or_default())
     }
 }
 

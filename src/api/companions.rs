@@ -34,7 +34,7 @@ pub(super) enum Counts {
     /// The routes of this process.
     Here(Router),
     /// Another host.
-    Elsewhere(ServerClient),
+    Elsewhere(Arc<ServerClient>),
 }
 
 impl Companions {
@@ -59,7 +59,7 @@ impl Companions {
 
     /// Forwards requests to `/counts` and `/sites`.
     pub(crate) fn forward_counts(&self, client: ServerClient) {
-        self.0.write().counts = Counts::Elsewhere(client);
+        self.0.write().counts = Counts::Elsewhere(Arc::new(client));
     }
 
     /// Adds metrics to those of the server, or replaces those of the same name.

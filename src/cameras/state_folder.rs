@@ -40,10 +40,18 @@ impl StateFolder {
             return Ok(T::default());
         }
         let content = read_file("state.path", &path)?;
-        serde_json::from_slice(&content).map_err(|error| {
-            let problem = format!("{} is not a file of cameras: {error}", path.display());
-            ConfigError::problem("state.path", &problem)
-        })
+        serde_json::from_slice(&content).map_err(|error| self.malformed(name, &error))
+    }
+
+    /// Returns the error of a file with another content.
+    pub(super) fn malformed(&self, name: &str, error: &serde_json::Error) -> ConfigError {
+        self.refused(name, &format!("is not a file of cameras: {error}"))
+    }
+
+    /// Returns the error of a file with this problem, the end of a sentence.
+    pub(super) fn refused(&self, name: &str, problem: &str) -> ConfigError {
+        let problem = format!("{} {problem}", self.file(name).display());
+        ConfigError::problem("state.path", &problem)
     }
 
     /// Writes a file that only this user can read: beside the old one, synced and renamed.

@@ -44,6 +44,7 @@ fn a_camera_is_stored_with_its_password_in_a_private_file() {
     );
     let json = fs::read_to_string(folder.path().join("state").join(FILE)).unwrap();
     assert!(!json.contains("geheim"), "{json}");
+    assert!(json.contains("\"version\": 1"), "{json}");
     assert!(cameras.delete("hall").unwrap());
     assert!(!file.exists() && !cameras.delete("hall").unwrap());
 }
@@ -89,11 +90,11 @@ fn only_urls_of_cameras_are_accepted() {
             .to_string();
         assert!(error.starts_with("url: it"), "{error}");
     }
-    let error = cameras
-        .put("../x", camera("rtsp://c/"), None)
-        .unwrap_err()
-        .to_string();
-    assert!(error.starts_with("name: \"../x\" is not"), "{error}");
+    for name in ["../x", "test", "version"] {
+        let error = cameras.put(name, camera("rtsp://c/"), None).unwrap_err();
+        let start = format!("name: {name:?} is not");
+        assert!(error.to_string().starts_with(&start), "{error}");
+    }
 }
 
 #[test]

@@ -91,7 +91,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let outcome = runtime.block_on(async {
         let shutdown = Shutdown::on_signals().context("signals cannot be handled")?;
         let counting = counting(&settings, None);
-        run_counts(&counting, |_| {}, async || shutdown.requested().await).await
+        let counts = run_counts(&counting, |_| {}, async || shutdown.requested().await);
+        Box::pin(counts).await
     });
     serve::end(runtime);
     outcome.map(|()| ExitCode::SUCCESS)

@@ -17,7 +17,7 @@ use std::{
 use anyhow::{Context, bail};
 use lookdown_eval::DetectedRow;
 
-pub(super) use self::arguments::Arguments;
+pub(super) use self::arguments::{Arguments, DEFAULT_SCORE_THRESHOLD};
 use self::{detect_group::detect_group, output::Output};
 use crate::app::engine_for;
 

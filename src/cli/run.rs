@@ -222,10 +222,10 @@ impl Parts {
             companions.set_counts(started.routes);
             companions.set_metrics("counts", started.metrics);
         };
-        run_counts(&settings, started, async || {
+        let counts = run_counts(&settings, started, async || {
             over(after_watching.clone()).await;
-        })
-        .await
+        });
+        Box::pin(counts).await
     }
 
     /// Requests the end of all parts at the end of this one.

@@ -20,6 +20,9 @@ use super::{
 };
 use crate::cameras::Cameras;
 
+/// Most commands that wait for cameras that are not known yet.
+const MAX_COMMANDS: usize = 256;
+
 /// The switches of all cameras of this process.
 pub(super) struct Switches {
     topics: Topics,
@@ -63,7 +66,8 @@ impl Switches {
     }
 
     /// Notes a command or a state. Returns false for a message of another topic. A retained command
-    /// is ignored: it would override what was chosen in the web page.
+    /// is ignored: it would override what was chosen in the web page. The cameras of the settings are
+    /// known some seconds after the start, so commands of unknown cameras wait.
     pub(super) fn note(&mut self, message: &Publish) -> bool {
         let Some(topic) = self.topics.switch_topic(&message.topic) else {
             return false;
@@ -71,10 +75,11 @@ impl Switches {
         match topic {
             SwitchTopic::Command { camera } if !message.retain => {
                 let is_known = self.published.keys().any(|name| level(name) == camera);
+                let may_wait = self.withdraw_at.is_some() && self.commands.len() < MAX_COMMANDS;
                 let wanted = [(ON, true), (OFF, false)]
                     .into_iter()
                     .find_map(|(payload, is_on)| (message.payload == payload).then_some(is_on));
-                if let (true, Some(is_on)) = (is_known, wanted) {
+                if let (true, Some(is_on)) = (is_known || may_wait, wanted) {
                     self.commands.insert(camera.to_owned(), is_on);
                 }
             }
@@ -94,7 +99,7 @@ impl Switches {
     /// Executes the commands and returns the messages for everything that has changed. It is called
     /// at intervals, so that commands cost no more than one write per camera and interval.
     pub(super) async fn update(&mut self, now: Instant) -> Vec<Message> {
-        let commands = std::mem::take(&mut self.commands);
+        let commands = self.commands.clone();
         let cameras = Arc::clone(&self.cameras);
         let done = spawn_blocking(move || {
             let mut states = cameras.detection()?;
@@ -124,9 +129,12 @@ impl Switches {
         };
         let mut messages = self.changes(&states);
         self.published = states;
+        let levels: BTreeSet<_> = self.published.keys().map(|name| level(name)).collect();
+        let is_waiting = self.withdraw_at.is_some();
+        self.commands
+            .retain(|camera, _| is_waiting && !levels.contains(camera));
         if self.withdraw_at.is_some_and(|at| at <= now) {
             self.withdraw_at = None;
-            let levels: BTreeSet<_> = self.published.keys().map(|name| level(name)).collect();
             for (unknown, _) in self.retained.take() {
                 if !levels.contains(&unknown) {
                     messages.extend(self.withdrawal(&unknown));

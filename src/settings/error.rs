@@ -23,6 +23,14 @@ pub enum SettingsError {
         /// The line, and what was expected there.
         problem: String,
     },
+    /// The settings file has another version.
+    #[error("the settings file {} {problem}", path.display())]
+    Version {
+        /// The file.
+        path: PathBuf,
+        /// Its version and the remedy.
+        problem: String,
+    },
     /// A key or a table that does not exist.
     #[error("{place}: there is no `{name}` {parent}; use one of {known}")]
     Unknown {

@@ -30,6 +30,7 @@ Every setting with its key, environment variable, type and default. This page is
   clients have access.
 * The lists `[[cameras]]` with `[camera_defaults]`, and `[[webhooks]]`, are in the file only:
   [watch.md](watch.md#several-cameras) and [count.md](count.md#webhooks) describe their keys.
+* The file may have `version = 1`, the [version of its format](upgrade.md#what-is-kept).
 * A list is an array in the file (`[\"a\", \"b\"]`) and is separated by commas in a variable (`a,b`).
 * A variable that is set to nothing counts as not set, except `LOOKDOWN__ACCESS__KEYS_FILE`, which
   is refused.

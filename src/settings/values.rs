@@ -3,7 +3,10 @@
 
 use std::{collections::BTreeMap, path::Path};
 
-use lookdown_common::files::{self, MAX_SETTINGS_BYTES};
+use lookdown_common::{
+    StoredFile,
+    files::{self, MAX_SETTINGS_BYTES},
+};
 use toml::{Table, Value};
 
 use super::{
@@ -36,6 +39,9 @@ impl Values {
         if let Some(path) = file {
             let text = read(path)?;
             let mut table = parse(path, &text)?;
+            if let Some(version) = table.remove(StoredFile::KEY) {
+                check_version(path, &version)?;
+            }
             let lists = lists::NAMES
                 .iter()
                 .filter(|name| table.remove(**name).is_some());
@@ -126,6 +132,14 @@ fn parse(path: &Path, text: &str) -> Result<Table, SettingsError> {
             path: path.to_owned(),
             problem: on_one_line(&error.to_string()),
         })
+}
+
+fn check_version(path: &Path, version: &Value) -> Result<(), SettingsError> {
+    let checked = StoredFile::Settings.check(&version.to_string());
+    checked.map_err(|problem| SettingsError::Version {
+        path: path.to_owned(),
+        problem,
+    })
 }
 
 /// Drops the quoted source lines of a TOML error, which may hold a secret.

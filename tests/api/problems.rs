@@ -65,6 +65,10 @@ async fn the_parameter_at_fault_is_a_field_of_the_problem() {
         let problem = service.post_raw(query, frame()).await.problem();
         assert_eq!(problem["parameter"], parameter, "{problem}");
     }
+    for field in ["img", "image"] {
+        let problem = service.post_form(&[(field, b"GIF89a")]).await.problem();
+        assert_eq!(problem["parameter"], field, "{problem}");
+    }
     let problem = service.get("/nothing").await.problem();
     assert_eq!(problem.get("parameter"), None, "{problem}");
 

@@ -7,7 +7,7 @@ from harness.places import ROOT
 from kubernetes.tools import PYTHON, VALIDATE, run
 
 DOCKER = ROOT / "docker"
-COMMAND = ["docker-compose", "--file", "-", f"--project-directory={DOCKER}", "--profile=monitoring", "config"]
+COMMAND = ["docker-compose", "--file", "-", "--profile=monitoring", "config"]
 
 
 def services(**variables: str) -> dict[str, dict]:
@@ -15,7 +15,9 @@ def services(**variables: str) -> dict[str, dict]:
     text = (DOCKER / "compose.yaml").read_text(encoding="utf-8")
     # Debian's Docker Compose is of version 1, which knows no name of a project.
     nameless = re.sub(r"^name:.*\n", "", text, flags=re.MULTILINE)
-    filled = run(["env", *(f"{name}={value}" for name, value in variables.items()), *COMMAND], nameless)
+    filled = run(
+        ["env", f"--chdir={DOCKER}", *(f"{name}={value}" for name, value in variables.items()), *COMMAND], nameless
+    )
     (document,) = json.loads(run([PYTHON / "python", VALIDATE, "--only-read"], filled))
     return document["services"]
 

@@ -8,6 +8,7 @@ is a part of its configuration, and `FOLDER/press.json` turns a switch. SIGTERM 
 import asyncio
 import json
 import signal
+import socket
 import sys
 from pathlib import Path
 
@@ -23,7 +24,8 @@ def prepare(folder: Path, port: int, user: str, password: str) -> None:
     automations = folder / "automations.yaml"
     automation = automations.read_text(encoding="utf-8") if automations.exists() else ""
     # The images of entities need its HTTP server.
-    http = "http:\n  server_host: 127.0.0.1\n  server_port: 0\n"
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        http = f"http:\n  server_host: 127.0.0.1\n  server_port: {free.getsockname()[1]}\n"
     text = f"homeassistant:\n  name: Test\n{http}{automation}"
     (folder / "configuration.yaml").write_text(text, encoding="utf-8")
     entry = {

@@ -17,11 +17,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from harness.places import LOOKDOWN, ROOT, SAMPLES
-from harness.processes import free_ports
+from harness.processes import free_ports, running
 from mosquitto import PASSWORD, USER, broker
 from support.lookdown import lookdown
 from waiting import wait_until
 
+from cameras import http_camera
 from metrics import metric
 
 HERE = Path(__file__).resolve().parent
@@ -31,6 +32,7 @@ OTHER_SECRET = "whsec_QSBzZWNyZXQgdGhhdCBpcyBub3Qgb25l"
 OFFICE = (SAMPLES / "office.jpg").read_bytes()
 DETECT = "/detect?calibration=office&profile=fast"
 FRAMES = 12
+KILLS = 6
 ZONES = [{"name": "left", "frame_px": [[0, 0], [480, 0], [480, 960], [0, 960]]}]
 LINES = [{"name": "middle", "frame_px": [[480, 0], [480, 960]], "directions": ["east", "west"]}]
 TOPICS = "lookdown/counts/cameras/office"
@@ -325,6 +327,68 @@ class Counts(CountedCamera):
                 ended = subprocess.run(command, capture_output=True, text=True, check=False, timeout=20)
                 self.assertEqual(1, ended.returncode)
                 self.assertIn(problem, ended.stderr)
+
+
+class KilledRun(unittest.TestCase):
+    """`lookdown run` with a camera, killed at any time."""
+
+    def setUp(self):
+        self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
+        calibrations = self.folder / "calibrations"
+        calibrations.mkdir()
+        calibration = json.loads((SAMPLES / "calibrations" / "office.json").read_text(encoding="utf-8"))
+        content = json.dumps(calibration | {"zones": ZONES, "lines": LINES})
+        (calibrations / "office.json").write_text(content, encoding="utf-8")
+        gray = "color=gray:size=960x960"
+        made = ["ffmpeg", "-v", "error", *("-f", "lavfi", "-i", gray), *("-frames:v", "1", "-f", "mjpeg", "-")]
+        empty = subprocess.run(made, capture_output=True, check=True).stdout
+        # Persons appear in the zone and are gone again, every twelve seconds.
+        self.camera = self.enterContext(http_camera([empty] * 24 + [OFFICE] * 24, 4.0))
+
+    @contextlib.contextmanager
+    def run_all(self):
+        """Runs all parts, and kills them at the end."""
+        (port,) = free_ports(1)
+        settings = {
+            "SERVER__LISTEN": f"127.0.0.1:{port}",
+            "CALIBRATIONS__PATH": str(self.folder / "calibrations"),
+            "COUNTS__PATH": str(self.folder / "counts.sqlite"),
+            "COUNTS__COMMIT_EVERY": "500ms",
+            "STATE__PATH": str(self.folder / "state"),
+        }
+        environment = {f"LOOKDOWN__{name}": value for name, value in settings.items()}
+        source = f"http://127.0.0.1:{self.camera}/stream"
+        flags = ["--name", "hall", "--calibration", "office", "--profile", "fast", "--every", "250ms"]
+        with running("killed", [str(LOOKDOWN), "run", source, *flags], port, "/readyz", environment) as server:
+            yield server
+            os.kill(server.pid, signal.SIGKILL)
+            server.process.wait(10)
+
+    def shown(self, server) -> tuple[float, float]:
+        """The entries into zones and the time with reports that a client sees."""
+        try:
+            counts = json.loads(server.get("/counts/hall?step=1h"))
+        except urllib.error.HTTPError:
+            # The counts are being started, or there is no report yet.
+            return (0, 0)
+        metrics = server.get("/metrics").decode().splitlines()
+        entries = [line for line in metrics if line.startswith("lookdown_count_zone_entries_total{")]
+        known = sum(step["known_seconds"] for step in counts["steps"])
+        return (sum(float(line.split()[-1]) for line in entries), known)
+
+    def test_a_kill_loses_no_count_that_was_shown(self):
+        shown = (0.0, 0.0)
+        for kill in range(KILLS):
+            with self.run_all() as server:
+                resumed = wait_until(lambda server=server: any(self.shown(server)) and self.shown(server), "counts", 60)
+                self.assertGreaterEqual(resumed, shown, f"kill {kill}")
+                self.assertGreaterEqual(resumed[1], shown[1], f"kill {kill}")
+                # Not a multiple of the interval of the transactions.
+                until = time.monotonic() + 3.0 + 0.37 * kill
+                while time.monotonic() < until:
+                    shown = self.shown(server)
+        self.assertGreater(shown[0], 0)
+        print(f"after {KILLS} kills: {shown[0]:.0f} entries, {shown[1]:.0f} s with reports", flush=True)
 
 
 if __name__ == "__main__":

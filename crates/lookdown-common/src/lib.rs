@@ -27,9 +27,11 @@ mod reload;
 mod secret;
 #[cfg(feature = "companion")]
 mod server_entry;
+mod stored_file;
 pub mod text;
 
 pub use log_once::LogOnce;
+pub use stored_file::StoredFile;
 
 #[cfg(feature = "companion")]
 pub use {

@@ -26,7 +26,7 @@ use serde::Serialize;
 use utoipa::{ToSchema, openapi::OpenApi};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
-use crate::{engine::Engine, metrics::Metrics, sums::Owner};
+use crate::{engine::Engine, metrics::Metrics, now::time_of, sums::Owner};
 pub(crate) use counts::{MAX_VALUES, table};
 pub(crate) use operation::probes;
 pub(crate) use shared::Api;
@@ -100,7 +100,7 @@ struct CameraRow {
 #[derive(Serialize, ToSchema)]
 struct Dropping {
     /// Time of the first of them.
-    since: Option<Timestamp>,
+    since: Timestamp,
     /// The reason, as in `lookdown_count_reports_skipped_total`.
     reason: &'static str,
 }
@@ -111,7 +111,7 @@ impl CameraRow {
         let drops = engine.drops().of(name);
         let since_ms = drops.and_then(|drops| drops.since_ms);
         let dropping = drops.zip(since_ms).map(|(drops, since_ms)| Dropping {
-            since: Timestamp::from_millisecond(since_ms).ok(),
+            since: time_of(since_ms),
             reason: drops.reason.label(),
         });
         Self {
@@ -137,7 +137,7 @@ async fn cameras(State(api): State<Shared>) -> Json<Vec<CameraRow>> {
     let mut rows = BTreeMap::new();
     for camera in snapshot.cameras {
         let row = CameraRow {
-            last_report: Timestamp::from_millisecond(camera.last_report_ms).ok(),
+            last_report: Some(time_of(camera.last_report_ms)),
             persons: camera.persons,
             site: match engine.scene_of(&camera.name).map(|scene| &scene.owner) {
                 Some(Owner::Site(site)) => Some(site.clone()),

@@ -1,4 +1,4 @@
-//! The own clocks at one moment.
+//! The own clocks at one moment, and times in milliseconds.
 
 use std::time::{Duration, Instant};
 
@@ -21,6 +21,16 @@ impl Now {
             instant: Instant::now(),
         }
     }
+}
+
+/// Returns the time of milliseconds since the Unix epoch, or the nearest one that can be written.
+pub(crate) fn time_of(milliseconds: i64) -> Timestamp {
+    let nearest = if milliseconds < 0 {
+        Timestamp::MIN
+    } else {
+        Timestamp::MAX
+    };
+    Timestamp::from_millisecond(milliseconds).unwrap_or(nearest)
 }
 
 /// Keeps equal log lines apart.

@@ -25,6 +25,7 @@ use crate::{
     hand_back::hand_back,
     http::{Api, operation_router, probes, router},
     metrics::Metrics,
+    now::time_of,
     options::CountOptions,
     snapshot::Snapshot,
     store::{Store, StoreError},
@@ -148,11 +149,8 @@ pub async fn count(
     };
     if follower.engine.lock().last_event() > 0 {
         let last_ms = follower.engine.lock().last_event() / 1000;
-        let last = i64::try_from(last_ms).ok();
-        let last = last.and_then(|last_ms| Timestamp::from_millisecond(last_ms).ok());
-        if let Some(last) = last {
-            tracing::info!("continuing after the report of {last}");
-        }
+        let last = time_of(i64::try_from(last_ms).unwrap_or(i64::MAX));
+        tracing::info!("continuing after the report of {last}");
     }
     let mut following = tokio::spawn(async move { follower.run().await });
     tokio::select! {

@@ -16,13 +16,16 @@ use std::{
     time::{Duration, Instant},
 };
 
+use lookdown_common::StoredFile;
 use parking_lot::Mutex;
 use rusqlite::Connection;
 
 pub(crate) use read::{Span, Step, StoredCalibrations};
 
-/// First byte of the stored state of a scene. Changes with the types in it.
-const STATE_VERSION: u8 = 3;
+/// First byte of the stored state of a scene.
+const STATE_VERSION: u8 = StoredFile::Tracks.version();
+/// The version of a file without tables.
+const NEW: i64 = 0;
 /// Longest wait for the other connection.
 const BUSY_TIMEOUT: Duration = Duration::from_secs(5);
 /// Longest wait for an earlier user of the store, and the interval of the attempts.
@@ -46,14 +49,12 @@ pub enum StoreError {
     #[error("counts.path: {0} is in use by another process: stop it, or give another path")]
     InUse(PathBuf),
     /// The store is of a later version.
-    #[error(
-        "counts.path: {path} has the version {version}: use the program that wrote it, or give another path"
-    )]
+    #[error("counts.path: {path} {problem}")]
     Version {
         /// The file.
         path: PathBuf,
-        /// Its version.
-        version: i64,
+        /// Its version and the remedy.
+        problem: String,
     },
     /// A query failed.
     #[error("the store cannot be read or written: {0}")]
@@ -88,11 +89,12 @@ impl Store {
         })?;
         let writer = connect(path).map_err(unusable)?;
         let version = schema::version(&writer).map_err(unusable)?;
-        if version > schema::VERSION {
-            return Err(StoreError::Version {
+        if version != NEW {
+            let checked = StoredFile::Counts.check(&version.to_string());
+            checked.map_err(|problem| StoreError::Version {
                 path: path.to_owned(),
-                version,
-            });
+                problem,
+            })?;
         }
         schema::create(&writer).map_err(unusable)?;
         let reader = connect(path).map_err(unusable)?;

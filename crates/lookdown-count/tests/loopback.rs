@@ -383,16 +383,33 @@ async fn refusals_are_problem_documents() {
             (
                 "/counts/hall?step=90s",
                 422,
-                "step: it is not a duration of whole minutes",
+                "step: \"90s\" is not a duration of whole minutes",
             ),
-            ("/counts/hall?from=someday", 422, "from: it is not a time"),
+            (
+                "/counts/hall?from=someday",
+                422,
+                "from: \"someday\" is not a time",
+            ),
             (
                 "/counts/hall?from=2020-01-01T00:00:00Z&step=1m",
                 422,
                 "from: the time has more than",
             ),
-            ("/counts/hall?colour=red", 422, "query: it has an unknown"),
-            ("/counts/hall?format=xml", 422, "format: it is unknown"),
+            (
+                "/counts/hall?colour=red",
+                422,
+                "query: unknown field `colour`",
+            ),
+            (
+                "/counts/hall?step=1m&step=1m",
+                422,
+                "query: duplicate field `step`",
+            ),
+            (
+                "/counts/hall?format=xml",
+                422,
+                "format: \"xml\" is not a format: give json or csv",
+            ),
         ] {
             let (given, body) = companion.get(path).await;
             let problem: Value = serde_json::from_str(&body).unwrap();

@@ -123,7 +123,7 @@ impl Shape {
 
     /// The unit of distances: the square root of the area.
     fn unit_px(&self) -> f64 {
-        ((self.log_size[0] + self.log_size[1]) / 2.0).exp()
+        f64::midpoint(self.log_size[0], self.log_size[1]).exp()
     }
 
     /// Distance of the centers, in units of this box.

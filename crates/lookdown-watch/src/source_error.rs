@@ -14,7 +14,7 @@ pub enum SourceError {
         user: String,
     },
     /// Credentials are missing.
-    #[error("the camera requires a user name and a password: give them")]
+    #[error("the camera requires a user name and a password: set user and password_file")]
     CredentialsMissing,
     /// The camera requires an unknown authentication scheme.
     #[error(
@@ -70,10 +70,10 @@ pub enum SourceError {
     #[error("no whole frame arrived within {0:?}: check the camera, or raise stall_after")]
     Stalled(Duration),
     /// The stream ended.
-    #[error("the camera ended the stream")]
+    #[error("the camera ended the stream: check it if this is logged again")]
     Closed,
     /// The camera cannot be reached.
-    #[error("the camera cannot be reached: {0}")]
+    #[error("the camera cannot be reached: {0}: check its address and the network")]
     Unreachable(String),
     /// `ffmpeg` cannot be started.
     #[error(
@@ -86,10 +86,10 @@ pub enum SourceError {
         problem: String,
     },
     /// `ffmpeg` failed, with its last line.
-    #[error("ffmpeg ended: {0}")]
+    #[error("ffmpeg ended: {0}: check the URL and the codec with ffprobe")]
     Ffmpeg(String),
     /// A file or a folder cannot be read.
-    #[error("{0} cannot be read: {1}")]
+    #[error("{0} cannot be read: {1}: check the path and its permissions")]
     Unreadable(String, String),
 }
 

@@ -59,13 +59,15 @@ use crate::api::{
 )]
 pub(in crate::api) async fn detect_persons(
     State(state): State<ApiState>,
-    upload: Upload,
+    mut upload: Upload,
 ) -> Result<impl IntoResponse, Problem> {
     let context = Arc::clone(&upload.context);
+    let field = upload.field.take();
     context.note_upload(upload.arrived);
     let (job, answer) = job(&state, upload)?;
     let write = move |input: AnswerInput<'_>| answer.content(input.frame, input.json);
-    let answered = run_detection(&state, &context, job, write).await?;
+    let answered = run_detection(&state, &context, job, write).await;
+    let answered = answered.map_err(|problem| problem.of_frame_field(field))?;
     let headers = AppendHeaders(report_headers(&answered.report));
     let Content { media_type, bytes } = answered.answer;
     let media_type = [(CONTENT_TYPE, HeaderValue::from_static(media_type))];

@@ -38,6 +38,8 @@ use crate::{
 pub(in crate::api) struct Upload {
     /// The encoded frame.
     pub(in crate::api) image: Bytes,
+    /// The form field of the frame; `None` if the frame is the body.
+    pub(in crate::api) field: Option<String>,
     /// The name of its file, if it was sent.
     pub(in crate::api) file_name: Option<String>,
     /// The headers of the request, such as `Accept`.
@@ -106,14 +108,16 @@ impl Upload {
             arrived,
         } = ReceivedRequest::receive(request, state, budget).await?;
         let headers = parts.headers.clone();
-        let (image, file_name, parameters) = if is_multipart(&headers) {
+        let (image, field, file_name, parameters) = if is_multipart(&headers) {
             let form = form::parse(parts, held.bytes(), use_of).await?;
-            (held.with_bytes(form.image), form.file_name, form.parameters)
+            let image = held.with_bytes(form.image);
+            (image, Some(form.field), form.file_name, form.parameters)
         } else {
-            (held, None, Vec::new())
+            (held, None, None, Vec::new())
         };
         Ok(Self {
             image: image.into_bytes(),
+            field,
             file_name,
             headers,
             caller: context.caller.clone(),

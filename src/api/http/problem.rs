@@ -24,6 +24,8 @@ pub(in crate::api) use lookdown_http::problem::ProblemBody;
 
 /// The longest `Retry-After`.
 const MAX_RETRY_AFTER_SECONDS: u64 = 60;
+/// The parameter of problems of the frame.
+const FRAME: &str = "image";
 
 /// The reason why a request failed.
 #[derive(Debug, Clone)]
@@ -140,6 +142,14 @@ impl Problem {
         Self {
             parameter: Some(parameter.into()),
             ..self
+        }
+    }
+
+    /// Names the form field in which the client sent the frame, if the frame is at fault.
+    pub(in crate::api) fn of_frame_field(self, field: Option<String>) -> Self {
+        match field {
+            Some(field) if self.parameter.as_deref() == Some(FRAME) => self.with_parameter(field),
+            _ => self,
         }
     }
 

@@ -14,6 +14,7 @@ use axum::{
     routing::{get, put},
 };
 use lookdown_common::ServerClient;
+use reqwest::RequestBuilder;
 use serde::Deserialize;
 use tower::ServiceExt;
 use url::Url;
@@ -71,7 +72,10 @@ async fn answer(state: &ApiState, request: Request) -> Result<Response, Problem>
             Ok(response) => response,
             Err(never) => match never {},
         },
-        Counts::Elsewhere(client) => forward(&client, &request).await?,
+        Counts::Elsewhere(client) => {
+            let outgoing = outgoing(&client, &request);
+            forward(&client, outgoing).await?
+        }
         Counts::Starting => return Err(unavailable("the counts are being started: retry")),
         Counts::None => {
             let detail = "this server has no counts: start `lookdown run`, or set counts.url to \
@@ -95,19 +99,24 @@ fn without_extensions(request: Request) -> Request {
     request
 }
 
-/// Requests the counts of another host with the key of that host: the key of the caller was checked
-/// here.
-async fn forward(client: &ServerClient, request: &Request) -> Result<Response, Problem> {
+/// Returns the request to another host.
+fn outgoing(client: &ServerClient, request: &Request) -> RequestBuilder {
     let url = url(client, request.uri());
     let outgoing = match *request.method() {
         Method::PUT => client.put(url),
         Method::DELETE => client.delete(url),
         _ => client.get(url),
     };
-    let mut outgoing = outgoing.timeout(TIMEOUT);
-    if let Some(accept) = request.headers().get(ACCEPT) {
-        outgoing = outgoing.header(ACCEPT, accept);
+    let outgoing = outgoing.timeout(TIMEOUT);
+    match request.headers().get(ACCEPT) {
+        Some(accept) => outgoing.header(ACCEPT, accept),
+        None => outgoing,
     }
+}
+
+/// Requests the counts of another host with the key of that host: the key of the caller was checked
+/// here.
+async fn forward(client: &ServerClient, outgoing: RequestBuilder) -> Result<Response, Problem> {
     let answered = client.send(outgoing).await.map_err(|error| {
         tracing::warn!("counts.url: {}", client.failure(&error));
         unavailable("the counts do not respond: the log of the server has the reason; retry")

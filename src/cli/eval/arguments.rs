@@ -9,7 +9,7 @@ use super::{plot_file::PlotFile, truth::TruthFlags};
 use crate::cli::{parameters::one_of, settings_file::SettingsFile};
 
 /// C_t without `--score-threshold`: low, as average precision considers all scores.
-const DEFAULT_SCORE_THRESHOLD: &str = "0.001";
+pub(in crate::cli) const DEFAULT_SCORE_THRESHOLD: &str = "0.001";
 
 /// Arguments of `lookdown eval`.
 #[derive(Debug, Args)]

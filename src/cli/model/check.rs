@@ -42,7 +42,7 @@ pub(in super::super) struct Arguments {
     #[arg(long, value_name = "OUT.jpg")]
     annotate: Option<PathBuf>,
     /// First write a `model.toml` beside the ONNX file: guess the head from the outputs, and the
-    /// input from the persons in the sample
+    /// input from the annotated persons of the installed samples
     #[arg(long)]
     write_manifest: bool,
     #[command(flatten)]
@@ -54,9 +54,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let settings = arguments.settings_file.load()?;
     let sample = arguments.sample.as_deref();
     if arguments.write_manifest {
-        let sample = sample.map(Path::to_owned);
-        let sample = sample.or_else(|| find_installed(Path::new(SAMPLE)));
-        manifest::write(&arguments.model, sample.as_deref(), &settings)?;
+        manifest::write(&arguments.model, &settings)?;
     }
     let annotated = arguments.annotate.as_deref();
     check_model(settings, &arguments.model, sample, annotated)

@@ -51,6 +51,13 @@ async fn a_command_pauses_a_camera_also_after_a_restart() {
     assert_eq!(after.update(now).await.last(), Some(&state("OFF")));
     after.note(&message(&command, "ON", false));
     assert_eq!(after.update(now).await, [state("ON")]);
+
+    // A command that arrives before the cameras are known waits for them.
+    let mut early = switches(folder.path());
+    early.begin_connection(now, UNKNOWN_FOR);
+    early.note(&message(&command, "OFF", false));
+    assert_eq!(early.update(now).await.last(), Some(&state("OFF")));
+    assert!(early.update(now).await.is_empty());
 }
 
 #[tokio::test]

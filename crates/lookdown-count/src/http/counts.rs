@@ -15,6 +15,7 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use jiff::Timestamp;
+use lookdown_common::text::{one_line, shortened, with_causes};
 use lookdown_http::problem::Problem;
 use serde::Serialize;
 use utoipa::{
@@ -28,6 +29,7 @@ use super::{
 };
 use crate::{
     definition::CameraDefinition,
+    now::time_of,
     store::{Span, Step},
     sums::{MINUTE_MS, Owner},
 };
@@ -142,7 +144,7 @@ async fn answer(
     parameters: Result<Query<TimeParameters>, QueryRejection>,
     headers: &HeaderMap,
 ) -> Result<Response, Problem> {
-    let Query(parameters) = parameters.map_err(|_| unknown_parameter())?;
+    let Query(parameters) = parameters.map_err(|refused| unusable_query(&refused))?;
     let span = parameters.span()?;
     let is_csv = match parameters.format.as_deref() {
         Some("csv") => true,
@@ -150,11 +152,9 @@ async fn answer(
         None => headers
             .get(ACCEPT)
             .is_some_and(|accept| accept.as_bytes().starts_with(b"text/csv")),
-        Some(_) => {
-            return Err(Problem::of_parameter(
-                "format",
-                "it is unknown: give json or csv",
-            ));
+        Some(other) => {
+            let fault = format!("{:?} is not a format: give json or csv", shortened(other));
+            return Err(Problem::of_parameter("format", &fault));
         }
     };
     check_known(api, &owner).await?;
@@ -179,11 +179,15 @@ fn too_large() -> Problem {
     )
 }
 
-pub(super) fn unknown_parameter() -> Problem {
-    Problem::of_parameter(
-        "query",
-        "it has an unknown or repeated parameter: docs/count.md lists them",
-    )
+/// Returns the problem of a query with an unknown or repeated parameter.
+pub(super) fn unusable_query(refused: &QueryRejection) -> Problem {
+    let cause = with_causes(refused);
+    let cause = cause.rsplit(": ").next().unwrap_or_default();
+    let fault = format!(
+        "{}: give each parameter of docs/count.md once",
+        one_line(cause)
+    );
+    Problem::of_parameter("query", &fault)
 }
 
 /// Returns the lines and zones that are counted now: a step without any has the count 0.
@@ -343,7 +347,7 @@ fn cell(text: &mut String, value: Option<impl std::fmt::Display>) {
 }
 
 fn time(minute: i64) -> Timestamp {
-    Timestamp::from_millisecond(minute * MINUTE_MS).unwrap_or(Timestamp::UNIX_EPOCH)
+    time_of(minute * MINUTE_MS)
 }
 
 #[expect(

@@ -15,11 +15,14 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::{
-    counts::unknown_parameter,
+    counts::unusable_query,
     shared::{Shared, blocking, check_known, query},
     time::TimeParameters,
 };
-use crate::sums::{DAY_MS, MINUTE_MS, Owner};
+use crate::{
+    now::time_of,
+    sums::{DAY_MS, MINUTE_MS, Owner},
+};
 
 /// Most cells along a side of an answer: those with the most time decide.
 const MAX_SIDE: i64 = 400;
@@ -115,10 +118,7 @@ pub(super) async fn png_of_site(
 
 async fn heat_map(api: &Shared, owner: Owner, parameters: Parameters) -> Result<HeatMap, Problem> {
     let (time, cells) = stored(api, owner, parameters).await?;
-    let day = |milliseconds: i64| {
-        let time = Timestamp::from_millisecond(milliseconds.div_euclid(DAY_MS) * DAY_MS);
-        time.unwrap_or(Timestamp::UNIX_EPOCH)
-    };
+    let day = |milliseconds: i64| time_of(milliseconds.div_euclid(DAY_MS) * DAY_MS);
     let (origin, seconds) = blocking(move || Ok(grid(&cells))).await?;
     Ok(HeatMap {
         from: day(time.0),
@@ -135,7 +135,7 @@ pub(super) async fn stored(
     owner: Owner,
     parameters: Parameters,
 ) -> Result<((i64, i64), BTreeMap<Cell, u64>), Problem> {
-    let Query(parameters) = parameters.map_err(|_| unknown_parameter())?;
+    let Query(parameters) = parameters.map_err(|refused| unusable_query(&refused))?;
     let span = parameters.span()?;
     check_known(api, &owner).await?;
     let time = (span.from * MINUTE_MS, span.to * MINUTE_MS);

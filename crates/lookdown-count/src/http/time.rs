@@ -1,12 +1,13 @@
 //! The parameters `from`, `to`, `step` and `time_zone`.
 
 use jiff::{SignedDuration, Timestamp, ToSpan, Zoned, tz::TimeZone};
+use lookdown_common::text::shortened;
 use lookdown_http::problem::Problem;
 use serde::Deserialize;
 use utoipa::IntoParams;
 
 use super::shared::now_ms;
-use crate::{store::Span, sums::MINUTE_MS};
+use crate::{now::time_of, store::Span, sums::MINUTE_MS};
 
 /// Most steps of an answer.
 const MAX_STEPS: i64 = 10_000;
@@ -42,12 +43,10 @@ impl TimeParameters {
     /// Checks the parameters. The time ends now and has a day by default. Named days are those of
     /// this machine's time zone, unless the request has one.
     pub(super) fn span(&self) -> Result<Span, Problem> {
-        let (from, until) = match self.from.as_deref() {
-            Some(name @ ("today" | "yesterday" | "week")) => {
-                let now = Timestamp::from_millisecond(now_ms()).unwrap_or(Timestamp::MAX);
-                named(name, &now.to_zoned(self.zone()?))
-            }
-            from => (timestamp("from", from)?, None),
+        let given = self.from.as_deref();
+        let (from, until) = match given.and_then(Day::named) {
+            Some(day) => day.span(&time_of(now_ms()).to_zoned(self.zone()?)),
+            None => (timestamp("from", given)?, None),
         };
         let step = match &self.step {
             None => DEFAULT_STEP,
@@ -66,10 +65,9 @@ impl TimeParameters {
             None => (to - DEFAULT_SPAN).div_euclid(step) * step,
         };
         if from >= to {
-            return Err(Problem::of_parameter(
-                "from",
-                "it is not before `to`: give an earlier time",
-            ));
+            let from = time_of(from * MINUTE_MS);
+            let fault = format!("{from} is not before `to`: give an earlier time");
+            return Err(Problem::of_parameter("from", &fault));
         }
         if (to - from + step - 1) / step > MAX_STEPS {
             let fault = "the time has more than 10000 steps: give a later time, or a longer step";
@@ -83,38 +81,61 @@ impl TimeParameters {
             return Ok(TimeZone::system());
         };
         TimeZone::get(name).map_err(|_| {
-            let fault = "it is not a time zone of this machine: give one like Europe/Berlin or UTC";
-            Problem::of_parameter("time_zone", fault)
+            let remedy = "a time zone of this machine: give one like Europe/Berlin or UTC";
+            is_not("time_zone", name, remedy)
         })
     }
 }
 
-/// Returns the milliseconds at which a named time begins and ends; `None` is now. A week begins on
-/// Monday.
-fn named(name: &str, now: &Zoned) -> (Option<i64>, Option<i64>) {
-    let start = |days: i64| {
-        let day = now
-            .checked_sub(days.days())
-            .and_then(|day| day.start_of_day());
-        day.ok().map(|day| day.timestamp().as_millisecond())
-    };
-    match name {
-        "yesterday" => (start(1), start(0)),
-        "week" => (start(now.weekday().to_monday_zero_offset().into()), None),
-        _ => (start(0), None),
+/// A time with a name.
+#[derive(Clone, Copy)]
+enum Day {
+    Today,
+    Yesterday,
+    /// Since Monday.
+    Week,
+}
+
+impl Day {
+    fn named(name: &str) -> Option<Self> {
+        match name {
+            "today" => Some(Self::Today),
+            "yesterday" => Some(Self::Yesterday),
+            "week" => Some(Self::Week),
+            _ => None,
+        }
+    }
+
+    /// Returns the milliseconds at which it begins and ends; `None` is now.
+    fn span(self, now: &Zoned) -> (Option<i64>, Option<i64>) {
+        let start = |days: i64| {
+            let day = now
+                .checked_sub(days.days())
+                .and_then(|day| day.start_of_day());
+            day.ok().map(|day| day.timestamp().as_millisecond())
+        };
+        match self {
+            Self::Today => (start(0), None),
+            Self::Yesterday => (start(1), start(0)),
+            Self::Week => (start(now.weekday().to_monday_zero_offset().into()), None),
+        }
     }
 }
 
 fn timestamp(name: &str, text: Option<&str>) -> Result<Option<i64>, Problem> {
     let Some(text) = text else { return Ok(None) };
-    match text.parse::<Timestamp>() {
-        Ok(time) => Ok(Some(time.as_millisecond())),
-        Err(_) => Err(Problem::of_parameter(
-            name,
-            "it is not a time: write it like 2026-11-22T10:00:00Z, with + as %2B; `from` may be \
-             today, yesterday or week",
-        )),
-    }
+    let time: Timestamp = text.parse().map_err(|_| {
+        let remedy = "a time: write it like 2026-11-22T10:00:00Z, with + as %2B; `from` may be \
+                      today, yesterday or week";
+        is_not(name, text, remedy)
+    })?;
+    Ok(Some(time.as_millisecond()))
+}
+
+/// Returns the problem of a value. `remedy` completes "… is not".
+fn is_not(name: &str, value: &str, remedy: &str) -> Problem {
+    let fault = format!("{:?} is not {remedy}", shortened(value));
+    Problem::of_parameter(name, &fault)
 }
 
 /// Parses a step in whole minutes.
@@ -126,9 +147,8 @@ fn step(text: &str) -> Result<i64, Problem> {
     });
     let minutes = minutes.filter(|minutes| (1..=MAX_STEP).contains(minutes));
     minutes.ok_or_else(|| {
-        let fault =
-            "it is not a duration of whole minutes from 1m to 168h: write it like 15m or 24h";
-        Problem::of_parameter("step", fault)
+        let remedy = "a duration of whole minutes from 1m to 168h: write it like 15m or 24h";
+        is_not("step", text, remedy)
     })
 }
 
@@ -145,13 +165,13 @@ mod tests {
         // The clocks went back by an hour on this Sunday.
         let now: Zoned = "2026-10-25T12:00[Europe/Berlin]".parse().unwrap();
         let today = Some(milliseconds("2026-10-24T22:00:00Z"));
-        assert_eq!(named("today", &now), (today, None));
+        assert_eq!(Day::Today.span(&now), (today, None));
         let yesterday = Some(milliseconds("2026-10-23T22:00:00Z"));
-        assert_eq!(named("yesterday", &now), (yesterday, today));
+        assert_eq!(Day::Yesterday.span(&now), (yesterday, today));
         let monday = Some(milliseconds("2026-10-18T22:00:00Z"));
-        assert_eq!(named("week", &now), (monday, None));
+        assert_eq!(Day::Week.span(&now), (monday, None));
         let later: Zoned = "2026-10-26T12:00[Europe/Berlin]".parse().unwrap();
         let day = (today, Some(milliseconds("2026-10-25T23:00:00Z")));
-        assert_eq!(named("yesterday", &later), day, "25 hours");
+        assert_eq!(Day::Yesterday.span(&later), day, "25 hours");
     }
 }

@@ -18,6 +18,7 @@ use super::{
 };
 use crate::{
     engine::Engine,
+    now::time_of,
     scene::Scene,
     scene_camera::SceneCamera,
     snapshot::{LineSnapshot, ZoneSnapshot},
@@ -75,8 +76,8 @@ struct ZoneRow {
 #[derive(Serialize, ToSchema)]
 struct TrackRow {
     id: u64,
-    first_seen: Option<Timestamp>,
-    last_seen: Option<Timestamp>,
+    first_seen: Timestamp,
+    last_seen: Timestamp,
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     floor_m: Option<[f64; 2]>,
@@ -150,9 +151,7 @@ fn tracks(engine: &Engine, scene: &Scene, camera: Option<&str>) -> Tracks {
         .map(|camera| (camera.lines, camera.zones))
         .unwrap_or_default();
     Tracks {
-        last_report: presence
-            .last_ms
-            .and_then(|last_ms| Timestamp::from_millisecond(last_ms).ok()),
+        last_report: presence.last_ms.map(time_of),
         tracks: seen
             .filter(|_| is_current)
             .map(|track| row(track, of_camera.map(|(_, camera)| camera)))
@@ -267,8 +266,8 @@ fn row(track: &Track, camera: Option<&SceneCamera>) -> TrackRow {
     }
 }
 
-fn time(seconds: f64) -> Option<Timestamp> {
+fn time(seconds: f64) -> Timestamp {
     #[expect(clippy::cast_possible_truncation, reason = "times of reports")]
     let milliseconds = (seconds * 1000.0).round() as i64;
-    Timestamp::from_millisecond(milliseconds).ok()
+    time_of(milliseconds)
 }

@@ -1,9 +1,7 @@
 //! The tables.
 
+use lookdown_common::StoredFile;
 use rusqlite::Connection;
-
-/// The version of the tables.
-pub(super) const VERSION: i64 = 1;
 
 /// Owners are `camera:NAME` or `site:NAME`. Minutes and days are counted from the Unix epoch.
 const TABLES: &str = "
@@ -35,11 +33,9 @@ CREATE TABLE IF NOT EXISTS deliveries (
   id TEXT PRIMARY KEY, webhook TEXT NOT NULL, body TEXT NOT NULL, created_s INTEGER NOT NULL) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS conditions (
   webhook TEXT, camera TEXT, PRIMARY KEY (webhook, camera)) WITHOUT ROWID;
-PRAGMA user_version = 1;
-COMMIT;
 ";
 
-/// Returns the version of the tables of a store, 0 for a new one.
+/// Returns the version of the tables of a store, `NEW` for a file without tables.
 pub(super) fn version(connection: &Connection) -> rusqlite::Result<i64> {
     connection.pragma_query_value(None, "user_version", |row| row.get(0))
 }
@@ -48,5 +44,6 @@ pub(super) fn version(connection: &Connection) -> rusqlite::Result<i64> {
 pub(super) fn create(connection: &Connection) -> rusqlite::Result<()> {
     // An earlier table held the URLs of webhooks with their secrets.
     connection.execute_batch("PRAGMA secure_delete = ON; DROP TABLE IF EXISTS outbox;")?;
-    connection.execute_batch(TABLES)
+    let version = StoredFile::Counts.version();
+    connection.execute_batch(&format!("{TABLES}PRAGMA user_version = {version}; COMMIT;"))
 }

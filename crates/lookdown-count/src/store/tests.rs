@@ -194,6 +194,25 @@ fn a_store_has_one_user_and_a_known_version() {
 }
 
 #[test]
+fn tracks_of_the_released_version_are_resumed() {
+    let released = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../tests/fixtures/upgrade/0.1.0/counts.sqlite"
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("counts.sqlite");
+    std::fs::copy(released, &path).unwrap();
+    let store = Store::open(&path).unwrap();
+    assert_eq!(store.resumed().unwrap().scenes.len(), 1);
+    // Those of another version are left out.
+    let writer = store.writer.lock();
+    let other = "UPDATE scenes SET state = CAST(x'ff' || substr(state, 2) AS BLOB)";
+    writer.execute(other, []).unwrap();
+    drop(writer);
+    assert!(store.resumed().unwrap().scenes.is_empty());
+}
+
+#[test]
 fn files_of_the_store_are_readable_by_the_owner_alone() {
     use std::os::unix::fs::PermissionsExt as _;
 

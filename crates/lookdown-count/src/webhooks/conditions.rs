@@ -2,12 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use jiff::Timestamp;
 use serde_json::{Value, json};
 
 use super::{Condition, Webhook};
 use crate::{
     message::{HeldCondition, Message},
+    now::time_of,
     scene::Scene,
     scene_camera::NamedCrossing,
 };
@@ -154,7 +154,7 @@ impl Conditions {
                 if !is_of || silence < after.as_millis() {
                     continue;
                 }
-                let data = json!({ "camera": camera, "last_report": time(*last_ms) });
+                let data = json!({ "camera": camera, "last_report": time_of(*last_ms) });
                 let names = ["camera.silent", "camera.back"];
                 let id = format!("msg_{last_ms}_{index}_silent");
                 let changed = change(&mut self.holding, (index, camera), true, names);
@@ -183,16 +183,11 @@ fn change(
 }
 
 fn message(id: String, webhook: &Webhook, kind: &str, at_ms: i64, data: &Value) -> Message {
-    let body = json!({ "type": kind, "timestamp": time(at_ms), "data": data });
+    let body = json!({ "type": kind, "timestamp": time_of(at_ms), "data": data });
     Message {
         id,
         webhook: webhook.digest(),
         body: body.to_string(),
         created_s: at_ms.div_euclid(1000),
     }
-}
-
-fn time(milliseconds: i64) -> Value {
-    let time = Timestamp::from_millisecond(milliseconds);
-    time.map_or(Value::Null, |time| json!(time.to_string()))
 }

@@ -59,7 +59,7 @@ impl CalibrationFile {
             Document::Tree(tree) => {
                 let fields = Fields::of(tree)?;
                 match recognise_tree(&fields) {
-                    Some(Format::Native) => native_file::read(text, syntax)?,
+                    Some(Format::Native) => native_file::read(&fields, text, syntax)?,
                     Some(format) => Self {
                         format,
                         cameras: read_tree(format, &fields)?,

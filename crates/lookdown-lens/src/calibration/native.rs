@@ -8,6 +8,7 @@ mod source;
 
 use std::{collections::BTreeMap, str::FromStr};
 
+use lookdown_common::StoredFile;
 use serde::{Deserialize, Serialize};
 
 pub use areas::{NativeLine, NativeMask, NativePlace, NativeZone};
@@ -20,6 +21,9 @@ use crate::geometry::lens::LensModel;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NativeCalibration {
+    /// The version of the format; 1 if absent.
+    #[serde(default = "first", skip_serializing_if = "is_first")]
+    pub version: u8,
     /// The calibration's ID, `[a-z0-9][a-z0-9_-]{0,63}`.
     pub id: String,
     /// The size of the frames it was made for.
@@ -57,6 +61,7 @@ impl NativeCalibration {
     #[must_use]
     pub fn new(id: String, image: NativeImage, lens: LensModel) -> Self {
         Self {
+            version: StoredFile::Calibration.version(),
             id,
             image,
             lens,
@@ -70,6 +75,18 @@ impl NativeCalibration {
             sources: BTreeMap::new(),
         }
     }
+}
+
+/// The version of a file without one.
+const FIRST: u8 = 1;
+
+const fn first() -> u8 {
+    FIRST
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "the shape serde needs")]
+const fn is_first(version: &u8) -> bool {
+    *version == FIRST
 }
 
 /// A frame size.

@@ -34,7 +34,7 @@ pub(super) struct Message {
 /// A message exceeds a limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "the camera's RTSP messages have more than {MAX_HEAD_BYTES} bytes of headers or {MAX_BODY_BYTES} bytes of content"
+    "the camera's RTSP messages have more than {MAX_HEAD_BYTES} bytes of headers or {MAX_BODY_BYTES} bytes of content: check that the URL is that of a camera"
 )]
 pub(super) struct TooLong;
 

@@ -33,18 +33,22 @@ enum State {
     Body(Option<usize>),
 }
 
+/// The remedy for a stream that does not follow its format.
+const OTHER: &str = "give the URL of a JPEG snapshot or RTSP";
+
 /// The reason why a stream is not read further.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum PartError {
-    #[error("the camera's multipart stream names no boundary")]
+    #[error("the camera's multipart stream names no boundary: {OTHER}")]
     NoBoundary,
     #[error(
-        "a part of the camera's multipart stream has more than {MAX_HEADER_BYTES} bytes of headers"
+        "a part of the camera's multipart stream has more than {MAX_HEADER_BYTES} bytes of headers: \
+         {OTHER}"
     )]
     LongHeaders,
-    #[error("the camera's multipart stream does not contain its boundary")]
+    #[error("the camera's multipart stream does not contain its boundary: {OTHER}")]
     BoundaryNotFound,
-    #[error("a frame of the camera's multipart stream is too large")]
+    #[error("a frame of the camera's multipart stream is too large: reduce its resolution")]
     TooLarge,
 }
 

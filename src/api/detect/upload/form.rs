@@ -36,6 +36,8 @@ pub(in crate::api) enum FieldUse {
 /// The content of a form.
 pub(super) struct Form {
     pub(super) image: Bytes,
+    /// The field of the frame.
+    pub(super) field: String,
     /// The name of the frame's file, without its folders.
     pub(super) file_name: Option<String>,
     pub(super) parameters: Vec<(String, String)>,
@@ -71,9 +73,10 @@ pub(super) async fn parse(
                 if file_name.is_none() && is_file_name(&bytes) {
                     return Err(name_instead_of_file(&name));
                 }
-                if image.replace(bytes).is_some() {
+                if image.is_some() {
                     return Err(second_image(&name));
                 }
+                image = Some((bytes, name));
             }
             FieldUse::Parameter => {
                 let value = value_of(&name, field).await?;
@@ -82,8 +85,10 @@ pub(super) async fn parse(
             FieldUse::None => {}
         }
     }
+    let (image, field) = image.ok_or_else(missing_image)?;
     Ok(Form {
-        image: image.ok_or_else(missing_image)?,
+        image,
+        field,
         file_name,
         parameters,
     })

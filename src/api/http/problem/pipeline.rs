@@ -6,7 +6,7 @@ use lookdown_detect::{
     pipeline::PipelineError,
 };
 
-use super::{Problem, ProblemKind};
+use super::{FRAME, Problem, ProblemKind};
 
 impl From<PipelineError> for Problem {
     fn from(error: PipelineError) -> Self {
@@ -51,7 +51,7 @@ fn parameter_of(error: &PipelineError) -> Option<&str> {
         PipelineError::Parameter(error) => Some(&error.name),
         PipelineError::Image(_)
         | PipelineError::AspectMismatch { .. }
-        | PipelineError::FrameTooSmall { .. } => Some("image"),
+        | PipelineError::FrameTooSmall { .. } => Some(FRAME),
         PipelineError::UnknownCalibration { .. } | PipelineError::UnusableCalibration { .. } => {
             Some("calibration")
         }

@@ -4,7 +4,7 @@ use std::{
 };
 
 use lookdown_lens::calibration::CalibrationFile;
-use lookdown_tracking::furniture::{Furniture, ThingState};
+use lookdown_tracking::furniture::{Furniture, Thing, ThingState};
 
 use crate::{
     definition::CameraDefinition,
@@ -92,7 +92,7 @@ impl Hall {
     fn states(&self) -> Vec<ThingState> {
         let furniture = self.engine.furniture("hall");
         let things = furniture.into_iter().flat_map(Furniture::things);
-        things.map(|thing| thing.state()).collect()
+        things.map(Thing::state).collect()
     }
 
     /// A hall with a mannequin that is furniture.

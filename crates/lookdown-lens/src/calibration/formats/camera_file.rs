@@ -78,9 +78,6 @@ impl Camera {
     #[must_use]
     pub fn to_native(&self, id: String, image: NativeImage) -> NativeCalibration {
         NativeCalibration {
-            id,
-            image,
-            lens: self.lens.clone(),
             mount: self.mount.clone(),
             zones: self.zones.clone(),
             lines: self.lines.clone(),
@@ -89,6 +86,7 @@ impl Camera {
             ignore: self.ignore.clone(),
             detect: self.detect.clone(),
             sources: self.sources.clone(),
+            ..NativeCalibration::new(id, image, self.lens.clone())
         }
     }
 }

@@ -4,11 +4,25 @@
 use super::{
     CalibrationFile, Camera, FileCamera, Format, FormatError,
     document::{Syntax, toml, yaml},
+    fields::Fields,
 };
+use lookdown_common::StoredFile;
+
 use crate::calibration::native::NativeCalibration;
 
-/// Reads the file once more from its text, so that an error names its place.
-pub(super) fn read(text: &str, syntax: Syntax) -> Result<CalibrationFile, FormatError> {
+/// Reads the file once more from its text, so that an error names its place. A later version is
+/// refused first, because its keys are not known here.
+pub(super) fn read(
+    fields: &Fields<'_>,
+    text: &str,
+    syntax: Syntax,
+) -> Result<CalibrationFile, FormatError> {
+    if let Some(version) = fields.map().get(StoredFile::KEY) {
+        let checked = StoredFile::Calibration.check(&version.to_string());
+        checked.map_err(|problem| {
+            FormatError::invalid(StoredFile::KEY, format!("the calibration {problem}"))
+        })?;
+    }
     let parsed: Result<NativeCalibration, String> = match syntax {
         Syntax::Toml => toml(text),
         Syntax::Yaml => yaml(text),
