@@ -63,7 +63,7 @@ test: ## set up, then check formatting, lints, tests and documentation; needs on
 	cargo test --workspace --locked
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --document-private-items --locked
 
-audit: ## check the licences, sources and bans of all dependencies (deny.toml)
+audit: ## check the licenses, sources and bans of all dependencies (deny.toml)
 	@$(PYTHON) scripts/setup.py checkers
 	$(CARGO_DENY) bans licenses sources
 

@@ -43,7 +43,7 @@ class Function:
 
 
 def rectangle(box: dict[str, float]) -> models.LabeledShapeRequest:
-    """Returns an oriented box as CVAT has it: unrotated corners, and the clockwise rotation about the centre."""
+    """Returns an oriented box as CVAT has it: unrotated corners, and the clockwise rotation about the center."""
     (x, y), (width, height) = (box["cx"], box["cy"]), (box["width"], box["height"])
     corners = [x - width / 2, y - height / 2, x + width / 2, y + height / 2]
     return cvataa.rectangle(PERSON, corners, rotation=box["angle_deg"] % 360)

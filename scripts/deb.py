@@ -1,7 +1,7 @@
 """Packs target/dist/lookdown into a Debian package in target/deb: `deb.py`, after `dist.py`.
 
 The folder `packaging/debian` describes the package; debhelper builds it. The changelog and the copyright file of the package are
-written here, from the version of the crate, NOTICE and the licences of the packed files.
+written here, from the version of the crate, NOTICE and the licenses of the packed files.
 """
 
 import os
@@ -32,7 +32,7 @@ Copyright 2026 The Lookdown authors
 
 Lookdown is licensed under the Apache License, Version 2.0; see
 /usr/share/common-licenses/Apache-2.0. The Rust packages inside the program are
-listed with their licences in /usr/share/doc/lookdown/lookdown.cdx.json.gz.
+listed with their licenses in /usr/share/doc/lookdown/lookdown.cdx.json.gz.
 """
 
 
@@ -67,7 +67,7 @@ def changelog(root: Path, modified: int) -> str:
 
 
 def copyright_of(dist: Path) -> str:
-    """The notices of all packed works, and the licences whose text is not part of every Debian."""
+    """The notices of all packed works, and the licenses whose text is not part of every Debian."""
     files = [dist / "NOTICE", dist / "runtime" / "LICENSE", *sorted(dist.glob("models/*/LICENSE-*"))]
     texts = {file: file.read_text(encoding="utf-8") for file in files}
     sections = (f"{file.relative_to(dist)}\n\n{text}" for file, text in texts.items() if APACHE not in text)

@@ -1,4 +1,4 @@
-"""Runs the fuzzers one after another: `fuzz.py [--runs N] [--minimise] [TARGET...]`, all targets by default.
+"""Runs the fuzzers one after another: `fuzz.py [--runs N] [--minimize] [TARGET...]`, all targets by default.
 
 A target stops at its first panic, at an input that takes more than a second or at more than 256 MiB of memory,
 and the script then fails. Needs `cargo install cargo-fuzz` and a C++ compiler.
@@ -32,7 +32,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("targets", nargs="*", metavar="TARGET", help=f"among {', '.join(TARGETS)}")
     parser.add_argument("--runs", type=int, default=1_000_000, help="how often each is run")
-    parser.add_argument("--minimise", action="store_true", help="keep the best finds in lab/fuzz/corpus")
+    parser.add_argument("--minimize", action="store_true", help="keep the best finds in lab/fuzz/corpus")
     arguments = parser.parse_args()
     for target in arguments.targets:
         if target not in TARGETS:
@@ -44,8 +44,8 @@ def main() -> int:
     failed = False
     for target in arguments.targets or TARGETS:
         failed |= not fuzz(target, arguments.runs)
-        if arguments.minimise:
-            minimise(target)
+        if arguments.minimize:
+            minimize(target)
     return int(failed)
 
 
@@ -69,7 +69,7 @@ def fuzz(target: str, runs: int) -> bool:
     return healthy
 
 
-def minimise(target: str) -> None:
+def minimize(target: str) -> None:
     """Keeps the inputs in the corpus that together reach the most code, and inputs that failed once."""
     corpus, chosen = FUZZ / "corpus" / target, FUZZ / "found" / f"{target}.chosen"
     corpus.mkdir(parents=True, exist_ok=True)

@@ -17,13 +17,49 @@ LONGEST_SENTENCE_WORDS = 35
 QUESTION_WORDS = "What|Who|Whom|Whose|How|Whether|Where|Which|Of|Why|When"
 # Things are not persons.
 PERSONS = re.compile(r"\b(somebody|nobody|whoever|anybody|everybody|whomever)\b", re.IGNORECASE)
+# Beginnings of words that prose spells in another way, or replaces. Names of keys, files and CSS classes keep theirs.
+OTHER_WORDS = {
+    "artefact": "artifact",
+    "behaviour": "behavior",
+    "centre": "center",
+    "colour": "color",
+    "defence": "defense",
+    "favour": "favor",
+    "grey": "gray",
+    "honour": "honor",
+    "labelled": "labeled",
+    "labelling": "labeling",
+    "learnt": "learned",
+    "licence": "license",
+    "metre": "meter",
+    "modelled": "modeled",
+    "neighbour": "neighbor",
+    "normalis": "normaliz",
+    "optimis": "optimiz",
+    "picture": "image",
+    "quantis": "quantiz",
+    "recognis": "recogniz",
+    "serialis": "serializ",
+    "towards": "toward",
+}
+# Not in a name, such as `centre_px`, `calibrate-picture`, `results.pictures`, `"grey"` and `licence = "MIT"`.
+OTHER_WORD = re.compile(rf"(?<![\w./#$'\"-])({'|'.join(OTHER_WORDS)})[a-z]*\b(?![-_./]\w|[\"'(]| ?=)", re.IGNORECASE)
+IS_NO = re.compile(r"(?<!there )\b(is|are) no (?!longer|more|farther|further|reason|\W)", re.IGNORECASE)
+# The prose of a line of code: its comment, and its strings that have a space.
+COMMENT = re.compile(r"(?:^|\s)(?://[/!]?|#|/\*+) (\D.*)")
+STRING = re.compile(r'"((?:[^"\\]|\\.)*)"')
+# Names in prose: code, the fields of a formatted string, and the targets of links.
+NAMES = re.compile(r"`[^`]*`|\{[^{}]*\}|\]\([^)]*\)")
 FIRST_WORD = re.compile(rf"(?:{QUESTION_WORDS})\b(?!-)")
 RUST_DOC = re.compile(r"^\s*//[/!](?!/) ?(.*)$")
 RUST_TEST = re.compile(r"#\[(?:tokio::)?test\b")
 RUST_FUNCTION = re.compile(r"\bfn (\w+)")
-# Ends of paragraphs in Markdown: empty lines, headings, items of lists, quotes and lines of tables.
-MARKDOWN_BREAK = re.compile(r"^\s*($|#|[*+-] |\d+\. |>|\||<)")
-SENTENCE_END = re.compile(r"(?<=[.!?:])[)\"*]*\s+(?=[A-Z`\[(*])")
+# Markdown lines without sentences: empty lines, headings, rows of tables, HTML, and images.
+NOT_PROSE = re.compile(r"$|#|\||<|!\[")
+LIST_ITEM = re.compile(r"^\s*(?:[*+-]|\d+\.|>) +")
+# An inline code span counts as one word.
+CODE_SPAN = re.compile(r"`[^`]+`")
+SENTENCE_END = re.compile(r"(?:[.!?]|:(?= +[A-Z`\[(*]))[)\"*]* +")
 PYTHON_TEST = re.compile(r"^\s*(?:async )?def (test_\w+)")
 # Files that hold the rules, and texts of others.
 EXEMPT = {"scripts/language.py", "scripts/tests/test_language.py", "CONTRIBUTING.md", "LICENSE", "NOTICE"}
@@ -36,9 +72,21 @@ def tracked_files(paths):
     return [name for name in listed.stdout.splitlines() if name not in EXEMPT]
 
 
+def prose(name, line):
+    """The prose of a line, without the names in it."""
+    if not name.endswith(".md"):
+        line = " ".join([*COMMENT.findall(line), *(text for text in STRING.findall(line) if " " in text)])
+    return NAMES.sub("", line)
+
+
 def findings_in_text(name, lines):
-    """Words that make persons of things."""
+    """Words that make persons of things, words with another form, and "is no" for "is not a"."""
     for number, line in enumerate(lines, 1):
+        text = prose(name, line)
+        for found in OTHER_WORD.finditer(text):
+            yield f"{name}:{number}: `{found.group()}`: write `{OTHER_WORDS[found.group(1).lower()]}…`"
+        if found := IS_NO.search(text):
+            yield f"{name}:{number}: `{found.group().strip()}`: write `{found.group(1)} not`"
         if found := PERSONS.search(line):
             yield f"{name}:{number}: `{found.group()}`: name the client, the caller or the component"
 
@@ -73,29 +121,28 @@ def findings_in_python(name, lines):
 
 
 def paragraphs(lines):
-    """The paragraphs of Markdown as pairs of their first line's number and their text, without tables and code."""
-    first, words, is_code = 0, [], False
-    for number, line in enumerate(lines, 1):
-        is_fence = line.lstrip().startswith("```")
-        if is_fence or is_code or MARKDOWN_BREAK.match(line) or line.startswith("    ") and not words:
-            if words:
-                yield first, " ".join(words)
-            first, words = number, []
-            is_code ^= is_fence
-            if is_fence or is_code or line.startswith("    ") or line.lstrip().startswith(("|", "#", "<")):
-                continue
-        if not words:
-            first = number
-        words.extend(line.lstrip(" *+->0123456789.").split() if not words else line.split())
-    if words:
-        yield first, " ".join(words)
+    """The paragraphs and list items of Markdown with the number of their first line, without tables and code."""
+    first, text, is_code = 0, [], False
+    for number, line in enumerate([*lines, ""], 1):
+        stripped = line.strip()
+        is_fence = stripped.startswith("```")
+        is_code ^= is_fence
+        # Four spaces are code, except in the lines that continue a list item.
+        is_indented_code = not text and line.startswith("    ")
+        is_prose = not (is_code or is_fence or is_indented_code or NOT_PROSE.match(stripped))
+        if text and (not is_prose or LIST_ITEM.match(line)):
+            yield first, " ".join(text)
+            text = []
+        if is_prose:
+            first = first if text else number
+            text.append(LIST_ITEM.sub("", stripped))
 
 
 def findings_in_markdown(name, lines):
     """Sentences that are too long."""
     for number, paragraph in paragraphs(lines):
-        for sentence in SENTENCE_END.split(paragraph):
-            words = sentence.split()
+        for sentence in SENTENCE_END.split(CODE_SPAN.sub("`code`", paragraph)):
+            words = [word for word in sentence.split() if any(map(str.isalnum, word))]
             if len(words) > LONGEST_SENTENCE_WORDS:
                 start = " ".join(words[:6])
                 yield f"{name}:{number}: a sentence has {len(words)} words, {LONGEST_SENTENCE_WORDS} are allowed: {start}"
@@ -108,7 +155,7 @@ def findings_in_openapi(name, text):
             summary = operation.get("summary", "")
             words = len(summary.split())
             if summary.endswith("?") or not 1 <= words <= LONGEST_SUMMARY_WORDS:
-                yield f"{name}: {method.upper()} {path}: the summary `{summary}` is no imperative of 1 to 6 words"
+                yield f"{name}: {method.upper()} {path}: the summary `{summary}` is not an imperative of 1 to 6 words"
 
 
 def findings(paths):

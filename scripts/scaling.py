@@ -1,6 +1,6 @@
 """Simulates the number of replicas for cameras: `scaling.py FIGURES.json CORES [PROFILE...]` prints Markdown.
 
-FIGURES.json has the measurements of one replica (docs/lab/scaling.json). A replica of CORES cores is modelled as a queue
+FIGURES.json has the measurements of one replica (docs/lab/scaling.json). A replica of CORES cores is modeled as a queue
 that processes one frame after the other with all cores, as Lookdown does with the views of a frame. So a frame takes
 its CPU time divided by the cores. Cameras send at their own phase, with a small jitter. The load balancer sends each
 frame to a random replica, in turns, or to the replica that finishes first.

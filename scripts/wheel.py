@@ -40,7 +40,7 @@ def main() -> int:
 
 
 def collect_models(package: Path) -> None:
-    """Copies the default models with their manifests and licences into the package."""
+    """Copies the default models with their manifests and licenses into the package."""
     shutil.rmtree(package / "models", ignore_errors=True)
     for source, name in default_model_files(ROOT, read_pins(ROOT / "scripts" / "pins.toml")):
         if not source.is_file():

@@ -317,7 +317,7 @@ fn calibration_store(settings: &Settings) -> anyhow::Result<(Box<dyn Calibration
     let settings = &settings.calibrations;
     let store: Box<dyn CalibrationStore> = match &settings.path {
         CalibrationPlace::Bucket(url) => {
-            // Variables that are no UTF-8 are not for this program.
+            // Variables that are not UTF-8 are not for this program.
             let variables = std::env::vars_os();
             let variables = variables.filter_map(|(name, value)| {
                 Some((name.into_string().ok()?, value.into_string().ok()?))

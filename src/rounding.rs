@@ -12,7 +12,7 @@ pub(crate) fn share(value: f64) -> f64 {
     rounded(value, 10_000.0)
 }
 
-/// Rounds to three decimals: millimetres.
+/// Rounds to three decimals: millimeters.
 pub(crate) fn metres(value: f64) -> f64 {
     rounded(value, 1_000.0)
 }

@@ -204,7 +204,7 @@ pub fn load_with(
     Settings::read(&values)
 }
 
-/// A sentence on the variables among `names` that begin with `LOOKDOWN_` and are no settings, with
+/// A sentence on the variables among `names` that begin with `LOOKDOWN_` and are not settings, with
 /// the setting that each may have been meant for; `None` when there are none.
 pub fn ignored_variables(names: impl IntoIterator<Item = String>) -> Option<String> {
     variables::ignored(names, &entries())

@@ -64,7 +64,7 @@ function captions(area, { editor, surface, unit, countOf }) {
   return [text(words.filter(Boolean).join(" · "), middleOf(places), unit, area.kind)];
 }
 
-/** The name of a line at its first end, and its directions on the sides that they count towards. */
+/** The name of a line at its first end, and its directions on the sides that they count toward. */
 function lineCaptions({ name, directions }, [from, to], unit) {
   const along = [to[0] - from[0], to[1] - from[1]];
   const length = Math.hypot(...along) || 1;

@@ -10,7 +10,7 @@ export const KINDS = {
 };
 /** The maximum number of areas of a kind in a calibration. */
 export const MOST_OF_A_KIND = 32;
-/** The decimals of coordinates: pixels of the frame, metres on the floor. */
+/** The decimals of coordinates: pixels of the frame, meters on the floor. */
 const DECIMALS = { frame_px: 1, floor_m: 2 };
 const DIRECTIONS = ["in", "out"];
 /** The words for kinds that are not their own word. */

@@ -23,7 +23,7 @@ let polling = null;
 const PATH = "counts";
 let bar;
 
-/** A response that is no answer of `lookdown count`. */
+/** A response that is not an answer of `lookdown count`. */
 class Unreachable extends Error {}
 
 /** Starts or ends the updates. */

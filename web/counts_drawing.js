@@ -3,7 +3,7 @@
 import { element, plural, shape } from "./dom.js";
 import { points } from "./geometry.js";
 
-/** The number of colours of tracks (counts.css). */
+/** The number of colors of tracks (counts.css). */
 const COLOURS = 6;
 /** The share of the frame's width that 1 unit of a drawing has. */
 const UNIT = 1 / 320;

@@ -5,16 +5,16 @@ import { roundStep } from "./geometry.js";
 
 /** Half the side of the map, in drawing units. */
 const HALF = 240;
-/** The minimum extent of a map, metres. */
+/** The minimum extent of a map, meters. */
 const LEAST_REACH = 3;
 const MOST_RINGS = 6;
 
 export const VIEW_BOX = `${-HALF} ${-HALF} ${2 * HALF} ${2 * HALF}`;
 
-/** The extent of a map with these places, metres from the camera to its sides. */
+/** The extent of a map with these places, meters from the camera to its sides. */
 export const reachOf = (places) => Math.max(LEAST_REACH, ...places.map(([x, y]) => Math.hypot(x, y))) * 1.12;
 
-/** Drawing units per metre. */
+/** Drawing units per meter. */
 export const scaleOf = (reach) => HALF / reach;
 
 /** The places of persons on the floor, null where unknown. */

@@ -22,7 +22,7 @@ export function holds(outline, [x, y]) {
 /** Formats points for the attribute `points` of a polygon. */
 export const points = (places) => places.map(([x, y]) => `${x.toFixed(1)},${y.toFixed(1)}`).join(" ");
 
-/** The centre of a person's box. */
+/** The center of a person's box. */
 export const centre = ({ oriented_box: box }) => [box.cx, box.cy];
 
 /** Cameras that look down to within 30° of it see feet nearer to the point below them than heads. */

@@ -4,7 +4,7 @@ import { element, find, shape } from "./dom.js";
 import { corners, foot, pointBelow, points } from "./geometry.js";
 import { ask, askJson } from "./server.js";
 
-/** The radius of an ignored place: metres on the floor, and the least share of the frame's width. */
+/** The radius of an ignored place: meters on the floor, and the least share of the frame's width. */
 const RADIUS_M = 0.5;
 const LEAST_SHARE = 0.015;
 /** The corners of an ignored place. */
@@ -108,7 +108,7 @@ async function ownCalibration({ camera, report }, others) {
   return { id: camera, file, tag: null, note };
 }
 
-/** The calibration of the lens that the server assumed. Its pixel centres are half a pixel before those of reports. */
+/** The calibration of the lens that the server assumed. Its pixel centers are half a pixel before those of reports. */
 export function assumedFile(id, { image, calibration: { assumed_circle: circle } }) {
   const lens = { model: "equidistant", focal: circle.radius / ASSUMED_THETA, cx: circle.cx - 0.5, cy: circle.cy - 0.5, max_theta: ASSUMED_THETA };
   return { id, image, lens, mount: { world_up: [0, 0, -1] } };

@@ -14,7 +14,7 @@ const STRAIGHT_DOWN = [0, 0, -1];
 
 /**
  * The calibration file of a lens whose image is a circle: `cx`, `cy` and `radius` in corner-origin pixels of a
- * frame of `width` × `height`, `fieldOfView` in degrees, `cameraHeight` in metres or null. Everything else, such as
+ * frame of `width` × `height`, `fieldOfView` in degrees, `cameraHeight` in meters or null. Everything else, such as
  * zones, is that of the file `base`.
  */
 export function calibrationOf({ id, width, height, model, cx, cy, radius, fieldOfView, cameraHeight }, base = null) {
@@ -26,7 +26,7 @@ export function calibrationOf({ id, width, height, model, cx, cy, radius, fieldO
     ...(base && scaledTo(base, { width, height })),
     id,
     image: { width, height },
-    // Lens functions use pixel centres.
+    // Lens functions use pixel centers.
     lens: { model, focal: radius / CURVES[model](maxTheta), cx: cx - 0.5, cy: cy - 0.5, max_theta: maxTheta },
     mount,
   };

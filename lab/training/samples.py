@@ -21,7 +21,7 @@ UPRIGHT_LIMIT = 62.0
 BELOW_CAMERA = 12.0
 """Degrees from straight down within which a person has no upright direction and counts in every turn."""
 TILE_WIDTH = 1.5
-"""Side of a tile in radii of the lens circle: from the rim down to half a radius beyond the centre."""
+"""Side of a tile in radii of the lens circle: from the rim down to half a radius beyond the center."""
 
 RINGS = ((0.05, 75.0, 0.15), (0.85, 90.0, 0.45), (1.25, 45.0, 0.4))
 """Perspective views as the profiles have them: angle from straight down (radians), field of view (degrees), share."""
@@ -59,7 +59,7 @@ def kept(moved, ignore, size):
 
 
 def jitter(image, rng):
-    """Small changes of colour."""
+    """Small changes of color."""
     out = image.astype(np.float32) * rng.uniform(0.75, 1.3) + rng.uniform(-18, 18)
     if rng.random() < 0.15:
         out = np.repeat(out.mean(2, keepdims=True), 3, 2)
@@ -67,7 +67,7 @@ def jitter(image, rng):
 
 
 def varied(image, boxes, rng):
-    """A square sample with its boxes, mirrored half of the time, with small changes of colour."""
+    """A square sample with its boxes, mirrored half of the time, with small changes of color."""
     if rng.random() < 0.5:
         image, size = image[:, ::-1], image.shape[1]
         boxes = np.stack([size - boxes[:, 2], boxes[:, 1], size - boxes[:, 0], boxes[:, 3]], 1)
@@ -112,7 +112,7 @@ class Frames:
             self.annotations[a["image_id"]].append(a)
 
     def load(self, k):
-        """Image (RGB), boxes, upright angles (NaN below the camera: upright in every turn), ignore flags, circle's centre and radius."""
+        """Image (RGB), boxes, upright angles (NaN below the camera: upright in every turn), ignore flags, circle's center and radius."""
         about = self.images[k]
         image = cv2.cvtColor(cv2.imread(str(self.folder / "images" / about["file_name"])), cv2.COLOR_BGR2RGB)
         found = self.annotations[about["id"]]

@@ -19,7 +19,7 @@ LOAD_LIBRARY = "import ctypes, sys; ctypes.CDLL(sys.argv[1]).OrtGetApiBase"
 
 
 def install_runtime(places: Places, runtime: Runtime) -> None:
-    """Puts ONNX Runtime's library and its licences into `runtime/`."""
+    """Puts ONNX Runtime's library and its licenses into `runtime/`."""
     step = "runtime"
     archive, members = runtime.archive, runtime.members
     library = places.root / LIBRARY
@@ -37,7 +37,7 @@ def install_runtime(places: Places, runtime: Runtime) -> None:
 
 
 def install_model(places: Places, model: Model, pins: Pins) -> None:
-    """Puts a model, converted to ONNX, and its licence into its folder under `models/`."""
+    """Puts a model, converted to ONNX, and its license into its folder under `models/`."""
     step = "model"
     members = model.members
     onnx_file = places.root / "models" / model.name / "model.onnx"

@@ -34,7 +34,7 @@ def write_model_folder(
     save(unfinished)
     os.replace(unfinished, folder / "model.onnx")
     lines = [
-        "# The converter cannot know the licence of the weights; write its SPDX identifier here.",
+        "# The converter cannot know the license of the weights; write its SPDX identifier here.",
         'licence = "NOASSERTION"',
         f"name = {json.dumps(name, ensure_ascii=False)}",
         'onnx = "model.onnx"',

@@ -1,6 +1,6 @@
 """MoveNet MultiPose Lightning, reduced to positions and sizes of persons: `MODEL_JSON ONNX`.
 
-The published graph follows at most six persons and finds their joints. Its heat map of persons' centres and its
+The published graph follows at most six persons and finds their joints. Its heat map of persons' centers and its
 maps of box offsets and sizes make a detector of their own, without that limit.
 """
 

@@ -1,6 +1,6 @@
 """NanoDet-g trained on COCO, from its TensorFlow.js form: `MODEL_JSON ONNX`.
 
-NanoDet predicts, per cell, the distances from the cell's centre to the four sides of the box, each as a
+NanoDet predicts, per cell, the distances from the cell's center to the four sides of the box, each as a
 distribution over whole strides (Li et al., Generalized Focal Loss, 2020).
 """
 
@@ -95,7 +95,7 @@ def _level(builder: OnnxBuilder, head: str, stride: int) -> tuple[str, str]:
 
 
 def _cell_centres(stride: int) -> numpy.ndarray:
-    """Centres of the cells in pixels, row by row, as x, y, x, y: `[1, cells, 4]`."""
+    """Centers of the cells in pixels, row by row, as x, y, x, y: `[1, cells, 4]`."""
     along = (numpy.arange(SIZE // stride, dtype=numpy.float32) + 0.5) * stride
     y, x = numpy.meshgrid(along, along, indexing="ij")
     return numpy.stack([x, y, x, y], axis=-1).reshape(1, -1, 4)

@@ -41,7 +41,7 @@ class Quantiser:
         self._written: list[NodeProto] = []
 
     def quantise(self) -> None:
-        """Adds QuantizeLinear and DequantizeLinear to every quantised tensor, and replaces weights by integers."""
+        """Adds QuantizeLinear and DequantizeLinear to every quantized tensor, and replaces weights by integers."""
         for node in self.graph.nodes:
             if node.name in self._int8_nodes and node.op_type == "Conv":
                 self._use_integer_weights(node)

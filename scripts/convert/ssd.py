@@ -7,7 +7,7 @@ from .onnx_builder import OnnxBuilder
 from .tf_graph import TfGraph
 from .translate import Translator
 
-# The network predicts offsets multiplied by these, for the centre and for the logarithm of the size.
+# The network predicts offsets multiplied by these, for the center and for the logarithm of the size.
 CENTRE_SCALE = 10.0
 SIZE_SCALE = 5.0
 ANCHORS_NODE = "Postprocessor/ExpandDims"
@@ -41,7 +41,7 @@ def predictions(translator: Translator, feature_maps: int) -> tuple[str, str]:
 
 
 def anchors(graph: TfGraph, count: int) -> numpy.ndarray:
-    """The anchors stored in the graph: `[A, 4]` of centre y, centre x, height, width as fractions of the image."""
+    """The anchors stored in the graph: `[A, 4]` of center y, center x, height, width as fractions of the image."""
     corners = graph.constant(ANCHORS_NODE)
     if corners.shape != (1, count, 4):
         raise ConversionError(f"'{ANCHORS_NODE}' has shape {corners.shape}, expected (1, {count}, 4)")
@@ -52,7 +52,7 @@ def anchors(graph: TfGraph, count: int) -> numpy.ndarray:
 def decode_boxes(builder: OnnxBuilder, encoded: str, anchor_boxes: numpy.ndarray, size: int) -> str:
     """Turns encoded boxes into corners in pixels: `[N, A, 4]`.
 
-    With an anchor (a_y, a_x, a_h, a_w) and predictions (t_y, t_x, t_h, t_w): centre y = a_y + a_h t_y / 10,
+    With an anchor (a_y, a_x, a_h, a_w) and predictions (t_y, t_x, t_h, t_w): center y = a_y + a_h t_y / 10,
     height = a_h exp(t_h / 5), and so for x and width (Liu et al., SSD, 2016, eq. 2, with the scales above).
     """
 

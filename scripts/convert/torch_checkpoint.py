@@ -34,7 +34,7 @@ def read_checkpoint(file: Path) -> dict:
             with archive.open(pickled) as stream:
                 return _Reader(stream, archive, pickled.removesuffix("data.pkl")).load()
     except zipfile.BadZipFile:
-        raise ConversionError(f"{file.name} is no zip archive, as PyTorch writes since 1.6; is it whole?") from None
+        raise ConversionError(f"{file.name} is not a zip archive, as PyTorch writes since 1.6; is it whole?") from None
     except (pickle.UnpicklingError, AttributeError, EOFError, IndexError, KeyError, TypeError, ValueError) as error:
         raise ConversionError(f"{file.name} cannot be read as a PyTorch checkpoint: {error!r}.") from None
 

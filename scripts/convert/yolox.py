@@ -21,7 +21,7 @@ PYRAMID = "backbone"
 
 
 def convert_detector(checkpoint: Path, folder: Path, size: int, name: str, class_names: Path | None) -> str:
-    """Writes the model folder for pictures of `size` x `size` pixels and returns a line that describes it."""
+    """Writes the model folder for images of `size` x `size` pixels and returns a line that describes it."""
     if size <= 0 or size % STRIDES[-1]:
         raise ConversionError(f"The size is {size} pixels; YOLOX needs a multiple of {STRIDES[-1]}.")
     saved = read_checkpoint(checkpoint)
@@ -59,7 +59,7 @@ class Yolox:
         self.weights = weights
 
     def trunk(self, images: str) -> list[str]:
-        """CSPDarknet: feature maps of strides 8, 16 and 32 of RGB pictures."""
+        """CSPDarknet: feature maps of strides 8, 16 and 32 of RGB images."""
         tensor = self._unit(self._quarters(images), f"{TRUNK}.stem.conv", turn_colours=True)
         maps = []
         for stage in ("dark2", "dark3", "dark4"):
@@ -119,10 +119,10 @@ class Yolox:
     def _unit(
         self, tensor: str, name: str, stride: int = 1, *, separable: bool = False, turn_colours: bool = False
     ) -> str:
-        """A convolution with its normalisation multiplied in, and SiLU."""
+        """A convolution with its normalization multiplied in, and SiLU."""
         kernel = self.weights[f"{name}.conv.weight"].astype(numpy.float64)
         if turn_colours:
-            # YOLOX was trained on blue, green, red; the stem gets four quarters of a picture with three colours each.
+            # YOLOX was trained on blue, green, red; the stem gets four quarters of an image with three colors each.
             kernel = kernel.reshape(kernel.shape[0], 4, 3, *kernel.shape[2:])[:, :, ::-1].reshape(kernel.shape)
         scale, shift, mean, variance = (
             self.weights[f"{name}.bn.{part}"].astype(numpy.float64)

@@ -21,7 +21,7 @@ class Deb(unittest.TestCase):
         texts = {
             "NOTICE": "the notices",
             "runtime/LICENSE": "MIT License",
-            "models/one/LICENSE-package": "the licence of a package",
+            "models/one/LICENSE-package": "the license of a package",
             "models/two/LICENSE-weights": (ROOT / "LICENSE").read_text(encoding="utf-8"),
         }
         for name, text in texts.items():

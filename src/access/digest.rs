@@ -8,7 +8,7 @@ use std::fmt;
 use sha2::{Digest, Sha256};
 use subtle::{Choice, ConstantTimeEq};
 
-/// The prefix of keys, by which secret scanners recognise them.
+/// The prefix of keys, by which secret scanners recognize them.
 const PREFIX: &str = "lookdown_";
 const BYTES: usize = 32;
 

@@ -38,7 +38,7 @@ pub struct StoredFrame {
 /// The reason why a frame cannot be kept or drawn.
 #[derive(Debug, thiserror::Error)]
 pub enum StoredFrameError {
-    /// The sketch cannot be serialised or parsed.
+    /// The sketch cannot be serialized or parsed.
     #[error("the sketch of a kept frame is invalid: {0}")]
     Sketch(#[from] serde_json::Error),
     /// The frame cannot be decoded.

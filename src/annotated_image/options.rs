@@ -55,7 +55,7 @@ parameter_table! {
 pub enum Layer {
     /// The area of each person is blurred.
     Blur,
-    /// The area of each person is filled with one colour.
+    /// The area of each person is filled with one color.
     Silhouette,
     /// Axis-parallel boxes.
     Boxes,

@@ -112,7 +112,7 @@ pub(super) fn document_of<Shape: Serialize>(
             });
         }
     }
-    // Serialising numbers and strings in a fixed structure cannot fail.
+    // Serializing numbers and strings in a fixed structure cannot fail.
     serde_json::to_string_pretty(&document).unwrap_or_default()
 }
 

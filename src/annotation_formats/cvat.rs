@@ -1,5 +1,5 @@
 //! CVAT for images 1.1: one XML document. An oriented box is written unrotated, with its clockwise
-//! `rotation` about its centre in degrees, from 0 to below 360.
+//! `rotation` about its center in degrees, from 0 to below 360.
 
 use lookdown_lens::geometry::OrientedBox;
 use serde::Serialize;

@@ -1,7 +1,7 @@
 //! GeoJSON (RFC 7946): a feature collection per image. The geometry of a person is its oriented
 //! box. Positions are corner-origin frame pixels, x to the right and y down, as image tools read
 //! them, not longitude and latitude. RFC 7946 permits this by prior agreement (section 4). The
-//! person's position on the floor, in metres, is a property.
+//! person's position on the floor, in meters, is a property.
 
 use serde::Serialize;
 
@@ -88,7 +88,7 @@ fn document(image: &AnnotatedImage, _boxes: BoxKind) -> String {
             .map(|((corners, person), id)| feature(id, corners, person))
             .collect(),
     };
-    // Serialising numbers and strings in a fixed structure cannot fail.
+    // Serializing numbers and strings in a fixed structure cannot fail.
     serde_json::to_string_pretty(&document).unwrap_or_default()
 }
 

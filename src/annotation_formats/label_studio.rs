@@ -1,4 +1,4 @@
-//! Label Studio: a list of tasks with predictions, as its import reads them. The labelling
+//! Label Studio: a list of tasks with predictions, as its import reads them. The labeling
 //! configuration has `<Image name="image" value="$image"/>` and `<RectangleLabels name="label"
 //! toName="image">`, as in the template for object detection.
 //!
@@ -75,7 +75,7 @@ struct Rectangle {
 
 fn document(images: &[AnnotatedImage], boxes: BoxKind) -> String {
     let tasks: Vec<_> = images.iter().map(|image| task(image, boxes)).collect();
-    // Serialising numbers and strings in a fixed structure cannot fail.
+    // Serializing numbers and strings in a fixed structure cannot fail.
     serde_json::to_string_pretty(&tasks).unwrap_or_default()
 }
 

@@ -91,7 +91,7 @@ fn annotation_format() -> impl TypedValueParser<Value = AnnotationFormat> {
     PossibleValuesParser::new(values).try_map(|name| name.parse::<AnnotationFormat>())
 }
 
-/// Reports on every picture; those that cannot be used cost the exit code, not the others.
+/// Reports on every image; those that cannot be used cost the exit code, not the others.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     if let Some(stream) = Stream::among(&arguments.images)? {
         return run_stream(arguments, &stream);

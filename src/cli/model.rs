@@ -17,7 +17,7 @@ use super::SettingsFile;
 pub(super) enum Command {
     /// Show the properties of a model, run it on a sample and draw the detections
     Check(check::Arguments),
-    /// List the models of the repository: name, size of the weights or `missing`, licence
+    /// List the models of the repository: name, size of the weights or `missing`, license
     List(SettingsFile),
     /// Fetch, verify and install the weights of a model of the repository
     Fetch(fetch::Arguments),

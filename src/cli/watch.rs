@@ -97,7 +97,7 @@ pub(super) fn separate(argument: Option<&str>) -> anyhow::Result<(Option<&str>, 
     match argument {
         Some(file) if is_settings_file(file) => Ok((Some(file), None)),
         Some(file) if is_of_another_format(file) => bail!(
-            "{file}: it is no source of frames: give a settings file that ends with .toml \
+            "{file}: it is not a source of frames: give a settings file that ends with .toml \
              (docs/watch.md), or a source"
         ),
         source => Ok((None, source)),

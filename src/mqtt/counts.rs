@@ -1,4 +1,5 @@
-//! Publishes the counts of `lookdown count`: totals, occupancy and dwell times.
+//! Publishes the counts of `lookdown count`: totals, occupancy and dwell times, with their
+//! announcements to Home Assistant.
 
 mod event_entities;
 mod events;

@@ -4,7 +4,7 @@ use sha2::{Digest, Sha256};
 
 /// Longest name that is used unchanged in a topic.
 const MAX_CHARS: usize = 64;
-/// Characters that are kept of a name that is changed, to recognise it by.
+/// Characters that are kept of a name that is changed, to recognize it by.
 const RECOGNISABLE_CHARS: usize = 32;
 
 /// The names of topics.
@@ -89,12 +89,12 @@ impl Topics {
         format!("{}/set", self.detection(camera))
     }
 
-    /// Filters for the topics that [`Topics::switch_topic`] recognises.
+    /// Filters for the topics that [`Topics::switch_topic`] recognizes.
     pub(super) fn switch_filters(&self) -> [String; 2] {
         ["+/detection", "+/detection/set"].map(|rest| format!("{}/cameras/{rest}", self.prefix))
     }
 
-    /// Recognises a topic of a camera's switch.
+    /// Recognizes a topic of a camera's switch.
     pub(super) fn switch_topic<'a>(&self, topic: &'a str) -> Option<SwitchTopic<'a>> {
         let (camera, rest) = self.below_cameras(topic)?;
         match rest {
@@ -112,13 +112,13 @@ impl Topics {
         topic.split_once('/')
     }
 
-    /// Filters for the topics that [`Topics::camera_topic`] recognises.
+    /// Filters for the topics that [`Topics::camera_topic`] recognizes.
     pub(super) fn camera_filters(&self) -> [String; 3] {
         ["+/persons", "+/availability", "+/zones/+"]
             .map(|rest| format!("{}/cameras/{rest}", self.prefix))
     }
 
-    /// Recognises a topic of a camera.
+    /// Recognizes a topic of a camera.
     pub(super) fn camera_topic<'a>(&self, topic: &'a str) -> Option<CameraTopic<'a>> {
         let (camera, rest) = self.below_cameras(topic)?;
         match rest {

@@ -32,7 +32,7 @@ pub struct StoredPicture {
     pub picture: NewPicture,
 }
 
-/// The cameras whose pictures are kept.
+/// The cameras whose images are kept.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum PicturesOf {
     /// Every camera.

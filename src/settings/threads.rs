@@ -2,7 +2,7 @@
 //! decides them.
 //!
 //! On a CPU there are as many sessions as cores, each with one thread and one view at a time.
-//! Sessions do not wait for each other, while the threads of one session synchronise at every
+//! Sessions do not wait for each other, while the threads of one session synchronize at every
 //! layer. A batch of views takes as long as its views one by one. Measured in lab/benches/NOTES.md.
 //!
 //! The counts follow from the cores that this process may use:

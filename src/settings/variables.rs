@@ -26,7 +26,7 @@ pub(crate) fn variable_of(key: &str) -> String {
     format!("{PREFIX}{}", key.replace('.', SEPARATOR).to_uppercase())
 }
 
-/// The key that a variable sets; `None` for a variable that is no setting.
+/// The key that a variable sets; `None` for a variable that is not a setting.
 ///
 /// # Errors
 /// Returns an error if there is no such key, or if the name has a single underscore after
@@ -57,7 +57,7 @@ pub(super) fn key_of(name: &str, entries: &[Entry]) -> Result<Option<String>, Se
     }
 }
 
-/// A sentence on the variables among `names` that begin with `LOOKDOWN_` and are no settings, with
+/// A sentence on the variables among `names` that begin with `LOOKDOWN_` and are not settings, with
 /// the setting that each may have been meant for; `None` when there are none.
 pub(super) fn ignored(
     names: impl IntoIterator<Item = String>,
@@ -80,6 +80,6 @@ pub(super) fn ignored(
     ignored.sort();
     (!ignored.is_empty()).then(|| {
         let names = ignored.join(", ");
-        format!("these variables are no settings and are ignored: {names}")
+        format!("these variables are not settings and are ignored: {names}")
     })
 }

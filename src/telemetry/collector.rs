@@ -17,7 +17,7 @@ const PATIENCE: Duration = Duration::from_secs(5);
 /// Most bytes of a response that are read.
 const MAX_ANSWER_BYTES: usize = 64 * 1024;
 
-/// Delivers the spans that the exporter has serialised.
+/// Delivers the spans that the exporter has serialized.
 #[derive(Debug)]
 pub(super) struct Collector {
     client: Client,

@@ -166,7 +166,7 @@ async fn a_plan_for_huge_frames_with_many_masks_is_fast() {
         .post("/calibrations/huge/views", &sent.to_string())
         .await;
     assert_eq!(answer.status, 200, "{}", answer.text());
-    // Without optimisation; in all rows of the frame it takes a hundred times as long.
+    // Without optimization; in all rows of the frame it takes a hundred times as long.
     assert!(began.elapsed() < Duration::from_secs(12));
 }
 

@@ -307,7 +307,7 @@ async fn invalid_frames_and_fields_have_the_statuses_of_deepstack() {
 
 #[tokio::test]
 async fn other_routes_have_no_member_success() {
-    let answer = Service::start().post_raw("", b"no picture".to_vec()).await;
+    let answer = Service::start().post_raw("", b"no image".to_vec()).await;
     assert_eq!(answer.status, 415);
     assert!(answer.problem()["success"].is_null());
 }

@@ -41,7 +41,7 @@ fn picture(answer: &Answer) -> Frame {
         .frame
 }
 
-/// Returns `true` if the pixel has the grey of the frame.
+/// Returns `true` if the pixel has the gray of the frame.
 fn is_grey(frame: &Frame, x: u32, y: u32) -> bool {
     let pixel = frame.pixel(x, y);
     pixel.iter().all(|value| value.abs_diff(128) < 12)
@@ -161,7 +161,7 @@ async fn zones_are_drawn_and_masked_areas_are_black() {
     let plain = picture(&service.get(&format!("{PATH}?draw=none")).await);
     assert!(plain.pixel(20, 20).iter().all(|value| *value < 16));
     let drawn = picture(&service.get(&format!("{PATH}?draw=zones")).await);
-    // The left border of each zone: a metre beside the camera, 3 m below it.
+    // The left border of each zone: a meter beside the camera, 3 m below it.
     for (x, y) in [(100, 150), (79, 99)] {
         assert!(is_grey(&plain, x, y) && !is_grey(&drawn, x, y), "{x}, {y}");
     }

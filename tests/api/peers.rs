@@ -1,5 +1,5 @@
 //! HTTP peers that misbehave: an inference server, a bucket and a trace collector whose responses
-//! never end, never come or are no HTTP. The bytes and the time of each are bounded.
+//! never end, never come or are not HTTP. The bytes and the time of each are bounded.
 
 use std::{
     fs,

@@ -364,7 +364,7 @@ pub(crate) fn form(parts: &[(&str, &[u8])]) -> Request<Body> {
         .unwrap()
 }
 
-/// A grey PNG that fits the calibration `lobby`.
+/// A gray PNG that fits the calibration `lobby`.
 pub(crate) fn frame() -> Vec<u8> {
     frame_of(FRAME_SIDE, FRAME_SIDE)
 }

@@ -41,7 +41,7 @@ fn circle_only_fit_names_its_assumptions() {
     }
 }
 
-/// Draws a room of 6 by 5 by 2.8 metres as a tilted equidistant camera sees it: walls with doors, a
+/// Draws a room of 6 by 5 by 2.8 meters as a tilted equidistant camera sees it: walls with doors, a
 /// floor of tiles.
 fn drawn_room(side: u32, focal: f64, tilt: f64) -> image::RgbImage {
     let center = f64::from(side) / 2.0 - 0.5;

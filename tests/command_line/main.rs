@@ -199,7 +199,7 @@ fn every_image_gives_a_report_or_an_error_line() {
     );
     let folder = tempfile::tempdir().unwrap();
     let text = folder.path().join("notes.txt");
-    std::fs::write(&text, "not a picture").unwrap();
+    std::fs::write(&text, "not an image").unwrap();
     let text = text.to_str().unwrap();
 
     let images = ["detect", text, office, "/nowhere.jpg"];

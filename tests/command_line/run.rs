@@ -360,6 +360,9 @@ fn a_server_forwards_counts_with_the_key_of_the_other_host() {
 fn settings_of_another_format_are_no_source_of_frames() {
     for command in ["run", "watch"] {
         let output = lookdown(&[command, "cameras.yaml"], &[]);
-        assert_fails_with(&output, &["cameras.yaml", "no source of frames", ".toml"]);
+        assert_fails_with(
+            &output,
+            &["cameras.yaml", "not a source of frames", ".toml"],
+        );
     }
 }

@@ -113,7 +113,7 @@ def rtsp_camera(folder: Path, rate: int, *login: str) -> Iterator[int]:
 
 @contextlib.contextmanager
 def rtsp_clock(rate: int) -> Iterator[int]:
-    """Serves pictures that show the time over RTSP, and yields the port."""
+    """Serves images that show the time over RTSP, and yields the port."""
     with _rtsp_server("rtsp_clock.py", str(rate), str(CLOCK_BITS)) as port:
         yield port
 
@@ -138,7 +138,7 @@ def _rtsp_server(script: str, *arguments: object) -> Iterator[int]:
 
 
 def shown_milliseconds(image: bytes) -> int:
-    """The lowest bits of the time that a picture of `rtsp_clock` shows."""
+    """The lowest bits of the time that an image of `rtsp_clock` shows."""
     strip = ["-vf", f"scale={CLOCK_BITS}:12:flags=area,crop={CLOCK_BITS}:1:0:0,format=gray", "-f", "rawvideo", "-"]
     command = ["ffmpeg", "-v", "error", "-i", "-", *strip]
     row = subprocess.run(command, input=image, capture_output=True, check=True).stdout

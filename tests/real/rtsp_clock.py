@@ -1,4 +1,4 @@
-"""An RTSP server whose pictures show the time at which they were made: `rtsp_clock.py PORT RATE BITS`.
+"""An RTSP server whose images show the time at which they were made: `rtsp_clock.py PORT RATE BITS`.
 
 The lowest bits of the system's clock in milliseconds stand in the upper rows as black and white blocks, the highest bit first. It is a
 program of its own, because GStreamer is only available to Debian's Python.
@@ -20,15 +20,15 @@ BLACK, WHITE, GREY = 16, 235, 128
 
 
 def picture(milliseconds: int, bits: int) -> bytes:
-    """A picture in I420 with the lowest bits of a time."""
+    """An image in I420 with the lowest bits of a time."""
     shown = [milliseconds >> bit & 1 for bit in reversed(range(bits))]
     row = b"".join(bytes([WHITE if bit else BLACK]) * BLOCK for bit in shown)
-    # Grey below, and no colour: half a byte for each pixel.
+    # Gray below, and no color: half a byte for each pixel.
     return row * (2 * BLOCK) + bytes([GREY]) * (len(row) * (HEIGHT - 2 * BLOCK + HEIGHT // 2))
 
 
 def feed(media: GstRtspServer.RTSPMedia, rate: int, bits: int) -> None:
-    """Gives the source of a stream a picture at each interval until it takes no more."""
+    """Gives the source of a stream an image at each interval until it takes no more."""
     source = media.get_element().get_child_by_name("source")
     due = time.monotonic()
     push = lambda data: source.emit("push-buffer", Gst.Buffer.new_wrapped(data))

@@ -18,7 +18,7 @@ ROLE = "viewer"
 ENCODED = (
     "x264enc tune=zerolatency speed-preset=ultrafast key-int-max=10 threads=1 ! rtph264pay name=pay0 config-interval=-1"
 )
-"""The end of a pipeline, from raw pictures on."""
+"""The end of a pipeline, from raw images on."""
 
 
 def serve(server: GstRtspServer.RTSPServer, factory: GstRtspServer.RTSPMediaFactory) -> None:

@@ -61,7 +61,7 @@ class DeepStackClients(unittest.TestCase):
 
     def test_failures_have_the_forms_of_deepstack(self):
         with tempfile.NamedTemporaryFile(suffix=".jpg") as file:
-            file.write(b"no picture")
+            file.write(b"no image")
             file.flush()
             invalid = Path(file.name)
             self.assertIn("Invalid image", ask("sdk", self.server, invalid)["raised"])

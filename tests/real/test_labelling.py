@@ -1,4 +1,4 @@
-"""Annotation files and the examples with the packages of labelling tools: supervision, Label Studio's and CVAT's SDK."""
+"""Annotation files and the examples with the packages of labeling tools: supervision, Label Studio's and CVAT's SDK."""
 
 import json
 import math
@@ -96,7 +96,7 @@ class Labelling(unittest.TestCase):
         self.assertEqual(self.heat_map[:4], b"\x89PNG")
 
     def assert_rectangles(self, regions: list[dict], persons: list[dict]) -> None:
-        """Each rectangle has the centre of its oriented box when it is rotated about its upper left corner."""
+        """Each rectangle has the center of its oriented box when it is rotated about its upper left corner."""
         self.assertEqual(len(regions), len(persons))
         for region, person in zip(regions, persons):
             value, box = region["value"], person["oriented_box"]

@@ -420,7 +420,7 @@ class Bounds(unittest.TestCase):
             self.assertLess(redis.ask("MEMORY", "USAGE", "{lookdown}:picture:hall"), 4 << 20)
             # A report from a server that keeps no images removes the previous one.
             detect(other, "hall")
-            wait_until(lambda: get(one, path).status == 404, "the picture is gone")
+            wait_until(lambda: get(one, path).status == 404, "the image is gone")
 
     def test_limits_of_the_settings_hold(self) -> None:
         """Cameras, history and reports."""

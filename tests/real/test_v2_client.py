@@ -78,8 +78,8 @@ class TritonClient(unittest.TestCase):
         refused = self.told["refused"]
         for name, (status, part) in {
             "unknown model": ("404", "model: "),
-            "no picture": ("415", "JPEG"),
-            "no picture in a batch": ("415", "image[1]"),
+            "no image": ("415", "JPEG"),
+            "no image in a batch": ("415", "image[1]"),
             "too many frames": ("422", "[16]"),
             "unknown parameter": ("400", "colour"),
             "unknown calibration": ("404", "unknown-id"),

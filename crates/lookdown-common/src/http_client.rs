@@ -16,7 +16,7 @@ use crate::{
     text::{one_line, with_causes},
 };
 
-/// Longest `Retry-After` that is honoured.
+/// Longest `Retry-After` that is honored.
 const MAX_RETRY_AFTER: Duration = Duration::from_mins(1);
 /// Largest problem document that is read.
 const MAX_PROBLEM_BYTES: usize = 64 << 10;

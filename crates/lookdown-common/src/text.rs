@@ -8,7 +8,7 @@ const MAX_CHARS: usize = 64;
 const MAX_LINE_CHARS: usize = 300;
 
 /// Displays a text in quotation marks with its control characters escaped, cut after 64 characters:
-/// enough to recognise it, too short to fill a log.
+/// enough to recognize it, too short to fill a log.
 #[derive(Debug, Clone, Copy)]
 pub struct Quoted<'a>(pub &'a str);
 

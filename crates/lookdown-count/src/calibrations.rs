@@ -153,7 +153,7 @@ async fn request(client: &ServerClient, id: &str) -> Result<Option<Vec<u8>>, Str
             } else {
                 let address = client.address();
                 Err(format!(
-                    "{address} is no Lookdown server: check upstream.url"
+                    "{address} is not a Lookdown server: check upstream.url"
                 ))
             }
         }

@@ -1,4 +1,4 @@
-//! Follows the reports of the server: counts them, and stores the sums in intervals.
+//! Follows the reports of the server: passes them to the engine, and stores its sums in intervals.
 
 use std::{sync::Arc, time::Duration};
 

@@ -1,4 +1,4 @@
-//! A tracker with the cameras that it follows: one camera, or all cameras of a site.
+//! A tracker with its cameras, one or all of a site, whose lines and zones count its tracks.
 
 use std::{collections::BTreeMap, sync::Arc, time::Instant};
 

@@ -35,7 +35,7 @@ const LOCK_PAUSE: Duration = Duration::from_millis(50);
 /// A store that cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
-    /// The file cannot be opened, or is no store.
+    /// The file cannot be opened, or is not a store.
     #[error(
         "counts.path: {path} cannot be used: {problem}: give a writable path of a store of lookdown count"
     )]

@@ -1,4 +1,4 @@
-//! Detects the persons in a picture, with its calibration if there is one:
+//! Detects the persons in an image, with its calibration if there is one:
 //! `cargo run -p lookdown-detect --example find_persons -- samples/office.jpg samples/calibrations/office.json`
 
 use std::{env, error::Error, fs, path::Path, sync::Arc};
@@ -14,7 +14,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = env::args().skip(1);
     let picture = arguments
         .next()
-        .ok_or("usage: find_persons PICTURE [CALIBRATION]")?;
+        .ok_or("usage: find_persons IMAGE [CALIBRATION]")?;
     let camera = arguments.next();
     let camera = camera
         .map(|path| Calibration::read(Path::new(&path)).map(Arc::new))

@@ -1,4 +1,4 @@
-//! Person detectors: boxes with scores from rendered views.
+//! Person detectors: boxes with scores from rendered views, and the choice of INT8 or FP32.
 
 mod detector;
 mod device;

@@ -1,6 +1,6 @@
 //! Data sets: images with annotated persons, in common file formats.
 //!
-//! [`DataSet::open`] recognises the format from the files at a path, and lists the formats. The
+//! [`DataSet::open`] recognizes the format from the files at a path, and lists the formats. The
 //! readers return an image's file, its ground truth and, if the data set has them, its calibration
 //! and size.
 

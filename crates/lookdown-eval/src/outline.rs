@@ -26,7 +26,7 @@ pub enum Outline {
     AxisParallel(BBox<FramePixels>),
     /// A rotated box.
     Rotated(RotatedBox),
-    /// The centre of a head, `[x, y]`, corner-origin.
+    /// The center of a head, `[x, y]`, corner-origin.
     Head([f64; 2]),
 }
 
@@ -54,7 +54,7 @@ impl Scoring {
 }
 
 impl Outline {
-    /// The centre, `[x, y]`, corner-origin frame pixels.
+    /// The center, `[x, y]`, corner-origin frame pixels.
     #[must_use]
     pub fn center(&self) -> [f64; 2] {
         match self {

@@ -1,7 +1,7 @@
 //! Rotated boxes, compared by the masks that they cover.
 //!
-//! A mask is the set of the frame's pixels whose centres lie in the box. The evaluation of CEPDOF
-//! (Duan et al., RAPiD, CVPR Workshops 2020) also rasterises boxes before it compares them, so the
+//! A mask is the set of the frame's pixels whose centers lie in the box. The evaluation of CEPDOF
+//! (Duan et al., RAPiD, CVPR Workshops 2020) also rasterizes boxes before it compares them, so the
 //! part outside the frame does not count. Masks are not stored: the box is convex, so its pixels in
 //! one row are one span, which is calculated on demand.
 
@@ -10,7 +10,7 @@ use lookdown_lens::geometry::OrientedBox;
 
 use super::{Region, region::share};
 
-/// A rectangle rotated about its centre, represented by the pixels that it covers in a frame.
+/// A rectangle rotated about its center, represented by the pixels that it covers in a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RotatedBox {
     center: [f64; 2],
@@ -67,7 +67,7 @@ impl RotatedBox {
         Self::new([center.x, center.y, width, height], angle, frame)
     }
 
-    /// The centre, `[x, y]`, corner-origin frame pixels.
+    /// The center, `[x, y]`, corner-origin frame pixels.
     #[must_use]
     pub fn center(&self) -> [f64; 2] {
         self.center
@@ -110,11 +110,11 @@ impl RotatedBox {
         )
     }
 
-    /// The columns whose pixels in `row` have their centres in the box, `start..end`. Empty if the
+    /// The columns whose pixels in `row` have their centers in the box, `start..end`. Empty if the
     /// end is not greater than the start.
     fn columns(&self, row: f64) -> [f64; 2] {
         let dy = row + 0.5 - self.center[1];
-        // Along the width axis (cos, sin) and along the height axis (−sin, cos), from the centre.
+        // Along the width axis (cos, sin) and along the height axis (−sin, cos), from the center.
         let across = interval(self.cos, dy * self.sin, self.width / 2.0);
         let along = interval(-self.sin, dy * self.cos, self.height / 2.0);
         let left = across[0].max(along[0]) + self.center[0];
@@ -176,7 +176,7 @@ fn interval(slope: f64, offset: f64, limit: f64) -> [f64; 2] {
     [ends[0].min(ends[1]), ends[0].max(ends[1])]
 }
 
-/// The pixels, `first..end`, whose centres lie from `low` up to but excluding `high`, within a
+/// The pixels, `first..end`, whose centers lie from `low` up to but excluding `high`, within a
 /// frame side of `side` pixels.
 fn first_and_end(low: f64, high: f64, side: u32) -> [f64; 2] {
     [low, high].map(|edge| (edge - 0.5).ceil().clamp(0.0, f64::from(side)))

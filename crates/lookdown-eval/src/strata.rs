@@ -20,7 +20,7 @@ const MIN_IOU: f64 = 0.5;
 )]
 #[strum(serialize_all = "snake_case")]
 pub enum Stratification {
-    /// Distance from the centre: the angle between the optical axis and the ray to the centre of
+    /// Distance from the center: the angle between the optical axis and the ray to the center of
     /// the box. It uses the calibrated lens, or else the equidistant lens of 180° with the largest
     /// circle in the frame.
     Distance,

@@ -2,7 +2,7 @@
 //! footprints. Knows no image, does no I/O.
 //!
 //! * Camera frame: OpenCV (x right, y down, z along the optical axis).
-//! * Lens functions speak of pixel centres: the centre of the top-left pixel is (0, 0).
+//! * Lens functions speak of pixel centers: the center of the top-left pixel is (0, 0).
 //! * Boxes are corner-origin: pixel `i` covers `[i, i + 1)`. [`pixels`] crosses the half pixel.
 //! * Angles are radians; `theta` is the angle from the optical axis.
 

@@ -45,7 +45,7 @@ impl PyCalibration {
         self.0.image_size()
     }
 
-    /// Height of the camera above the floor, metres, if the file has it.
+    /// Height of the camera above the floor, meters, if the file has it.
     #[getter]
     fn height_m(&self) -> Option<f64> {
         self.0.mount().height_m()

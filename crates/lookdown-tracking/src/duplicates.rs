@@ -2,7 +2,7 @@
 
 use crate::Track;
 
-/// Tracks nearer than this may be one person, metres.
+/// Tracks nearer than this may be one person, meters.
 const MERGE_DISTANCE_M: f64 = 0.8;
 /// Squared Mahalanobis distance up to which they may be: the 99 % quantile of the chi-squared
 /// distribution with two degrees of freedom.

@@ -116,7 +116,7 @@ impl Evidence {
         self.sum(settings) >= settings.confirm
     }
 
-    /// Returns true when a confirmed track is no person after all.
+    /// Returns true when a confirmed track is not a person after all.
     pub fn revokes(self, settings: &EvidenceSettings) -> bool {
         self.seen(settings) < settings.revoke
     }

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Plane, Track, TrackId};
 
-/// Side of a cell, metres.
+/// Side of a cell, meters.
 pub const CELL_M: f64 = 0.25;
 /// Cells on each side of the origin.
 const MAX_CELLS_FROM_ORIGIN: f64 = 4096.0;
@@ -68,7 +68,7 @@ impl HeatMap {
 }
 
 impl Cell {
-    /// Returns the cell of a place in metres. `None` for places more than a kilometre away.
+    /// Returns the cell of a place in meters. `None` for places more than a kilometer away.
     #[must_use]
     pub fn of([x, y]: [f64; 2]) -> Option<Self> {
         let index = |metres: f64| {
@@ -83,7 +83,7 @@ impl Cell {
         })
     }
 
-    /// Returns the corner with the least x and y, metres.
+    /// Returns the corner with the least x and y, meters.
     #[must_use]
     pub fn corner_m(self) -> [f64; 2] {
         [self.column, self.row].map(|index| f64::from(index) * CELL_M)

@@ -38,11 +38,11 @@ pub struct Line {
     pub plane: Plane,
     /// The points in order, 2 to [`MAX_LINE_POINTS`].
     pub points: Vec<[f64; 2]>,
-    /// Half the width of the hysteresis band, in the unit of the plane: metres or pixels.
+    /// Half the width of the hysteresis band, in the unit of the plane: meters or pixels.
     pub band: f64,
 }
 
-/// Half the width of the hysteresis band for lines on the floor, metres, where none is set.
+/// Half the width of the hysteresis band for lines on the floor, meters, where none is set.
 pub const DEFAULT_BAND_M: f64 = 0.3;
 
 /// A counted crossing.
@@ -75,7 +75,7 @@ pub enum LineError {
     /// A coordinate that is not finite.
     #[error("line `{0}` has a coordinate that is not finite: give numbers")]
     Coordinate(String),
-    /// Two neighbouring points in one place.
+    /// Two neighboring points in one place.
     #[error("line `{0}` has the same point twice in a row: leave one out")]
     Repeated(String),
     /// A band without a width.

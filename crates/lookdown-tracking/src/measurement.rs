@@ -7,7 +7,7 @@ use nalgebra::{Matrix2, Unit, Vector2, Vector3};
 
 use crate::{CameraPose, MeasurementNoise, Observation, place::Place};
 
-/// Extents in the radial direction and across it: metres, or radians.
+/// Extents in the radial direction and across it: meters, or radians.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Extents {
     pub along: f64,

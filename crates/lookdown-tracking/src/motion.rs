@@ -64,7 +64,7 @@ impl Motion {
             .unwrap_or_else(|| self.kalman.place().push(0.0))
     }
 
-    /// Returns the place on the floor expected at `at_s`, metres; `None` in bearing space.
+    /// Returns the place on the floor expected at `at_s`, meters; `None` in bearing space.
     pub fn floor_at(&self, at_s: f64) -> Option<[f64; 2]> {
         let state = self.on_floor()?;
         Some((state.place() + state.velocity() * (at_s - self.at_s)).into())

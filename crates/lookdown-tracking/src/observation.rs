@@ -3,13 +3,13 @@
 /// One person of one report.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observation {
-    /// Place on the floor in metres (x, y of the camera); absent without the camera's height.
+    /// Place on the floor in meters (x, y of the camera); absent without the camera's height.
     pub floor_m: Option<[f64; 2]>,
-    /// Direction of the person's centre: clockwise from the top of the frame, in degrees (0 to 360).
+    /// Direction of the person's center: clockwise from the top of the frame, in degrees (0 to 360).
     pub azimuth_deg: f64,
     /// Angle between that direction and the optical axis, in degrees (0 to 180).
     pub off_axis_deg: f64,
-    /// Centre of the oriented box in frame pixels (x, y).
+    /// Center of the oriented box in frame pixels (x, y).
     pub centre_px: [f64; 2],
     /// Width and height of the oriented box in frame pixels.
     pub size_px: [f64; 2],

@@ -34,7 +34,7 @@ pub struct TrackerSettings {
     pub noise: MeasurementNoise,
     /// Evidence that confirms and ends tracks.
     pub evidence: EvidenceSettings,
-    /// Motion on the floor, in metres.
+    /// Motion on the floor, in meters.
     pub floor: PlaneSettings,
     /// Motion in bearing space, in radians.
     pub bearing: PlaneSettings,
@@ -44,25 +44,25 @@ pub struct TrackerSettings {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct MeasurementNoise {
-    /// Distance of the foot point from the place of the body, metres.
+    /// Distance of the foot point from the place of the body, meters.
     pub body_m: f64,
-    /// Added to it straight below the camera, metres.
+    /// Added to it straight below the camera, meters.
     pub below_m: f64,
-    /// Distance from the point below the camera at which nothing is added, metres.
+    /// Distance from the point below the camera at which nothing is added, meters.
     pub below_range_m: f64,
     /// Angle of the foot point off the axis, degrees.
     pub angle_deg: f64,
     /// Angle of the foot point around the axis, degrees.
     pub across_deg: f64,
-    /// Distance from the lower end of a box out to the body's axis, metres.
+    /// Distance from the lower end of a box out to the body's axis, meters.
     pub foot_offset_m: f64,
-    /// Angle of the person's centre off the axis in bearing space, degrees.
+    /// Angle of the person's center off the axis in bearing space, degrees.
     pub bearing_along_deg: f64,
-    /// Angle of the person's centre around the axis in bearing space, degrees.
+    /// Angle of the person's center around the axis in bearing space, degrees.
     pub bearing_across_deg: f64,
     /// Growth of the deviations toward a score of 0: they are 1 + this factor times as large.
     pub low_score_factor: f64,
-    /// Boxes nearer than this show one person, metres.
+    /// Boxes nearer than this show one person, meters.
     pub same_person_m: f64,
     /// Added to that radially, as a share of the distance from the camera.
     pub same_person_share: f64,

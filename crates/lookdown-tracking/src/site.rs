@@ -5,12 +5,12 @@ use serde::{Deserialize, Serialize};
 /// The place of a camera on the floor plane of its site. A camera alone is at the origin.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CameraPose {
-    /// The site's coordinates of the floor point below the camera, metres (`mount.position_m`).
+    /// The site's coordinates of the floor point below the camera, meters (`mount.position_m`).
     pub position_m: [f64; 2],
     /// Rotation of the camera's floor axes into those of the site, degrees: a yaw of 90 turns the
     /// camera's x axis into the site's y axis (`mount.yaw_deg`).
     pub yaw_deg: f64,
-    /// Height of the camera above the floor, metres; absent when it is unknown.
+    /// Height of the camera above the floor, meters; absent when it is unknown.
     pub height_m: Option<f64>,
 }
 
@@ -25,7 +25,7 @@ impl CameraPose {
         }
     }
 
-    /// Returns the site's coordinates of a floor place of this camera, metres. Lines and zones of
+    /// Returns the site's coordinates of a floor place of this camera, meters. Lines and zones of
     /// a calibration reach the site's plane through this.
     #[must_use]
     pub fn to_site(&self, floor_m: [f64; 2]) -> [f64; 2] {
@@ -33,7 +33,7 @@ impl CameraPose {
         [x + self.position_m[0], y + self.position_m[1]]
     }
 
-    /// Returns the floor place of this camera at the site's coordinates, metres.
+    /// Returns the floor place of this camera at the site's coordinates, meters.
     #[must_use]
     pub fn of_site(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let (x, y) = (x - self.position_m[0], y - self.position_m[1]);

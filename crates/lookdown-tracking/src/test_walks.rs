@@ -2,7 +2,7 @@
 
 use crate::{CameraPose, Observation, Tracker, TrackerSettings};
 
-/// Height of the test cameras, metres.
+/// Height of the test cameras, meters.
 pub(crate) const CAMERA_M: f64 = 3.0;
 
 /// A surely seen person at a place of the camera's floor.

@@ -52,7 +52,7 @@ pub struct PersonOfReport {
 pub struct TailPoint {
     /// Time of the frame, seconds since the Unix epoch.
     pub at_s: f64,
-    /// Filtered place on the floor, metres; absent in bearing space.
+    /// Filtered place on the floor, meters; absent in bearing space.
     pub floor_m: Option<[f64; 2]>,
     /// Foot point in the frame of the camera that saw the person, pixels.
     pub foot_px: [f64; 2],
@@ -191,7 +191,7 @@ impl Track {
         }
     }
 
-    /// Returns the velocity on the floor, metres per second; `None` without the camera's height.
+    /// Returns the velocity on the floor, meters per second; `None` without the camera's height.
     #[must_use]
     pub fn velocity_m_s(&self) -> Option<[f64; 2]> {
         self.motion.on_floor().map(|state| state.velocity().into())

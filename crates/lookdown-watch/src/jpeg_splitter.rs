@@ -131,7 +131,7 @@ impl JpegSplitter {
                 self.parsed += 2;
                 return Step::Whole;
             }
-            // The start of another file, or a byte that is no marker.
+            // The start of another file, or a byte that is not a marker.
             0xd8 | 0x00 => self.skip(self.parsed),
             // Markers without a segment.
             0x01 | 0xd0..=0xd7 => self.parsed += 2,

@@ -22,7 +22,7 @@ pub enum Location {
     StandardInput,
 }
 
-/// The reason why a text is no location. The text is not repeated: it may hold a password.
+/// The reason why a text is not a location. The text is not repeated: it may hold a password.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum InvalidLocation {
     /// Not a URL.

@@ -19,7 +19,7 @@ from trackeval.metrics import CLEAR, HOTA, Identity
 
 ROOT = Path(__file__).resolve().parents[3]
 RATES = (1, 2, 5, 10)
-# Persons farther apart than this on the floor are not the same, metres: a similarity of one half.
+# Persons farther apart than this on the floor are not the same, meters: a similarity of one half.
 FLOOR_MATCH_M = 1.0
 # A counted crossing belongs to a true one within this time, seconds.
 CROSSING_S = 3.0

@@ -11,7 +11,7 @@ from .places import SAMPLES, WORK
 SIDE = 1680
 """The side of a common camera's frames, pixels."""
 NOISE = 2.0
-"""The standard deviation of the noise that replaces the detail missing after enlarging, grey levels."""
+"""The standard deviation of the noise that replaces the detail missing after enlarging, gray levels."""
 QUALITY = 90
 
 

@@ -35,4 +35,4 @@ def draw(raw: list[dict]) -> str:
     values = {}
     for row in raw:
         values |= {f"Lookdown, {row['view']}": row["ours_us"], f"OpenCV, {row['view']}": row["opencv_us"]}
-    return bars("remap", "Remap, normalise and lay out a view, one thread", "µs", values)
+    return bars("remap", "Remap, normalize and lay out a view, one thread", "µs", values)

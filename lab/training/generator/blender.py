@@ -78,7 +78,7 @@ def material(
     normal=None,
     uv_scale=None,
 ):
-    """A Principled material. `texture` is box-projected in metres unless `uv`; `hsv` and `tint` recolour it."""
+    """A Principled material. `texture` is box-projected in meters unless `uv`; `hsv` and `tint` recolor it."""
     key = (
         tuple(colour),
         rough,

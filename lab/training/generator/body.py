@@ -1,6 +1,6 @@
 """MakeHuman's base mesh as a posed, dressed person: shape targets, clothes fitted to the shape, and linear skinning.
 
-Frame of the body: x to the person's left, y up, z to the front, in decimetres. `Person` is in metres: x, -z, y, so that
+Frame of the body: x to the person's left, y up, z to the front, in decimetres. `Person` is in meters: x, -z, y, so that
 the person faces the negative y axis with the feet on z = 0.
 """
 
@@ -100,7 +100,7 @@ def _material_textures(folder, material):
             words = line.split()
             if len(words) > 1 and words[0] in ("diffuseTexture", "normalmapTexture"):
                 path = Path(os.path.normpath((folder / material).parent / words[1]))
-                found[words[0]] = str(path) if path.exists() else None  # Textures of unsettled licence are absent.
+                found[words[0]] = str(path) if path.exists() else None  # Textures of unsettled license are absent.
     return found.get("diffuseTexture"), found.get("normalmapTexture")
 
 

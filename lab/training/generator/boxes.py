@@ -1,7 +1,7 @@
 """From masks to boxes: axis-parallel and oriented boxes of the visible pixels. Numpy and OpenCV only.
 
 An oriented box is [cx, cy, w, h, angle]: `angle` in degrees clockwise from upright, -90 to 90, `h` along the person.
-Pixel i covers [i, i + 1), so that a mask of one pixel at (3, 5) has the box [3, 5, 1, 1] and the centre (3.5, 5.5).
+Pixel i covers [i, i + 1), so that a mask of one pixel at (3, 5) has the box [3, 5, 1, 1] and the center (3.5, 5.5).
 """
 
 import math
@@ -24,13 +24,13 @@ def wrap_upright(angle):
 
 
 def _outline(mask):
-    """The centres of all outline pixels of a mask (n × 2)."""
+    """The centers of all outline pixels of a mask (n × 2)."""
     outlines, _ = cv2.findContours(np.ascontiguousarray(mask, np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     return np.concatenate(outlines)[:, 0].astype(np.float32) + 0.5
 
 
 def box_along(mask, angle):
-    """The tightest box of a mask whose height runs along `angle`: exact at 0, half a pixel around the outermost centres at others."""
+    """The tightest box of a mask whose height runs along `angle`: exact at 0, half a pixel around the outermost centers at others."""
     t = math.radians(angle)
     across, along = np.array([math.cos(t), math.sin(t)]), np.array([-math.sin(t), math.cos(t)])
     points = _outline(mask)

@@ -15,12 +15,12 @@ from .shadow import FloorShadow, sun_patches
 
 SUPERSAMPLING = 2
 DEPTH_TOLERANCE = 0.03
-"""Metres by which a crop may lie behind the room and still be visible: feet on the floor."""
+"""Meters by which a crop may lie behind the room and still be visible: feet on the floor."""
 
 
 @dataclass
 class Composition:
-    """A frame before the camera's look: linear colour, distance, ids, and the unoccluded pixels of every person."""
+    """A frame before the camera's look: linear color, distance, ids, and the unoccluded pixels of every person."""
 
     colour: np.ndarray
     distance: np.ndarray
@@ -36,7 +36,7 @@ def direction_grid(calibration, factor=SUPERSAMPLING):
 
 
 def fill_depth(depth, alpha):
-    """Distances for partly covered edge pixels whose own ray hit nothing: those of the nearest neighbours."""
+    """Distances for partly covered edge pixels whose own ray hit nothing: those of the nearest neighbors."""
     filled = depth.copy()
     for _ in range(2):
         missing = (filled <= 0) & (alpha > 0.02)
@@ -84,7 +84,7 @@ def _window(calibration, placement, crop, factor):
 
 
 def _sample_crop(crop, placement, theta, phi, frame_focal):
-    """Colour, alpha, distance and index of a crop at nadir angles and azimuths."""
+    """Color, alpha, distance and index of a crop at nadir angles and azimuths."""
     v = placement.view
     x, y = panorama_xy(theta, phi - placement.azimuth, v["focal"])
     x, y = x - v["left"], y - v["top"]

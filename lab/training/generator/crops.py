@@ -10,7 +10,7 @@ RADIANCE_SCALE = 4.0
 
 
 def encode_radiance(linear):
-    """Linear colour as 16 bits with a square-root curve: fine steps in the dark."""
+    """Linear color as 16 bits with a square-root curve: fine steps in the dark."""
     return np.rint(np.sqrt(np.clip(linear / RADIANCE_SCALE, 0, 1)) * 65535).astype(np.uint16)
 
 
@@ -20,7 +20,7 @@ def decode_radiance(stored):
 
 @dataclass
 class Crop:
-    """One view of a piece: premultiplied linear colour, alpha, distance in metres, person index, and its place."""
+    """One view of a piece: premultiplied linear color, alpha, distance in meters, person index, and its place."""
 
     colour: np.ndarray
     alpha: np.ndarray
@@ -49,7 +49,7 @@ class CropFile:
             )
 
     def cloud(self):
-        """Points of the piece's surfaces about its centre, for shadows."""
+        """Points of the piece's surfaces about its center, for shadows."""
         with np.load(self.path) as arrays:
             return arrays["cloud"].astype(np.float32)
 

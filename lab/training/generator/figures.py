@@ -1,4 +1,4 @@
-"""Persons as Blender objects: meshes with recoloured clothes, and what they wear and carry beyond MakeHuman's clothes."""
+"""Persons as Blender objects: meshes with recolored clothes, and what they wear and carry beyond MakeHuman's clothes."""
 
 import math
 
@@ -60,7 +60,7 @@ class Figure:
             item.location.z += dz
 
     def colour(self, colours, textures):
-        """Gives every slot a material of these colours: the same body in another outfit."""
+        """Gives every slot a material of these colors: the same body in another outfit."""
         for i, (kind, upper, texture, normal) in enumerate(self._slots):
             if kind == "skin":
                 made = material(tuple(colours["skin"]), 0.5, specular=0.35)

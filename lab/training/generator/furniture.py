@@ -202,7 +202,7 @@ def plant(b, p):
 
 
 def pram(b, p):
-    """A pram that is pushed towards local -y."""
+    """A pram that is pushed toward local -y."""
     cloth = material(p.colour(0.02, 0.5), 0.9)
     for x in (-0.27, 0.27):
         for y in (-0.38, 0.35):
@@ -214,7 +214,7 @@ def pram(b, p):
 
 
 def trolley(b, p):
-    """A shopping trolley, pushed towards local -y."""
+    """A shopping trolley, pushed toward local -y."""
     for x in (-0.25, 0.25):
         for k in range(7):
             b.box(0.012, 0.85, 0.012, x, 0, 0.5 + 0.07 * k, p.metal, bevel=0)

@@ -1,9 +1,9 @@
 """Lens models, calibrations and the panorama about the vertical that persons and rooms are rendered in. Numpy only.
 
 World: z up, the camera at (0, 0, height). Nadir angle `theta`: 0 straight down, 90° at the horizon. Azimuth `phi`: 0 along
-+y, growing towards +x. Panorama: equidistant about the nadir, `focal` pixels a radian, x right = +x, y down = -y. Every
++y, growing toward +x. Panorama: equidistant about the nadir, `focal` pixels a radian, x right = +x, y down = -y. Every
 camera at that place, however turned or tilted, is a remapping of the panorama, and turning a person about the vertical is
-a rotation of the panorama. Pixel centres are integers; boxes cover whole pixels, corner-origin.
+a rotation of the panorama. Pixel centers are integers; boxes cover whole pixels, corner-origin.
 """
 
 import math
@@ -48,7 +48,7 @@ def make_lens(rng, circle_radius):
 
 
 def camera_rotation(yaw, tilt=0.0, roll=0.0):
-    """World to camera (x right, y down, z along the axis): looks down, tilted up by `tilt` towards the image's up."""
+    """World to camera (x right, y down, z along the axis): looks down, tilted up by `tilt` toward the image's up."""
     c, s = math.cos(yaw), math.sin(yaw)
     down = np.array([[c, s, 0], [s, -c, 0], [0, 0, -1.0]])
     ct, st = math.cos(tilt), math.sin(tilt)
@@ -90,7 +90,7 @@ class Calibration:
     height_m: float = 3.0
 
     def project(self, points):
-        """World points (n × 3, metres) to pixels (n × 2) and angles from the axis, as `pixels_of`."""
+        """World points (n × 3, meters) to pixels (n × 2) and angles from the axis, as `pixels_of`."""
         rays = (np.atleast_2d(points) - np.array([0, 0, self.height_m])) @ self.rotation.T
         columns, rows, theta = pixels_of(self.lens, self.cx, self.cy, rays)
         return np.stack([columns, rows], 1), theta

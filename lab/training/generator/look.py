@@ -42,7 +42,7 @@ def infrared(rng, colour, distance, height):
 
 
 def exposure_of(colour, inside):
-    """The factor that brings the median of the visible frame to mid-grey."""
+    """The factor that brings the median of the visible frame to mid-gray."""
     return 0.15 / max(float(np.median(colour[inside].mean(-1))), 1e-4)
 
 
@@ -51,7 +51,7 @@ def _blur(image, sigma):
 
 
 def _fringe(image, cx, cy, share):
-    """Lateral chromatic aberration: red and blue scaled apart about the centre."""
+    """Lateral chromatic aberration: red and blue scaled apart about the center."""
     out = image.copy()
     for channel, scale in ((0, 1 + share), (2, 1 - share)):
         m = np.array([[scale, 0, cx * (1 - scale)], [0, scale, cy * (1 - scale)]], np.float32)

@@ -1,6 +1,6 @@
 """Renders pieces alone, from many heights and distances, into packed crops: `WORK/persons/SPLIT/SEED.npz`.
 
-A crop is a rectangle of the panorama (geometry.py) about the piece at azimuth 0: linear colour with alpha, distance, and the
+A crop is a rectangle of the panorama (geometry.py) about the piece at azimuth 0: linear color with alpha, distance, and the
 index of the person (0: furniture). One file a body group; every view has another outfit. Finished files are skipped.
 """
 
@@ -25,7 +25,7 @@ from .wardrobe import random_colours
 
 VIEWS = 10
 FARTHEST = 18.0
-"""Metres on the floor."""
+"""Meters on the floor."""
 LONGEST_SIDE = 250
 """Pixels: crops are at most about so long, but never coarser than 220 pixels a radian."""
 LIGHTS = {"soft": 0.5, "side": 0.22, "sun": 0.16, "infrared": 0.12}

@@ -1,4 +1,4 @@
-"""Pieces: one or a few persons with the furniture that belongs to them, centred on the origin, rendered as one crop.
+"""Pieces: one or a few persons with the furniture that belongs to them, centered on the origin, rendered as one crop.
 
 Each maker returns the figures. Figures have object index 1, 2, …; furniture has index 0.
 """
@@ -146,5 +146,5 @@ def make_piece(m):
 
 
 def reach(figures):
-    """How far the piece reaches from its centre on the floor, in metres."""
+    """How far the piece reaches from its center on the floor, in meters."""
     return max(float(abs(figure.world_vertices()[:, :2]).max()) for figure in figures) + 0.1 if figures else math.nan

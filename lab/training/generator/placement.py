@@ -14,7 +14,7 @@ NEAREST = 24
 
 
 def random_angle(rng):
-    """A nadir angle in degrees as in real pictures of large rooms: median 60°, out to 85°."""
+    """A nadir angle in degrees as in real images of large rooms: median 60°, out to 85°."""
     return rng.uniform(0, 85) if rng.random() < 0.2 else float(np.clip(rng.normal(63, 13), 5, 85))
 
 
@@ -35,7 +35,7 @@ class Placement:
         return distance * math.sin(self.azimuth), distance * math.cos(self.azimuth)
 
     def to_world(self, points):
-        """Points about the piece's centre (metres, unscaled) as world points of this placement."""
+        """Points about the piece's center (meters, unscaled) as world points of this placement."""
         b, a, d = self.view["bearing"], self.azimuth, self.view["distance"]
         x = math.cos(b) * points[:, 0] + math.sin(b) * points[:, 1]
         y = -math.sin(b) * points[:, 0] + math.cos(b) * points[:, 1] + d

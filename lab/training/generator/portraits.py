@@ -1,4 +1,4 @@
-"""Pictures of persons for posters and screens: our own persons before a plain ground. Detectors take such pictures for people."""
+"""Images of persons for posters and screens: our own persons before a plain ground. Detectors take such images for people."""
 
 import math
 import os

@@ -226,14 +226,14 @@ class Room:
             self.occupy(place, 0.3, 0.3)
 
     def sign(self, b):
-        """A roll-up with a picture of a person."""
+        """A roll-up with an image of a person."""
         w, h = f.flip_board(b, self.palette)
         made = self.palette.texture(self.portrait(), uv=True, rough=0.5)
         b.child(0, 0, index=PICTURE_OF_PERSON).plane(w - 0.04, h - 0.1, 0, -0.02, h / 2 + 0.1, made, rx=math.pi / 2)
         self.occupy(b, 0.5, 0.3)
 
     def mannequin(self, b):
-        """A shop-window figure: one plain colour for skin and head, dressed or not, on a base plate."""
+        """A shop-window figure: one plain color for skin and head, dressed or not, on a base plate."""
         r = self.rng
         self.mannequins += 1
         if self.mannequins > MOST_MANNEQUINS:

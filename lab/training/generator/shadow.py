@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 CELL = 0.05
-"""Side of a cell of the floor map in metres."""
+"""Side of a cell of the floor map in meters."""
 
 
 class FloorShadow:
@@ -74,7 +74,7 @@ class FloorShadow:
 
 
 def sun_patches(rng, room, rays, distance, colour):
-    """Brightens what a low sun reaches through windows: a point is lit where the ray towards the sun leaves by a window."""
+    """Brightens what a low sun reaches through windows: a point is lit where the ray toward the sun leaves by a window."""
     bearing, height = rng.uniform(0, 2 * math.pi), math.radians(rng.uniform(18, 60))
     sun = np.array(
         [math.cos(bearing) * math.cos(height), math.sin(bearing) * math.cos(height), math.sin(height)],

@@ -1,4 +1,4 @@
-"""Prints what composed frames look like in numbers, to compare with real pictures."""
+"""Prints what composed frames look like in numbers, to compare with real images."""
 
 import json
 

@@ -101,10 +101,10 @@ def rug(rng, kind):
 
 
 def fabric(rng, number, n=512):
-    """Plain, stripes, checks, dots, camouflage, print: mid-grey on average, so that a tint colours it."""
+    """Plain, stripes, checks, dots, camouflage, print: mid-gray on average, so that a tint colors it."""
     muted = lambda low, high: (
         rng.uniform(low, high) * (1 + 0.35 * rng.uniform(-1, 1, 3))
-    )  # Clothes are greyer than paint.
+    )  # Clothes are grayer than paint.
     base, other = muted(0.25, 0.75), muted(0.05, 0.95)
     image = np.ones((n, n, 3), np.float32) * base
     y, x = np.mgrid[0:n, 0:n]

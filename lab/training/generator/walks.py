@@ -60,7 +60,7 @@ class Walk:
     places: tuple
 
     def azimuth(self, seconds, distance):
-        """Radians at a time; `distance` in metres is the radius of the circle."""
+        """Radians at a time; `distance` in meters is the radius of the circle."""
         times = [time for time, _ in self.places]
         after = min(max(1, bisect.bisect_right(times, seconds)), len(times) - 1)
         (begin, first), (end, last) = self.places[after - 1 : after + 1]

@@ -1,4 +1,4 @@
-"""Random descriptions of persons: body, clothes, colours. One split of clothes, hair and fabrics stays unseen in training."""
+"""Random descriptions of persons: body, clothes, colors. One split of clothes, hair and fabrics stays unseen in training."""
 
 import numpy as np
 
@@ -56,7 +56,7 @@ EXTRAS = (
 
 
 def random_ages(rng, child):
-    """Shares of MakeHuman's ages, and a stature in metres."""
+    """Shares of MakeHuman's ages, and a stature in meters."""
     if child:
         share = float(rng.uniform(0, 1))  # 0: about four years, 1: about fourteen.
         ages = (
@@ -120,7 +120,7 @@ def random_person(rng, assets, split="train", child=False):
 
 
 def random_colours(rng, who, split="train"):
-    """Colours and fabrics; drawn anew for every view of a body, which multiplies the outfits."""
+    """Colors and fabrics; drawn anew for every view of a body, which multiplies the outfits."""
     skin = np.array(SKIN[who["ancestry"]]) * rng.uniform(0.75, 1.2)
     garment = lambda: dict(
         fabric=int(rng.choice(list(FABRICS[split]))) if rng.random() < 0.6 else None,

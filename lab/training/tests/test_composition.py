@@ -32,7 +32,7 @@ def calibration(yaw=0.0, tilt=0.0):
 
 
 def empty_room(distance=50.0):
-    """A grey room whose every ray ends at one distance."""
+    """A gray room whose every ray ends at one distance."""
     about = dict(
         focal=FOCAL,
         nadir=(SIDE - 1) / 2,

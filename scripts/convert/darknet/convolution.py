@@ -15,7 +15,7 @@ VARIANCE_FLOOR = numpy.float32(1e-6)
 
 
 class Convolution(Layer):
-    """A convolution, normalised over the batch or with biases, and its activation."""
+    """A convolution, normalized over the batch or with biases, and its activation."""
 
     kind = "convolutional"
 
@@ -55,9 +55,9 @@ class Convolution(Layer):
         return activate(builder, self.activation, convolved)
 
     def kernel_and_bias(self, weights: numpy.ndarray) -> tuple[numpy.ndarray, numpy.ndarray]:
-        """The kernel `[filters, channels, size, size]` and the bias `[filters]`, normalisation multiplied in.
+        """The kernel `[filters, channels, size, size]` and the bias `[filters]`, normalization multiplied in.
 
-        In the file: biases, then scales, means and variances if it normalises, then the kernel.
+        In the file: biases, then scales, means and variances if it normalizes, then the kernel.
         """
         vectors = 4 if self.normalised else 1
         bias, *statistics = weights[: vectors * self.filters].reshape(vectors, self.filters)

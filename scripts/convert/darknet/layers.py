@@ -100,7 +100,7 @@ class Reorg(Layer):
 
     Darknet reads the memory of a map of C channels, H x W, as one of C / s^2 channels, s H x s W, and sorts the
     pixels of every s x s block of that into channels of their own. What comes out lies in memory as C channels,
-    H x W again, and is taken for C s^2 channels, H / s x W / s. For C = 64, s = 2 this is no mere space-to-depth.
+    H x W again, and is taken for C s^2 channels, H / s x W / s. For C = 64, s = 2 this is not a mere space-to-depth.
     """
 
     kind = "reorg"

@@ -56,7 +56,7 @@ def read_network(cfg: Path) -> Network:
     net, *rest = sections
     picture = Shape(net.whole("channels", COLOURS), net.whole("height", least=1), net.whole("width", least=1))
     if picture.channels != COLOURS:
-        raise net.refusal(f"has channels={picture.channels}; pictures have {COLOURS}")
+        raise net.refusal(f"has channels={picture.channels}; images have {COLOURS}")
     shapes = {-1: picture}
     layers = []
     for index, section in enumerate(rest):

@@ -26,7 +26,7 @@ DIGITS = 6
 
 
 def measure(fp32_file: Path, samples: Path) -> ActivationRanges:
-    """The range of each quantised tensor without the outermost values; groups of moved tensors share one."""
+    """The range of each quantized tensor without the outermost values; groups of moved tensors share one."""
     graph = OnnxGraph(fp32_file)
     fold(graph)
     tensors = int8_tensors(graph)

@@ -1,11 +1,11 @@
-"""Folds scaling, shifting and padding into convolutions, so that fewer tensors need quantisation."""
+"""Folds scaling, shifting and padding into convolutions, so that fewer tensors need quantization."""
 
 import numpy
 from onnx import NodeProto
 
 from .graph import OnnxGraph, attribute, set_attribute
 
-# What a picture is padded with where only the largest neighbour counts.
+# What an image is padded with where only the largest neighbor counts.
 LOWEST = numpy.finfo(numpy.float32).min
 
 

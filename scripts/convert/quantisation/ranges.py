@@ -14,7 +14,7 @@ LARGEST = 255
 
 @dataclass(frozen=True)
 class ActivationRanges:
-    """The ranges of the quantised tensors, measured on the FP32 model with this sum."""
+    """The ranges of the quantized tensors, measured on the FP32 model with this sum."""
 
     model_sha256: str
     ranges: dict[str, tuple[float, float]]
@@ -37,7 +37,7 @@ class ActivationRanges:
             raise ConversionError(f"the activation ranges were measured on another model than {file}; measure anew")
 
     def scale_and_zero_point(self, tensor: str) -> tuple[numpy.float32, numpy.uint8]:
-        """The quantisation of a tensor to 0..255; 0, the value of padding, stays exact."""
+        """The quantization of a tensor to 0..255; 0, the value of padding, stays exact."""
         if tensor not in self.ranges:
             raise ConversionError(f"the range of '{tensor}' was not measured; measure the ranges anew")
         low, high = self.ranges[tensor]

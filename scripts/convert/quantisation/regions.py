@@ -25,7 +25,7 @@ def int8_nodes(graph: OnnxGraph) -> list[NodeProto]:
 
 
 def int8_tensors(graph: OnnxGraph) -> list[str]:
-    """The tensors that are quantised: inputs and outputs of those nodes, in order.
+    """The tensors that are quantized: inputs and outputs of those nodes, in order.
 
     A convolution that only a Clip reads is not rounded itself: rounding the Clip's result does both at once.
     """

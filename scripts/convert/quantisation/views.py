@@ -40,7 +40,7 @@ def _rays(elevation: float, azimuth: float, field_of_view: float, size: int) -> 
 
 
 def _project(lens: dict, rays: numpy.ndarray) -> tuple[numpy.ndarray, numpy.ndarray]:
-    """The projection of rays by an equidistant lens: columns and rows of pixel centres; NaN outside its image."""
+    """The projection of rays by an equidistant lens: columns and rows of pixel centers; NaN outside its image."""
     across = numpy.hypot(rays[..., 0], rays[..., 1])
     theta = numpy.arctan2(across, rays[..., 2])
     radius_by_across = numpy.where(theta <= lens["max_theta"], lens["focal"] * theta / across, numpy.nan)

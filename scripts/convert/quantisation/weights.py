@@ -34,10 +34,10 @@ def quantise_weights(
 
 
 def _largest_pair(weights: numpy.ndarray) -> numpy.ndarray:
-    """Per output channel, the largest sum of magnitudes of two neighbouring weights of the same sign.
+    """Per output channel, the largest sum of magnitudes of two neighboring weights of the same sign.
 
     x86 CPUs without VNNI multiply and add such pairs in 16 bits and cut off what does not fit. Depthwise convolutions
-    have no neighbouring inputs.
+    have no neighboring inputs.
     """
     outputs, inputs = weights.shape[:2]
     if inputs == 1:

@@ -21,7 +21,7 @@ def section(kind: str, **options) -> str:
 
 
 def convolution(filters: int, size: int, **changes) -> str:
-    """A convolution as the published networks use it: normalised, padded, leaky."""
+    """A convolution as the published networks use it: normalized, padded, leaky."""
     usual = {"batch_normalize": 1, "filters": filters, "size": size, "stride": 1, "pad": 1, "activation": "leaky"}
     return section("convolutional", **(usual | changes))
 
@@ -42,7 +42,7 @@ def region(anchors: list[float], classes: int) -> str:
 
 
 def yolov2_cfg(size: int, anchors: list[float], classes: int, thinner: int = 1) -> str:
-    """YOLOv2 for pictures of `size` pixels; `thinner` divides the filters of every layer but the last."""
+    """YOLOv2 for images of `size` pixels; `thinner` divides the filters of every layer but the last."""
     # Darknet-19: a max pooling precedes each doubling of the filters; 1 x 1 convolutions halve them in between.
     parts = [section("net", width=size, height=size, channels=3)]
     for filters, repeats in ((32, 0), (64, 0), (128, 1), (256, 1), (512, 2), (1024, 2)):

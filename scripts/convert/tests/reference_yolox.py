@@ -64,7 +64,7 @@ def block(weights, name, image, stride=1):
 
 
 def unit(weights, name, image, stride=1, groups=1):
-    """A convolution, its normalisation, and x times the sigmoid of x."""
+    """A convolution, its normalization, and x times the sigmoid of x."""
     kernel = weights[f"{name}.conv.weight"]
     result = correlated(image, kernel, stride, kernel.shape[2] // 2, groups)
     own = {

@@ -85,7 +85,7 @@ class Checkpoints(WithCheckpoint):
     def test_a_checkpoint_that_was_cut_short_is_refused(self):
         self.write()
         self.checkpoint.write_bytes(self.checkpoint.read_bytes()[:-100])
-        self.refused("yolox.pth is no zip archive")
+        self.refused("yolox.pth is not a zip archive")
 
     def test_nothing_that_a_checkpoint_names_is_run(self):
         harm = self.folder / "harm"

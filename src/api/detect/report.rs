@@ -124,9 +124,9 @@ pub struct ReportCalibration {
 #[derive(Debug, Clone, Serialize, ToSchema)]
 #[schema(as = LensCircle)]
 pub struct ReportCircle {
-    /// Column of the centre.
+    /// Column of the center.
     pub cx: f64,
-    /// Row of the centre.
+    /// Row of the center.
     pub cy: f64,
     /// Radius; the circle may reach beyond the frame.
     pub radius: f64,
@@ -212,7 +212,7 @@ pub struct ReportPerson {
     pub score: f64,
     /// The box rotated so that its height axis is the projected vertical.
     pub oriented_box: ReportOrientedBox,
-    /// Direction of the box centre; null outside the lens image.
+    /// Direction of the box center; null outside the lens image.
     pub bearing: Option<ReportBearing>,
     /// Position of the person on the floor; null when the height of the camera is unknown.
     pub floor: Option<ReportFloor>,
@@ -249,9 +249,9 @@ pub struct ReportBox {
 /// Corner-origin frame pixels.
 #[derive(Debug, Clone, Serialize, ToSchema)]
 pub struct ReportOrientedBox {
-    /// Horizontal position of the centre.
+    /// Horizontal position of the center.
     pub cx: f64,
-    /// Vertical position of the centre.
+    /// Vertical position of the center.
     pub cy: f64,
     /// Extent across the height axis.
     pub width: f64,
@@ -274,9 +274,9 @@ pub struct ReportBearing {
 /// of a camera that points straight down.
 #[derive(Debug, Clone, Serialize, ToSchema)]
 pub struct ReportFloor {
-    /// Metres.
+    /// Meters.
     pub x_m: f64,
-    /// Metres.
+    /// Meters.
     pub y_m: f64,
 }
 

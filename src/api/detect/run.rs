@@ -116,7 +116,7 @@ pub(in crate::api) async fn wait_for_workers<T>(
     done
 }
 
-/// Serialises the report for the result store and the response.
+/// Serializes the report for the result store and the response.
 fn written<T>(
     detected: DetectedFrame,
     write: impl FnOnce(AnswerInput<'_>) -> Result<T, Problem>,

@@ -166,7 +166,7 @@ fn circle(lens: &Lens, width: u32, height: u32) -> String {
         _ => "cut off by the frame",
     };
     format!(
-        "centre {:.1}, {:.1}; radius {radius} pixels, {held}",
+        "center {:.1}, {:.1}; radius {radius} pixels, {held}",
         centre.x, centre.y
     )
 }

@@ -24,7 +24,7 @@ impl Labels {
     /// No annotations yet. Looking takes long, so that what would fail at the end fails now.
     ///
     /// # Errors
-    /// Returns an error if two pictures would share a name or a file, or `folder` cannot be made.
+    /// Returns an error if two images would share a name or a file, or `folder` cannot be made.
     pub(super) fn start(
         format: AnnotationFormat,
         boxes: BoxKind,
@@ -53,7 +53,7 @@ impl Labels {
         })
     }
 
-    /// Takes in what was found in a picture.
+    /// Takes in what was found in an image.
     pub(super) fn add(&mut self, picture: &Picture, report: &DetectionReport) {
         let image = AnnotatedImage::of(report, picture.name.clone());
         self.images.push(image);

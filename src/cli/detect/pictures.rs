@@ -1,18 +1,18 @@
-//! The pictures that were asked for: files as they are named, folders with all that is in them.
+//! The images to detect people in: files as they are named, folders with all that is in them.
 
 use std::{
     fs, io,
     path::{Path, PathBuf},
 };
 
-/// Endings of pictures that can be read, in lower case.
+/// Endings of images that can be read, in lower case.
 const ENDINGS: [&str; 4] = ["jpg", "jpeg", "png", "webp"];
-/// Most pictures of one run.
+/// The maximum number of images of one run.
 const MAX_PICTURES: usize = 100_000;
 /// Most folders within each other.
 const MAX_DEPTH: usize = 32;
 
-/// A picture to look at.
+/// An image to detect people in.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Picture {
     /// Its file.
@@ -21,20 +21,20 @@ pub(super) struct Picture {
     pub name: String,
 }
 
-/// Pictures that cannot be listed.
+/// Images that cannot be listed.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum PicturesError {
     #[error("{path}: the folder cannot be read: {source}")]
     Unreadable { path: PathBuf, source: io::Error },
     #[error("{0}: there is no .jpg, .jpeg, .png or .webp file in this folder")]
     NoPictures(PathBuf),
-    #[error("{0}: more than {MAX_PICTURES} pictures at once; name fewer")]
+    #[error("{0}: more than {MAX_PICTURES} images at once; name fewer")]
     TooMany(PathBuf),
     #[error("{0}: folders lie more than {MAX_DEPTH} deep; name one further down")]
     TooDeep(PathBuf),
 }
 
-/// The files among `paths`, and the pictures below the folders among them in the order of their
+/// The files among `paths`, and the images below the folders among them in the order of their
 /// names. Hidden files and folders are left out, and links to folders are not followed.
 pub(super) fn pictures(paths: &[PathBuf]) -> Result<Vec<Picture>, PicturesError> {
     let mut pictures = Vec::new();

@@ -30,7 +30,7 @@ impl fmt::Display for Lines<'_> {
         )?;
         writeln!(f, "sha256       {} ({checked})", model.sha256)?;
         writeln!(f, "revision     {}", model.revision)?;
-        writeln!(f, "licence      {licence}")?;
+        writeln!(f, "license      {licence}")?;
         writeln!(f, "source       {source}")?;
         for (what, tensors) in [("input", &model.inputs), ("output", &model.outputs)] {
             for OnnxTensor {

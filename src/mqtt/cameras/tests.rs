@@ -47,7 +47,7 @@ fn update(cameras: &mut Cameras, report: &StoredReport) -> Vec<Message> {
     )
 }
 
-/// Topic and payload of all messages that are no announcements, and the number of announcements.
+/// Topic and payload of all messages that are not announcements, and the number of announcements.
 fn published(messages: &[Message]) -> (Vec<(String, String)>, usize) {
     let is_announcement = |message: &&Message| message.topic.starts_with("homeassistant/");
     let published = messages.iter().filter(|message| !is_announcement(message));

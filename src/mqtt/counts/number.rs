@@ -11,7 +11,7 @@ pub(super) enum Owner<'a> {
 }
 
 impl<'a> Owner<'a> {
-    /// Recognises an owner by its path. Returns the rest of the topic, too.
+    /// Recognizes an owner by its path. Returns the rest of the topic, too.
     pub(super) fn of_topic(topic: &'a str) -> Option<(Self, &'a str)> {
         let (kind, rest) = topic.split_once('/')?;
         let (name, rest) = rest.split_once('/')?;
@@ -55,7 +55,7 @@ pub(super) enum Number<'a> {
 }
 
 impl<'a> Number<'a> {
-    /// Recognises a number by its topic below that of its owner.
+    /// Recognizes a number by its topic below that of its owner.
     pub(super) fn of_topic(topic: &'a str) -> Option<Self> {
         let levels: Vec<_> = topic.split('/').collect();
         match levels[..] {

@@ -79,7 +79,7 @@ async fn follow_redirections(
     }
 }
 
-/// The nodes of the cluster. Empty for a Redis that is no cluster.
+/// The nodes of the cluster. Empty for a Redis that is not a cluster.
 async fn nodes_of_cluster(connection: &mut MultiplexedConnection, asked: &Node) -> Vec<Node> {
     let slots: RedisResult<Value> = cmd("CLUSTER").arg("SLOTS").query_async(connection).await;
     let mut nodes = Vec::new();

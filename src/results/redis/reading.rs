@@ -1,4 +1,4 @@
-//! Queries to Redis, and the parsing of its answers into reports. Entries that are no reports of
+//! Queries to Redis, and the parsing of its answers into reports. Entries that are not reports of
 //! Lookdown are skipped.
 
 use std::{num::NonZeroUsize, sync::Arc};

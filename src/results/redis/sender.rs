@@ -1,5 +1,5 @@
 //! Sends reports from the outbox to Redis, one after the other. Each report is stored atomically
-//! and exactly once: after a lost answer, Redis recognises the report by its number.
+//! and exactly once: after a lost answer, Redis recognizes the report by its number.
 
 use std::sync::Arc;
 

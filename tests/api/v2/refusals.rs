@@ -211,7 +211,7 @@ async fn inconsistent_byte_counts_are_refused() {
     none["inputs"][0]["parameters"]["binary_data_size"] = json!(2);
     let answer = send(&service, FRAMES, &none, b"ab").await;
     assert_refused(&answer, 422, "invalid-tensor", "its length in four bytes");
-    let (head, behind) = in_bytes(b"no picture", &fast());
+    let (head, behind) = in_bytes(b"no image", &fast());
     let answer = send(&service, FRAMES, &head, &behind).await;
     assert_refused(&answer, 415, "unsupported-image", "");
 }

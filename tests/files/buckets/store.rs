@@ -115,9 +115,9 @@ fn errors_of_invalid_addresses_hold_no_secrets() {
             .map(|(name, value)| ((*name).to_owned(), (*value).to_owned()))
     };
     for (url, part) in [
-        ("ftp://cameras/x", "ftp:// is no bucket's address"),
-        ("http://127.0.0.1/x", "http:// is no bucket's address"),
-        ("memory:///x", "memory:// is no bucket's address"),
+        ("ftp://cameras/x", "ftp:// is not a bucket's address"),
+        ("http://127.0.0.1/x", "http:// is not a bucket's address"),
+        ("memory:///x", "memory:// is not a bucket's address"),
         ("s3://cameras", "its settings cannot be used: "),
     ] {
         let error = BucketStore::new(&url.parse().unwrap(), variables())

@@ -7,7 +7,7 @@ use lookdown_detect::{
 
 use crate::models::folder::{fixture, library, load, options};
 
-/// Runs the detector on views of one colour each.
+/// Runs the detector on views of one color each.
 fn detect(detector: &mut OnnxDetector, colours: &[[u8; 3]]) -> HeadOutput {
     let input: NetworkInput = detector.input().clone();
     let mut batch = ViewBatch::default();

@@ -249,7 +249,7 @@ fn a_label_stays_whole_wherever_its_box_is() {
         }
         for bbox in borders {
             let here = size(bbox);
-            // Where the plate lies on its own outline of the same colour, a line's width is not
+            // Where the plate lies on its own outline of the same color, a line's width is not
             // visible.
             let unseen = 3 + width.min(height) / 300;
             let mut sides = here.into_iter().zip(whole);

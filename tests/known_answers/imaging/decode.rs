@@ -43,7 +43,7 @@ const IMAGES: [&str; 21] = [
     "thumbnail.jpg",
 ];
 
-/// Centres of the quarters of the image in every fixture.
+/// Centers of the quarters of the image in every fixture.
 const QUARTERS: [((u32, u32), [u8; 3]); 4] = [
     ((40, 8), [0, 255, 0]),
     ((8, 8), [255, 0, 0]),

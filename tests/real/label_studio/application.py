@@ -107,7 +107,7 @@ def label_studio(program: str, folder: Path, root: Path) -> Iterator[LabelStudio
 
 
 def configuration() -> str:
-    """The labelling configuration of the documentation."""
+    """The labeling configuration of the documentation."""
     text = (ROOT / "docs" / "evaluate.md").read_text(encoding="utf-8")
     return text[text.index("    <View>") : text.index("</View>") + len("</View>")]
 

@@ -1,4 +1,4 @@
-"""Reads annotation files with the packages of labelling tools: `readers.py FOLDER SAMPLES SERVER`. Prints JSON."""
+"""Reads annotation files with the packages of labeling tools: `readers.py FOLDER SAMPLES SERVER`. Prints JSON."""
 
 import importlib.util
 import json

@@ -29,7 +29,7 @@ const pixels = (page) => page.locator("#previews canvas").first().evaluate((canv
 
 pageTest("the detected circle is drawn over the frame, and the views follow it", "#detect", async (page) => {
   await start(page);
-  for (const name of ["Centre, from the left", "Centre, from the top", "Radius"]) {
+  for (const name of ["Center, from the left", "Center, from the top", "Radius"]) {
     assert.ok(Math.abs(Number(await page.getByRole("slider", { name }).inputValue()) - 480) < 1.5, name);
   }
   const before = await pixels(page);
@@ -45,7 +45,7 @@ pageTest("the detected circle is drawn over the frame, and the views follow it",
   });
   assert.ok(Number(await page.getByRole("slider", { name: "Radius" }).inputValue()) < 420);
   await straightenedAfter(page, async () => {
-    await page.getByRole("slider", { name: "Centre, from the left" }).focus();
+    await page.getByRole("slider", { name: "Center, from the left" }).focus();
     await page.keyboard.press("ArrowRight");
   });
   assert.ok(Math.abs(Number(await page.locator("output[for=calibrate-cx]").textContent()) - 480.1) < 1.5);
@@ -53,7 +53,7 @@ pageTest("the detected circle is drawn over the frame, and the views follow it",
 
 pageTest("a saved lens with a height is used at once and shows the floor", "#detect", async (page) => {
   await start(page);
-  await page.getByLabel("Height, metres").fill("2.9");
+  await page.getByLabel("Height, meters").fill("2.9");
   await page.getByLabel("Name", { exact: true }).fill("lobby");
   await page.getByRole("button", { name: "Save", exact: true }).click();
   await page.getByText("lobby is saved and in use.").waitFor();
@@ -68,7 +68,7 @@ pageTest("a saved lens with a height is used at once and shows the floor", "#det
   await page.locator(".dot-mark").first().waitFor();
   // The second save replaces the first.
   await go(page, "Calibrate");
-  await page.getByLabel("Height, metres").fill("3.1");
+  await page.getByLabel("Height, meters").fill("3.1");
   await page.getByRole("button", { name: "Replace lobby" }).click();
   await page.getByText("lobby is saved and in use.").waitFor();
   assert.equal((await stored("lobby")).mount.height_m, 3.1);
@@ -111,7 +111,7 @@ pageTest("a calibration in use is opened and edited", "#detect", async (page) =>
   await start(page, "office");
   const answer = await straightenedAfter(page, () => page.locator("#open-calibration").selectOption("canteen"));
   assert.equal(answer.status(), 200);
-  assert.equal(await page.getByLabel("Height, metres").inputValue(), "2.9");
+  assert.equal(await page.getByLabel("Height, meters").inputValue(), "2.9");
   assert.equal(await page.getByLabel("Name", { exact: true }).inputValue(), "canteen");
   await page.getByRole("button", { name: "Replace canteen" }).waitFor();
 });

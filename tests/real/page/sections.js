@@ -43,7 +43,7 @@ for (const [lens, what] of [["", "a lens that was assumed"], ["office", "a calib
   });
 }
 
-/** The number of colours of a canvas, which shows if anything is drawn. */
+/** The number of colors of a canvas, which shows if anything is drawn. */
 const colours = (page, selector) =>
   page.locator(selector).first().evaluate((canvas) => {
     const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);

@@ -186,7 +186,7 @@ pageTest("a line has named directions, which can be turned", "#detect", async (p
   near(line.frame_px, [[600, 500], [300, 500]]);
 });
 
-pageTest("a zone is drawn on the floor, in metres", "#detect", async (page) => {
+pageTest("a zone is drawn on the floor, in meters", "#detect", async (page) => {
   await storeCopy("floored");
   await start(page, "floored");
   await page.getByRole("radio", { name: "Floor" }).check();
@@ -278,19 +278,19 @@ pageTest("the circle editor keeps zones, lines and masks", "#detect", async (pag
   // Saving over it, and opening it first.
   const saved = page.getByText("circled is saved and in use.");
   await page.getByLabel("Name", { exact: true }).first().fill("circled");
-  await page.getByLabel("Height, metres").fill("3.1");
+  await page.getByLabel("Height, meters").fill("3.1");
   await page.getByRole("button", { name: "Replace circled" }).click();
   await saved.waitFor();
   assert.equal(await kept(), 3.1);
   await page.locator("#open-calibration").selectOption("circled");
   await page.waitForFunction(() => !document.querySelector("#circle-fields").disabled);
-  await page.getByLabel("Height, metres").fill("3.2");
+  await page.getByLabel("Height, meters").fill("3.2");
   await page.getByRole("button", { name: "Replace circled" }).click();
   await saved.waitFor();
   assert.equal(await kept(), 3.2);
   // Another lens or mount is a conflict. The second save replaces it.
   await storeCopy("circled", { ...areas, mount: { world_up: [0, 0, -1], height_m: 4 } });
-  await page.getByLabel("Height, metres").fill("3.3");
+  await page.getByLabel("Height, meters").fill("3.3");
   await page.getByRole("button", { name: "Replace circled" }).click();
   await page.getByRole("alert").getByText("circled has another lens or mount since it was opened here.").waitFor();
   assert.equal(await kept(), 4);

@@ -80,7 +80,7 @@ def found(client: InferenceServerClient, frame: bytes, sent: bool, answered: boo
 
 
 def views(client: InferenceServerClient, datatype: str) -> list:
-    """The shapes of the outputs for two grey views."""
+    """The shapes of the outputs for two gray views."""
     shape = client.get_model_metadata(DETECTOR)["inputs"][0]["shape"]
     grey = np.full([2, *shape[1:]], 128, dtype=np.uint8 if datatype == "UINT8" else np.float32)
     tensor = InferInput("views", list(grey.shape), datatype).set_data_from_numpy(grey)
@@ -100,9 +100,9 @@ def refused(client: InferenceServerClient, frame: bytes) -> dict:
     shared = InferInput("image", [1], "BYTES").set_shared_memory("region", len(frame))
     requests = {
         "unknown model": ("unknown", good, {}),
-        "no picture": (MODEL, [image(b"no picture")], {}),
-        "no picture in a batch": (MODEL, [images(frame, b"no picture")], {"parameters": FAST}),
-        "too many frames": (MODEL, [images(*[b"no picture"] * 17)], {}),
+        "no image": (MODEL, [image(b"no image")], {}),
+        "no image in a batch": (MODEL, [images(frame, b"no image")], {"parameters": FAST}),
+        "too many frames": (MODEL, [images(*[b"no image"] * 17)], {}),
         "unknown parameter": (MODEL, good, {"parameters": {"colour": "red"}}),
         "unknown calibration": (MODEL, good, {"parameters": {"calibration": "unknown-id"}}),
         "score out of range": (MODEL, good, {"parameters": {"score_threshold": 1.5}}),

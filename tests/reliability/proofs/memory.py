@@ -31,7 +31,7 @@ def frames() -> dict[str, tuple[bytes, set[int]]]:
         "of 8192 × 6000 pixels": (png(8192, 6000), {413}),
         "of a thousand times its bytes": (png(2000, 2000), {200, 422, 429}),
         "of 40 MB": (bytes(40_000_000), {413, 429}),
-        "of 30 MB that are no picture": (bytes(30_000_000), {415, 429}),
+        "of 30 MB that are not images": (bytes(30_000_000), {415, 429}),
     }
 
 

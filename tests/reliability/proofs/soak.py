@@ -36,7 +36,7 @@ def prove(effort: Effort) -> list[Row]:
         capacity = load(server, [DETECT], OFFICE, clients=4, seconds=3.0)["succeeded_per_second"]
         streams = [
             ("200", DETECT, picture, LOAD * capacity),
-            ("415", DETECT, b"no picture at all", BAD_PER_SECOND),
+            ("415", DETECT, b"no image at all", BAD_PER_SECOND),
             ("422", DETECT, picture[: len(picture) // 2], BAD_PER_SECOND),
             ("422", "/detect?score_threshold=2", picture, BAD_PER_SECOND),
             ("404", "/detect?calibration=unknown", picture, BAD_PER_SECOND),

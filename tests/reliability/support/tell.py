@@ -18,7 +18,7 @@ def markdown(folder: Path, parts: Iterable[str]) -> str:
     runs: dict[str, list[str]] = {}
     for part in kept:
         runs.setdefault(_ran_on(part["made"]), []).append(f"{part['name']} ({part['seconds']:.0f} s)")
-    return "\n".join([*lines, "", *(f"*{', '.join(names)}: {run}*" for run, names in runs.items())])
+    return "\n".join([*lines, "", *(f"* {', '.join(names)}: {run}" for run, names in runs.items())])
 
 
 def _kept(folder: Path, part: str) -> dict | None:
@@ -31,6 +31,6 @@ def _kept(folder: Path, part: str) -> dict | None:
 
 def _ran_on(made: dict) -> str:
     return (
-        f"{made['effort']} form, {made['date'][:10]}, commit {made['commit']}; {made['cpu']}, {made['cores']} cores, "
+        f"{made['effort']} form, {made['date'][:10]}, commit {made['commit']}. {made['cpu']}, {made['cores']} cores, "
         f"{made['memory_gib']:.0f} GiB, {made['system']}; ONNX Runtime {made['onnx_runtime']}, {made['rust']}"
     )

@@ -13,9 +13,9 @@ use lookdown_tracking::Plane;
 use super::shared::{Shared, check_known, not_found, now_ms};
 use crate::{scene::Scene, sums::Owner};
 
-/// Least extent around a camera, metres.
+/// Least extent around a camera, meters.
 const AROUND_CAMERA_M: f64 = 4.0;
-/// Farthest from the first camera that is drawn, metres.
+/// Farthest from the first camera that is drawn, meters.
 const MAX_EXTENT_M: f64 = 500.0;
 
 /// Draw the floor of a site

@@ -36,7 +36,7 @@ struct HeatMap {
     from: Timestamp,
     to: Timestamp,
     cell_m: f64,
-    /// The corner with the least x and y, metres on the floor of the camera or the site.
+    /// The corner with the least x and y, meters on the floor of the camera or the site.
     origin_m: [f64; 2],
     /// Seconds of presence, row by row from the least y on.
     seconds: Vec<Vec<f64>>,
@@ -237,7 +237,7 @@ fn encoded(pixels: &[u8], width: usize, height: usize) -> Result<Vec<u8>, png::E
     Ok(file)
 }
 
-/// Returns the colour of a time of presence, with the most of any cell.
+/// Returns the color of a time of presence, with the most of any cell.
 pub(super) fn colour(seconds: f64, most: f64) -> [u8; 4] {
     if seconds <= 0.0 {
         return [0; 4];

@@ -88,7 +88,7 @@ pub(super) async fn check_known(api: &Shared, owner: &Owner) -> Result<(), Probl
     })
 }
 
-/// Returns a place in metres or pixels with three decimals.
+/// Returns a place in meters or pixels with three decimals.
 pub(super) fn rounded(place: [f64; 2]) -> [f64; 2] {
     place.map(|value| (value * 1000.0).round() / 1000.0)
 }

@@ -72,7 +72,7 @@ struct ZoneRow {
     outline_px: Option<Vec<[f64; 2]>>,
 }
 
-/// A track. Places are on the floor in metres, or in frame pixels of the camera.
+/// A track. Places are on the floor in meters, or in frame pixels of the camera.
 #[derive(Serialize, ToSchema)]
 struct TrackRow {
     id: u64,

@@ -55,7 +55,7 @@ impl Server {
                 let (events, sent) = (Arc::clone(&events), Arc::clone(&sent));
                 let (resumed, calibration) = (Arc::clone(&resumed), calibration.clone());
                 tokio::spawn(async move {
-                    // A client that is gone is no failure.
+                    // A client that is gone is not a failure.
                     let _ = answer(stream, &events, pause, &sent, &resumed, &calibration).await;
                 });
             }

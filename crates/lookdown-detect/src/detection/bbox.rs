@@ -124,7 +124,7 @@ impl<S> BBox<S> {
         self.width() * self.height()
     }
 
-    /// The centre `[x, y]`, in pixels.
+    /// The center `[x, y]`, in pixels.
     #[must_use]
     pub fn center(&self) -> [f64; 2] {
         [

@@ -3,13 +3,13 @@
 //! A uniform grid lists every box in each cell that the box covers. A query for an IoU of at least
 //! `t` searches only a part of the queried box. An overlap covers at least the share `t` of each
 //! side, since the IoU is at most that share. So it always meets the *core* of the side: the part
-//! that remains when `t` is cut off at both ends, which from `t` = ½ on is the centre alone. The
+//! that remains when `t` is cut off at both ends, which from `t` = ½ on is the center alone. The
 //! cells of the core therefore contain all boxes that can match.
 
 use super::{BBox, FramePixels};
 
 /// Cells along a side of the mean box when whole boxes are searched, and how many more when only
-/// their centres are searched. Finer cells reduce the number of neighbouring boxes compared.
+/// their centers are searched. Finer cells reduce the number of neighboring boxes compared.
 const CELLS_PER_BOX: [f64; 2] = [1.0, 4.0];
 const MAX_CELLS_PER_AXIS: usize = 128;
 /// Tolerance of shares of sides relative to IoUs, so that rounding loses no box.

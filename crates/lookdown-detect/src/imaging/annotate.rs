@@ -45,7 +45,7 @@ pub struct Drawing {
 /// Most marks drawn. More cannot be distinguished in an image.
 pub const MOST_MARKS: usize = 1000;
 
-/// Bright enough for dark text, and distinguishable by lightness for most colour-blind people.
+/// Bright enough for dark text, and distinguishable by lightness for most color-blind people.
 const COLOURS: [Rgb; 6] = [
     [0, 214, 255],
     [255, 200, 30],

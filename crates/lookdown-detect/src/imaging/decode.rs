@@ -57,7 +57,7 @@ pub struct DecodedFrame {
 ///
 /// The EXIF orientation is applied. Transparent pixels are blended over black, like the surround of
 /// a lens. 16-bit samples are rounded to 8 bits. Of an animation, the first frame is used. A
-/// truncated file is refused, even where a lenient decoder would fill the missing rows with grey.
+/// truncated file is refused, even where a lenient decoder would fill the missing rows with gray.
 ///
 /// # Errors
 /// See [`DecodeError`]. No input causes a panic.
@@ -231,7 +231,7 @@ fn unsupported(found: impl Into<String>) -> DecodeError {
     }
 }
 
-/// Blends transparent parts over black, the colour around a lens circle.
+/// Blends transparent parts over black, the color around a lens circle.
 fn rgb_over_black(image: DynamicImage) -> RgbImage {
     if !image.color().has_alpha() {
         return image.into_rgb8();

@@ -144,7 +144,7 @@ mod tests {
         }
     }
 
-    /// Number of pixels of one grey level.
+    /// Number of pixels of one gray level.
     fn count(sheet: &Frame, value: u8) -> usize {
         let pixels = sheet.pixels().chunks_exact(3);
         pixels.filter(|pixel| *pixel == [value; 3]).count()

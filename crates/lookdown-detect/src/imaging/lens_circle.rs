@@ -25,7 +25,7 @@ use surround::Surround;
 /// Frames with a shorter side below this show too little of a rim to measure.
 const MIN_SIDE: u32 = 32;
 /// Least contrast between lens image and surround, relative to the brightness of the frame's
-/// centre. The first value ignores stray light around the lens image. The second is for lenses that
+/// center. The first value ignores stray light around the lens image. The second is for lenses that
 /// darken toward the rim.
 const MIN_CONTRASTS: [f64; 2] = [0.1, 0.03];
 /// Search range for the rim on either side of the current circle, in radii. The first is wide, to
@@ -36,7 +36,7 @@ const MIN_RADIUS_IN_SHORT_SIDES: f64 = 0.25;
 /// Share of the rays meeting the circle inside the frame that must show a rim. The others may show
 /// a dark part of the room.
 const MIN_SUPPORT: f64 = 0.35;
-/// The widest angle without any rim. Beyond it, centre and radius are ambiguous.
+/// The widest angle without any rim. Beyond it, center and radius are ambiguous.
 const MAX_GAP_RADIANS: f64 = 3.5;
 
 /// Finds the lens circle to a fraction of a pixel. The frame may cut it off.
@@ -97,7 +97,7 @@ fn is_shown(edge: &[RimPoint], frame: &Frame, circle: &LensCircle) -> bool {
     !shown.is_empty() && is_supported && widest_gap <= MAX_GAP_RADIANS
 }
 
-/// The largest circle in the centre of a frame of this size. It is the guess for frames without a
+/// The largest circle in the center of a frame of this size. It is the guess for frames without a
 /// detected circle.
 #[must_use]
 pub fn assumed_circle(width: u32, height: u32) -> LensCircle {

@@ -1,4 +1,4 @@
-//! The whole frame as one network input: scaled to fit, with the rest filled grey.
+//! The whole frame as one network input: scaled to fit, with the rest filled gray.
 
 use image::{RgbImage, imageops};
 

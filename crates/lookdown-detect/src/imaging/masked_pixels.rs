@@ -60,7 +60,7 @@ impl MaskedPixels {
         following > 0 && x < row[following - 1].end
     }
 
-    /// Returns true if the pixel that contains a position (pixel centres) is masked.
+    /// Returns true if the pixel that contains a position (pixel centers) is masked.
     #[must_use]
     pub fn hides_position(&self, position: Pixel) -> bool {
         let position = cross_half_pixel(position, PixelConvention::CornerOrigin);
@@ -88,7 +88,7 @@ impl MaskedPixels {
     }
 }
 
-/// The columns in which a polygon covers a part of the row `y`: where its centre line is inside,
+/// The columns in which a polygon covers a part of the row `y`: where its center line is inside,
 /// and where an edge crosses it.
 fn touched(polygon: &Polygon, y: u32, width: u32) -> Vec<Range<u32>> {
     let [top, middle, bottom] = [0.0, 0.5, 1.0].map(|down| f64::from(y) + down);

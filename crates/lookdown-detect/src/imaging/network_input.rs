@@ -1,6 +1,6 @@
 //! Network input format, and batches of inputs.
 
-/// Order of the colour planes in a network's input.
+/// Order of the color planes in a network's input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ChannelOrder {
@@ -19,7 +19,7 @@ pub struct NetworkInput {
     pub width: u32,
     /// Height, pixels.
     pub height: u32,
-    /// Order of the colour planes.
+    /// Order of the color planes.
     pub channel_order: ChannelOrder,
     /// Factor per plane, in the network's plane order.
     pub scale: [f32; 3],

@@ -41,7 +41,7 @@ use super::{Frame, MaskedPixels, NetworkInput};
 /// One view's sampling positions.
 ///
 /// Exact at every eighth pixel across and down and interpolated bilinearly in between, so that a
-/// block of eight pixels is one vector. In the normalised plane of a lens that is the same in every
+/// block of eight pixels is one vector. In the normalized plane of a lens that is the same in every
 /// azimuth, views that are turned from each other about the optical axis have one and the same
 /// grid; only an affine map to the frame is each view's own.
 ///
@@ -120,7 +120,7 @@ impl RemapTable {
         }
     }
 
-    /// Returns the position in the frame (pixel centres) that the view's pixel (`x`, `y`) samples,
+    /// Returns the position in the frame (pixel centers) that the view's pixel (`x`, `y`) samples,
     /// also beyond the frame's borders. `None` beyond the lens image.
     ///
     /// # Panics

@@ -5,11 +5,11 @@ use super::NetworkInput;
 /// Sides of the averaged cells, in view pixels. 256 pixels average out the noise of a sensor and of
 /// JPEG, and a detectable person fills a good part of one cell.
 const CELL: usize = 16;
-/// Least change of a cell's mean, in grey levels (0 to 255), that counts as motion. The noise of a
+/// Least change of a cell's mean, in gray levels (0 to 255), that counts as motion. The noise of a
 /// mean is below 1. A person's clothes differ from the floor by tens.
 const MOVED_LEVELS: u8 = 4;
 
-/// Mean levels (0 to 255) of the cells of a view, for each colour channel.
+/// Mean levels (0 to 255) of the cells of a view, for each color channel.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ViewSignature(Vec<u8>);
 

@@ -35,7 +35,7 @@ pub struct ModelManifest {
     /// with `upstream`, the sum that was recorded when the file was installed.
     #[serde(default)]
     pub sha256: Option<String>,
-    /// SPDX identifier of the weights' licence.
+    /// SPDX identifier of the weights' license.
     #[serde(default)]
     pub licence: Option<String>,
     /// Origin of the weights.

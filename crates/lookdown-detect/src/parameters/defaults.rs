@@ -1,5 +1,5 @@
 //! Default values of parameters: those of a camera, in its calibration, and those of the server, in
-//! its settings.
+//! its settings. The built-in ones are rows of the table in `detect_parameters.rs`.
 
 use strum::IntoStaticStr;
 

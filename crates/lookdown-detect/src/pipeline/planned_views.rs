@@ -151,7 +151,7 @@ impl CoarseMasks {
         }
     }
 
-    /// Returns true if the row and the pixel that contain a position (pixel centres) are masked.
+    /// Returns true if the row and the pixel that contain a position (pixel centers) are masked.
     fn hides_position(&self, at: Pixel) -> bool {
         let row = (at.y + 0.5) * self.rows_per_pixel - 0.5;
         self.masked.hides_position(Pixel::new(at.x, row))

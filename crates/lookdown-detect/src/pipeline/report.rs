@@ -139,7 +139,7 @@ pub struct Person {
     pub score: f64,
     /// The box turned so that its height axis is the projected vertical.
     pub oriented_box: OrientedBox,
-    /// The direction of the box centre; `None` when it lies outside the lens image.
+    /// The direction of the box center; `None` when it lies outside the lens image.
     pub bearing: Option<Bearing>,
     /// The floor position of the person, when the height of the camera is known.
     pub floor: Option<FloorPosition>,

@@ -139,7 +139,7 @@ pub(super) fn engine(
     Engine::new(Arc::new(models), calibrations, options, Arc::default()).unwrap()
 }
 
-/// A grey lens image on black, `side` pixels wide, with a white disc.
+/// A gray lens image on black, `side` pixels wide, with a white disc.
 pub(super) fn frame_with_disc(side: u32, center: [f64; 2], radius: f64) -> Bytes {
     let middle = f64::from(side) / 2.0;
     let mut pixels = Vec::with_capacity(side as usize * side as usize * 3);

@@ -1,4 +1,5 @@
-//! Worker threads that take frames from a bounded queue.
+//! Worker threads that take frames from a bounded queue. A frame without a free permit is refused
+//! here.
 
 use std::{
     num::NonZeroUsize,

@@ -17,7 +17,7 @@ pub enum DataSetError {
         /// The error of the operating system.
         source: std::io::Error,
     },
-    /// The format was not recognised.
+    /// The format was not recognized.
     #[error(
         "{path}: holds no data set in a known format; expected annotations.json, \
          annotations/*.json, *.json, *.xml or Ground_Truth_Annotations/groundTruth_*.csv"

@@ -29,7 +29,7 @@ pub(super) fn boxes(image: &DataSetImage) -> Vec<[f64; 4]> {
     let counting = image.truth.persons.iter().filter(|person| person.counts);
     let boxes = counting.map(|person| match &person.outline {
         Outline::AxisParallel(bbox) => bbox.corners(),
-        other => panic!("{other:?} is no axis-parallel box"),
+        other => panic!("{other:?} is not an axis-parallel box"),
     });
     boxes.collect()
 }

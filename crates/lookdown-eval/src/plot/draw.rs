@@ -24,7 +24,7 @@ const FONT: &str = "sans-serif";
 const INK: RGBColor = RGBColor(40, 44, 52);
 const GRID: RGBColor = RGBColor(225, 228, 232);
 
-/// Distinguishable with colour blindness (Okabe and Ito, Color Universal Design, 2008).
+/// Distinguishable with color blindness (Okabe and Ito, Color Universal Design, 2008).
 const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),

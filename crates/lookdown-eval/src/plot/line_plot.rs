@@ -20,7 +20,7 @@ pub struct Line {
     pub name: String,
     /// `[x, y]`, 0 to 1 each.
     pub points: Vec<[f64; 2]>,
-    /// A dashed line in the same colour, without its own name.
+    /// A dashed line in the same color, without its own name.
     pub dashed: Vec<[f64; 2]>,
     /// True if the points have markers.
     pub marked: bool,

@@ -79,7 +79,7 @@ fn of_matrix((detected, _): &(DetectedRow, EvaluatedRow)) -> Option<(f64, f64)> 
 }
 
 /// Columns and rows of the square around all boxes with a margin. It is the whole frame if there
-/// are no boxes.
+/// are not boxes.
 fn part_with<'a>(
     boxes: impl Iterator<Item = &'a FoundPerson>,
     frame: &Frame,

@@ -149,7 +149,7 @@ fn area(
         )),
         (None, None) => Err(FormatError::invalid(
             field,
-            "it has no corners: give frame_px in pixels of the frame, or floor_m in metres on the \
+            "it has no corners: give frame_px in pixels of the frame, or floor_m in meters on the \
              floor",
         )),
     }

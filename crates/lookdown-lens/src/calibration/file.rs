@@ -140,7 +140,7 @@ fn mount(raw: &NativeMount) -> Result<Mount, String> {
         && !(height.is_finite() && height > 0.0)
     {
         return Err(format!(
-            "height_m is {height}: give metres above 0, or leave it out"
+            "height_m is {height}: give meters above 0, or leave it out"
         ));
     }
     Ok(Mount::new(Unit::new_normalize(up), raw.height_m))

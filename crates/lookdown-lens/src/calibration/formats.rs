@@ -1,4 +1,4 @@
-//! Calibration files of every kind: the format is recognised from the content, each has one small
+//! Calibration files of every kind: the format is recognized from the content, each has one small
 //! reader that turns the file into cameras of the native shape, and some have a writer.
 //!
 //! Each reader documents its format and the usual mistakes; `docs/calibrate.md` has the table.
@@ -47,7 +47,7 @@ use super::native::NativeImage;
 const MAX_CAMERAS: usize = 256;
 
 impl CalibrationFile {
-    /// Recognises and reads the content of a calibration file.
+    /// Recognizes and reads the content of a calibration file.
     ///
     /// # Errors
     /// [`FormatError`] when the content is in no format that is read, or not whole.

@@ -124,13 +124,13 @@ pub struct NotAFrameSize;
 pub struct NativeMount {
     /// The direction of up in the camera frame, a unit vector.
     pub world_up: [f64; 3],
-    /// Metres above the floor.
+    /// Meters above the floor.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub height_m: Option<f64>,
     /// The name of the site whose floor several cameras share.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub site: Option<String>,
-    /// The floor point below the camera, in metres of the site.
+    /// The floor point below the camera, in meters of the site.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub position_m: Option<[f64; 2]>,
     /// The angle from the x axis of the site to that of the camera's floor, in degrees from x to y.

@@ -26,7 +26,7 @@ pub(super) fn check(lens: &Lens, width: u32, height: u32, corner_theta: f64) -> 
         && (-0.5..=frame_height - 0.5).contains(&centre.y);
     if !is_inside {
         return Err(format!(
-            "its centre, cx {} and cy {}, lies outside the frame of {width}×{height} pixels: give \
+            "its center, cx {} and cy {}, lies outside the frame of {width}×{height} pixels: give \
              both in pixels of that frame",
             centre.x, centre.y
         ));
@@ -36,29 +36,29 @@ pub(super) fn check(lens: &Lens, width: u32, height: u32, corner_theta: f64) -> 
     if !(1.0 / MAX_PIXEL_ASPECT..=MAX_PIXEL_ASPECT).contains(&aspect) {
         return Err(format!(
             "an angle is {aspect:.3} times as long across the frame as down it: the horizontal and \
-             the vertical focal length (fx and fy, aspect, or c) belong to different pictures"
+             the vertical focal length (fx and fy, aspect, or c) belong to different images"
         ));
     }
     let rim = Ray::new(lens.max_theta().sin(), 0.0, lens.max_theta().cos());
     let rim_radius = distance(lens, centre, &rim);
     if rim_radius < MIN_RIM_RADIUS * frame_width.min(frame_height) {
         return Err(format!(
-            "its image ends {rim_radius:.0} pixels from the centre, a speck in a frame of \
-             {width}×{height}: give the focal length and the image size of the same picture"
+            "its image ends {rim_radius:.0} pixels from the center, a speck in a frame of \
+             {width}×{height}: give the focal length and the image size of the same image"
         ));
     }
     let expected = MIN_CORNER_THETA.max(MIN_CORNER_SHARE * lens.max_theta().min(FRAC_PI_2));
     if corner_theta < expected.min(lens.max_theta()) {
         return Err(format!(
             "the corners of a frame of {width}×{height} pixels are only {:.1}° off its axis: give \
-             the focal length and the image size of the same picture",
+             the focal length and the image size of the same image",
             corner_theta.to_degrees()
         ));
     }
     Ok(())
 }
 
-/// Returns the distance from the centre at which the lens shows `ray`, pixels; infinite where it
+/// Returns the distance from the center at which the lens shows `ray`, pixels; infinite where it
 /// does not show it.
 fn distance(lens: &Lens, centre: Pixel, ray: &Ray) -> f64 {
     lens.project_to_rim(ray)

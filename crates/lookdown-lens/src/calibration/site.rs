@@ -5,7 +5,7 @@ use lookdown_common::plain_name::{MAX_CHARS, is_plain};
 use super::{FormatError, native::NativeMount};
 use crate::geometry::SitePlacement;
 
-/// Farthest coordinate of a site, metres.
+/// Farthest coordinate of a site, meters.
 const MAX_POSITION_M: f64 = 10_000.0;
 
 /// Checks the fields of the mount that place a camera on a site.
@@ -36,14 +36,14 @@ pub(super) fn site_placement(mount: &NativeMount) -> Result<Option<SitePlacement
         return Err(FormatError::invalid("mount.site", problem));
     }
     let Some(position_m) = mount.position_m else {
-        let problem = "it is missing: give the floor point below the camera in metres of the site, \
+        let problem = "it is missing: give the floor point below the camera in meters of the site, \
                        such as [4.0, 2.5]";
         return Err(FormatError::invalid("mount.position_m", problem));
     };
     if !position_m.iter().all(|value| value.abs() <= MAX_POSITION_M) {
         let [x, y] = position_m;
         let problem = format!(
-            "it is [{x}, {y}]: give numbers from -{MAX_POSITION_M} to {MAX_POSITION_M} metres"
+            "it is [{x}, {y}]: give numbers from -{MAX_POSITION_M} to {MAX_POSITION_M} meters"
         );
         return Err(FormatError::invalid("mount.position_m", problem));
     }

@@ -6,11 +6,11 @@ use crate::{
     warning::{Warning, WarningCode},
 };
 
-/// A lens centre farther than this from the frame's, as a share of the side, is rare.
+/// A lens center farther than this from the frame's, as a share of the side, is rare.
 const OFF_CENTRE: f64 = 0.1;
 /// Pixels are square to within this in nearly all cameras.
 const SQUARE_PIXELS: f64 = 0.05;
-/// A lens that sees no farther than this off its axis (radians) is no fisheye.
+/// A lens that sees no farther than this off its axis (radians) is not a fisheye.
 const NARROW: f64 = 1.0;
 /// Far enough from the axis to measure the scale there, radians.
 const NEAR_AXIS: f64 = 0.01;

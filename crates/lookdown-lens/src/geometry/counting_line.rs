@@ -24,7 +24,7 @@ pub struct CountingLine {
 pub enum LineEnds {
     /// Corner-origin frame pixels.
     Frame([Point2<f64>; 2]),
-    /// Metres, as in [`FloorPosition`].
+    /// Meters, as in [`FloorPosition`].
     Floor([Point2<f64>; 2]),
 }
 

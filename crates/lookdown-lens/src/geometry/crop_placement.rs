@@ -11,11 +11,11 @@ const WITHIN: f64 = 0.96;
 /// A crop also serves persons who fill between these multiples of the wanted share.
 const SERVED_FILL: RangeInclusive<f64> = 0.6..=1.6;
 /// A crop serves persons whose up is at most about 53° from its own (cosine): beyond 45°, so that
-/// neighbours on both sides of a diagonal may share a crop.
+/// neighbors on both sides of a diagonal may share a crop.
 const SERVED_COSINE: f64 = 0.6;
 /// The greatest enlargement, crop pixels per frame pixel: beyond it there is nothing to see.
 const MAX_SCALE: f64 = 3.0;
-/// Most neighbours that are considered for one crop; bounds the work.
+/// Most neighbors that are considered for one crop; bounds the work.
 const MAX_NEIGHBOURS: usize = 32;
 /// Boxes smaller than this, pixels, are taken to be of this size.
 const MIN_EXTENT: f64 = 1.0;
@@ -81,7 +81,7 @@ fn crop_around(first: &CropTarget, others: &[&CropTarget], fill: f64, side: u32)
     crop
 }
 
-/// The hull of `first` and of those neighbours that, within a square of side `reach`, have the
+/// The hull of `first` and of those neighbors that, within a square of side `reach`, have the
 /// greatest sum of scores. The square may be moved until the hull touches its left and upper
 /// sides, so that these need only be tried where boxes begin.
 fn best_hull(first: &CropTarget, neighbours: &[&CropTarget], reach: f64) -> Hull {

@@ -22,9 +22,9 @@ pub struct Bearing {
 /// a camera that looks straight down.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FloorPosition {
-    /// Metres toward image right.
+    /// Meters toward image right.
     pub x_m: f64,
-    /// Metres toward image down.
+    /// Meters toward image down.
     pub y_m: f64,
 }
 

@@ -37,7 +37,7 @@ pub enum BackProjection {
     /// azimuths (Seidel et al., section III-C).
     CornerHull,
     /// The hull of the inscribed ellipse whose major axis lies along the projected vertical at
-    /// the box centre: persons are upright ellipsoids far more than they are boxes.
+    /// the box center: persons are upright ellipsoids far more than they are boxes.
     TiltedEllipse,
 }
 
@@ -194,9 +194,9 @@ fn ray_through(point: Pixel, view: &VirtualView) -> Ray {
 /// An ellipse in the plane of a view, as rays (camera frame).
 struct Ellipse {
     center: Ray,
-    /// From the centre along the vertical to the outline.
+    /// From the center along the vertical to the outline.
     to_head: Ray,
-    /// From the centre to the right, across the vertical, to the outline.
+    /// From the center to the right, across the vertical, to the outline.
     to_right: Ray,
 }
 

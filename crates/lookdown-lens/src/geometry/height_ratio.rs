@@ -3,7 +3,7 @@
 //! For a camera that looks down from height `H`, a vertical person whose feet are seen at the angle
 //! `foot` from straight down and whose head at `head` stands `H tan(foot)` away and is
 //! `H (1 − tan(foot) / tan(head))` tall. The ratio to `H` needs no knowledge of `H`: people are a
-//! third to four fifths of it, pictures on a wall and lamps are not.
+//! third to four fifths of it, images on a wall and lamps are not.
 
 use super::{Mount, Ray};
 

@@ -1,9 +1,11 @@
 //! Lens models: the pixel that sees a ray, and the ray that a pixel sees.
 //!
-//! Three stages make every lens: the curve of its [`LensModel`] gives the radius in the normalised
+//! Three stages make every lens: the curve of its [`LensModel`] gives the radius in the normalized
 //! plane for the angle `theta` from the optical axis, `mei` then distorts that plane
 //! ([`RadialTangential`]), and an affine [`ImagePlane`] turns it into pixels. A ray or pixel
 //! outside the valid range is refused with `None`, never mapped to a made-up place.
+//!
+//! A model is a file in `models/` and a line of the list in `models.rs`.
 
 use std::f64::consts::PI;
 
@@ -92,7 +94,7 @@ impl Lens {
     }
 
     /// The ideal equidistant lens (`r = focal · theta`) whose image is the circle of `radius`
-    /// pixels around (`cx`, `cy`) (pixel centres), seeing up to `max_theta` radians off its axis.
+    /// pixels around (`cx`, `cy`) (pixel centers), seeing up to `max_theta` radians off its axis.
     ///
     /// # Errors
     /// [`LensError`] when a value is not finite or not positive.
@@ -117,13 +119,13 @@ impl Lens {
         self.max_theta
     }
 
-    /// The principal point: where the optical axis meets the image, pixel centres.
+    /// The principal point: where the optical axis meets the image, pixel centers.
     #[must_use]
     pub fn principal_point(&self) -> Pixel {
         Pixel::new(self.plane.cx, self.plane.cy)
     }
 
-    /// The pixel (pixel centres) that sees `ray` (camera frame, any length above 0), or `None`
+    /// The pixel (pixel centers) that sees `ray` (camera frame, any length above 0), or `None`
     /// beyond `max_theta`, exactly behind the camera, or for a ray that is not finite.
     #[must_use]
     pub fn project(&self, ray: &Ray) -> Option<Pixel> {
@@ -163,7 +165,7 @@ impl Lens {
         }
     }
 
-    /// The unit ray in the camera frame that `pixel` (pixel centres) sees, or `None` outside the
+    /// The unit ray in the camera frame that `pixel` (pixel centers) sees, or `None` outside the
     /// lens image.
     #[must_use]
     pub fn unproject(&self, pixel: &Pixel) -> Option<Ray> {
@@ -187,7 +189,7 @@ impl Lens {
             .then(|| Ray::new(sin * x / radius, sin * y / radius, cos))
     }
 
-    /// The affine map from the normalised plane to pixels.
+    /// The affine map from the normalized plane to pixels.
     #[must_use]
     pub fn image_plane(&self) -> &ImagePlane {
         &self.plane
@@ -200,7 +202,7 @@ impl Lens {
             .is_none_or(|distortion| distortion.is_radial())
     }
 
-    /// The same lens for a frame `scale_x`, `scale_y` times as large. Pixel centres move with
+    /// The same lens for a frame `scale_x`, `scale_y` times as large. Pixel centers move with
     /// their corners: the frame's edges stay its edges.
     #[must_use]
     pub fn scaled(&self, scale_x: f64, scale_y: f64) -> Self {

@@ -4,7 +4,7 @@ use nalgebra::{Rotation3, Unit, Vector3};
 
 use super::Ray;
 
-/// A camera tilted by no more than this from straight down gets a plan centred on the nadir.
+/// A camera tilted by no more than this from straight down gets a plan centered on the nadir.
 const NEAR_NADIR: f64 = 30.0 * std::f64::consts::PI / 180.0;
 
 /// The camera's orientation and height.
@@ -26,7 +26,7 @@ impl Default for Mount {
 
 impl Mount {
     /// A mount with the direction of up in the camera frame (a ceiling camera looking straight
-    /// down: `(0, 0, -1)`) and the height above the floor in metres, when known.
+    /// down: `(0, 0, -1)`) and the height above the floor in meters, when known.
     #[must_use]
     pub fn new(world_up: Unit<Vector3<f64>>, height_m: Option<f64>) -> Self {
         Self { world_up, height_m }
@@ -44,13 +44,13 @@ impl Mount {
         -*self.world_up
     }
 
-    /// Height of the camera above the floor, metres.
+    /// Height of the camera above the floor, meters.
     #[must_use]
     pub fn height_m(&self) -> Option<f64> {
         self.height_m
     }
 
-    /// Returns true when the camera looks down to within 30°: view plans are then centred on the
+    /// Returns true when the camera looks down to within 30°: view plans are then centered on the
     /// nadir.
     #[must_use]
     pub fn is_near_nadir(&self) -> bool {
@@ -68,7 +68,7 @@ impl Mount {
         }
     }
 
-    /// The levelled camera frame: z straight down, x and y as image right and image down would be
+    /// The leveled camera frame: z straight down, x and y as image right and image down would be
     /// if the camera were turned to look straight down by the smallest rotation.
     #[must_use]
     pub fn camera_from_floor(&self) -> Rotation3<f64> {

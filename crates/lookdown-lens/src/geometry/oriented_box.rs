@@ -13,7 +13,7 @@ const VERTICAL_STEP: f64 = 1e-4;
 /// A rectangle in the frame, turned so that its height axis is the projected vertical.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OrientedBox {
-    /// Centre, corner-origin frame pixels.
+    /// Center, corner-origin frame pixels.
     pub center: Pixel,
     /// Extent across the height axis, pixels.
     pub width: f64,

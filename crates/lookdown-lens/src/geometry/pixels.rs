@@ -1,9 +1,9 @@
-//! The one place where pixel-centre coordinates (lens functions, tables) and corner-origin
+//! The one place where pixel-center coordinates (lens functions, tables) and corner-origin
 //! coordinates (boxes) meet.
 
 use super::Pixel;
 
-/// Half a pixel: the centre of pixel `i` lies at `i` for a lens and at `i + 0.5` for a box.
+/// Half a pixel: the center of pixel `i` lies at `i` for a lens and at `i + 0.5` for a box.
 const HALF_PIXEL: f64 = 0.5;
 
 /// The two conventions for where pixel `i` lies.
@@ -11,7 +11,7 @@ const HALF_PIXEL: f64 = 0.5;
 pub enum PixelConvention {
     /// Pixel `i` covers `[i, i + 1)`: boxes in reports, data sets and files.
     CornerOrigin,
-    /// The centre of pixel `i` is at `i`: `project`, `cx`, `cy`, remap tables.
+    /// The center of pixel `i` is at `i`: `project`, `cx`, `cy`, remap tables.
     PixelCentre,
 }
 

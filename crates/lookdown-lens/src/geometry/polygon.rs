@@ -36,7 +36,7 @@ pub enum PolygonError {
         /// Its second one.
         y: f64,
     },
-    /// Two neighbouring corners in one place.
+    /// Two neighboring corners in one place.
     #[error(
         "corners {0} and {1} are the same: leave one out (the last corner is joined to the first \
          by itself)"

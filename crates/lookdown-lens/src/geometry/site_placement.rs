@@ -5,7 +5,7 @@
 pub struct SitePlacement {
     /// The name of the site.
     pub site: String,
-    /// The floor point below the camera, in metres of the site (x, y).
+    /// The floor point below the camera, in meters of the site (x, y).
     pub position_m: [f64; 2],
     /// The angle from the x axis of the site to the x axis of the camera's floor, in degrees. It
     /// grows from x to y, so clockwise where y points down.

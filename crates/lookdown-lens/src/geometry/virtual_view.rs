@@ -1,10 +1,10 @@
-//! Virtual views: pinhole cameras that share the fisheye camera's centre.
+//! Virtual views: pinhole cameras that share the fisheye camera's center.
 
 use nalgebra::{Matrix3, Rotation3, Vector2, Vector3};
 
 use super::{Mount, Pixel, Ray};
 
-/// The direction of a view, relative to the axis its plan is centred on.
+/// The direction of a view, relative to the axis its plan is centered on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ViewDirection {
     /// Angle from the plan's axis, radians. Positive tilts toward image up, then `azimuth` spins.
@@ -32,7 +32,7 @@ const TURN_TOLERANCE: f64 = 1e-12;
 impl VirtualView {
     /// Places a view. `camera_from_view = camera_from_plan · Rz(azimuth) · Rx(elevation)`, so that
     /// with a camera that looks straight down, image up in the view points outward and up: people
-    /// stand upright. Under any mount that the plan is not centred on, the view is rolled until
+    /// stand upright. Under any mount that the plan is not centered on, the view is rolled until
     /// the projected `world_up` points up.
     #[must_use]
     pub fn new(direction: &ViewDirection, mount: &Mount, width: u32, height: u32) -> Self {
@@ -113,13 +113,13 @@ impl VirtualView {
         })
     }
 
-    /// The ray (camera frame, not of unit length) through a view pixel (pixel centres).
+    /// The ray (camera frame, not of unit length) through a view pixel (pixel centers).
     #[must_use]
     pub fn ray_in_camera(&self, pixel: &Pixel) -> Ray {
         self.camera_from_view * self.ray_in_view(pixel)
     }
 
-    /// The ray (view frame, z = 1) through a view pixel (pixel centres).
+    /// The ray (view frame, z = 1) through a view pixel (pixel centers).
     #[must_use]
     pub fn ray_in_view(&self, pixel: &Pixel) -> Ray {
         let principal = self.principal_point();
@@ -130,7 +130,7 @@ impl VirtualView {
         )
     }
 
-    /// Returns the point at which a ray (camera frame) meets the view (pixel centres), also beyond
+    /// Returns the point at which a ray (camera frame) meets the view (pixel centers), also beyond
     /// its borders; `None` for rays that point away from it.
     #[must_use]
     pub fn project(&self, ray_in_camera: &Ray) -> Option<Pixel> {
@@ -168,7 +168,7 @@ impl VirtualView {
     }
 
     /// The direction (unit length, view pixels) in which a vertical pole seen at `pixel` (pixel
-    /// centres) rises; `None` where the view looks along the vertical.
+    /// centers) rises; `None` where the view looks along the vertical.
     #[must_use]
     pub fn vertical_at(&self, pixel: &Pixel, mount: &Mount) -> Option<Vector2<f64>> {
         let up = self
@@ -180,7 +180,7 @@ impl VirtualView {
         direction.try_normalize(f64::EPSILON)
     }
 
-    /// Returns the point at which the axis meets the view: its middle, pixel centres.
+    /// Returns the point at which the axis meets the view: its middle, pixel centers.
     #[must_use]
     pub fn principal_point(&self) -> Pixel {
         Pixel::new(

@@ -22,7 +22,7 @@ pub struct Zone {
 pub enum ZoneArea {
     /// Corner-origin frame pixels.
     Frame(Polygon),
-    /// Metres, as in [`FloorPosition`].
+    /// Meters, as in [`FloorPosition`].
     Floor(Polygon),
 }
 

@@ -106,7 +106,7 @@ impl RoomFit {
         if edges < MIN_CURVES {
             return Err(FitRefusal::TooFewEdges { edges });
         }
-        // Frames of one camera show the same edges, so they are no independent evidence.
+        // Frames of one camera show the same edges, so they are not independent evidence.
         #[expect(clippy::cast_precision_loss, reason = "a few frames")]
         let weight = 1.0 / frames.len() as f64;
         let mut best: Option<(Vec<Maximum>, Prior)> = None;

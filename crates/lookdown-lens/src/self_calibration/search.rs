@@ -99,7 +99,7 @@ fn cone() -> Vec<Ray> {
     rays
 }
 
-/// The planes of the curves, weighted by length; a curve that is no straight line has no weight.
+/// The planes of the curves, weighted by length; a curve that is not a straight line has no weight.
 fn planes(curves: &[EdgeCurve], camera: &RoomCamera, angles: &Angles) -> Vec<Plane> {
     let plane = |curve: &EdgeCurve| {
         let first = angles.ray(camera, *curve.points.first()?).ray;

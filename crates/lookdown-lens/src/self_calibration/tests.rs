@@ -19,7 +19,7 @@ fn pixel(ray: &Ray) -> [f64; 2] {
     ]
 }
 
-/// Edges of a room of 6 by 5 by 2.8 metres seen by a tilted camera below its ceiling.
+/// Edges of a room of 6 by 5 by 2.8 meters seen by a tilted camera below its ceiling.
 fn edges(camera_from_room: &Rotation3<f64>) -> Vec<EdgeCurve> {
     let mut edges = Vec::new();
     let mut add = |from: [f64; 3], to: [f64; 3]| {

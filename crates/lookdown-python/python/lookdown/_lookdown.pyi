@@ -9,7 +9,7 @@ class LookdownError(ValueError):
     """A value, file or frame that cannot be used. The text names it and the remedy."""
 
 class Lens:
-    """A fisheye lens. The centre of the top-left pixel is (0, 0); rays are in the camera frame of OpenCV."""
+    """A fisheye lens. The center of the top-left pixel is (0, 0); rays are in the camera frame of OpenCV."""
 
     @property
     def model(self) -> str:
@@ -42,7 +42,7 @@ class Calibration:
         """Width and height of the frames, pixels."""
     @property
     def height_m(self) -> float | None:
-        """Height of the camera above the floor, metres, if the file has it."""
+        """Height of the camera above the floor, meters, if the file has it."""
     @property
     def lens(self) -> Lens:
         """The lens, in pixels of frames of `image_size`."""

@@ -22,13 +22,13 @@ class Detections:
     boxes: Floats
     """(N, 4): x_min, y_min, x_max, y_max, pixels."""
     oriented_boxes: Floats
-    """(N, 5): centre x, centre y, width, height in pixels, and the clockwise angle in degrees."""
+    """(N, 5): center x, center y, width, height in pixels, and the clockwise angle in degrees."""
     scores: Floats
     """(N,): 0 to 1; with fusion, the probability that it is a person."""
     bearings: Floats
     """(N, 2): azimuth and angle from the optical axis, degrees. NaN if unknown."""
     floor: Floats
-    """(N, 2): position on the floor, metres. NaN without the height of the camera."""
+    """(N, 2): position on the floor, meters. NaN without the height of the camera."""
     report: dict[str, Any]
     """The whole report, as the server sends it."""
 

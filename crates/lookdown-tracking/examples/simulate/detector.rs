@@ -18,7 +18,7 @@ use crate::{
 
 /// Side of the frame, pixels.
 pub const FRAME_PX: f64 = 1280.0;
-/// Radius of a person, metres.
+/// Radius of a person, meters.
 const BODY_RADIUS_M: f64 = 0.25;
 /// Time over which scores and places stay wrong, seconds, and the share of the variance that does.
 const CORRELATION_S: f64 = 1.0;

@@ -8,19 +8,19 @@ use crate::chance::Chance;
 pub const STEP_S: f64 = 0.02;
 /// Time in which a person adopts a new velocity, seconds.
 const RELAXATION_S: f64 = 0.5;
-/// Persons nearer than this walk apart, metres.
+/// Persons nearer than this walk apart, meters.
 const PERSONAL_M: f64 = 1.0;
-/// Acceleration apart at no distance, metres per square second.
+/// Acceleration apart at no distance, meters per square second.
 const REPULSION: f64 = 8.0;
 /// Share of that acceleration that turns both to their right, so that they pass each other.
 const DODGE: f64 = 0.5;
-/// Least distance of the axes of two bodies, metres.
+/// Least distance of the axes of two bodies, meters.
 const BODY_M: f64 = 0.5;
 /// Share of waypoints at which a person stops, and the longest stop in seconds.
 const PAUSES: f64 = 0.3;
 const LONGEST_PAUSE_S: f64 = 8.0;
 
-/// The walls of the hall, metres: half the extent along x and y.
+/// The walls of the hall, meters: half the extent along x and y.
 #[derive(Clone, Copy)]
 pub struct Hall(pub Vector2<f64>);
 

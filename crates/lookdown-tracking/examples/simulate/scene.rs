@@ -19,11 +19,11 @@ use crate::{
     people::{Hall, People, STEP_S},
 };
 
-/// Height of the cameras above the floor, metres.
+/// Height of the cameras above the floor, meters.
 const CAMERA_M: f64 = 3.0;
-/// Persons farther from a camera than this are out of its sight, metres: 74° off the axis.
+/// Persons farther from a camera than this are out of its sight, meters: 74° off the axis.
 const SIGHT_M: f64 = 3.5 * CAMERA_M;
-/// Place of the counting line on the x axis, metres.
+/// Place of the counting line on the x axis, meters.
 const LINE_X_M: f64 = 0.8;
 /// Tracks count as present for this long after their last person, seconds.
 const PRESENT_S: f64 = 1.0;

@@ -18,7 +18,7 @@ class Lens:
         self.max_theta = lens["max_theta"]
 
     def project(self, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Frame pixels (pixel centres) of rays `[..., 3]` in the camera frame, and which of them the lens sees."""
+        """Frame pixels (pixel centers) of rays `[..., 3]` in the camera frame, and which of them the lens sees."""
         across = np.hypot(rays[..., 0], rays[..., 1])
         theta = np.arctan2(across, rays[..., 2])
         scale = self.focal * theta / np.maximum(across, 1e-12)
@@ -41,7 +41,7 @@ class View:
         self.maps = cv2.convertMaps(pixels[..., 0].astype(np.float32), pixels[..., 1].astype(np.float32), cv2.CV_16SC2)
 
     def rays(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Rays in the camera frame through view pixels (pixel centres)."""
+        """Rays in the camera frame through view pixels (pixel centers)."""
         rays = np.stack([(x - self.middle) / self.focal, (y - self.middle) / self.focal, np.ones(np.shape(x))], axis=-1)
         return rays @ self.rotation.T
 

@@ -1,7 +1,7 @@
 """An ONNX model for MLServer that takes images as bytes and returns the boxes above a threshold.
 
-The server's REST protocol has JSON only, so the pictures come in base64: one tensor of bytes `[n, 3, size, size]`.
-Settings: MODEL (file), THREADS (of one run of the network), BATCH (pictures in a run).
+The server's REST protocol has JSON only, so the images come in base64: one tensor of bytes `[n, 3, size, size]`.
+Settings: MODEL (file), THREADS (of one run of the network), BATCH (images in a run).
 """
 
 import os

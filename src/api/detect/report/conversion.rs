@@ -66,7 +66,7 @@ impl From<&DetectionReport> for Report {
 }
 
 impl From<LensCircle> for ReportCircle {
-    /// Converts pixel centres to the corner-origin pixels of reports.
+    /// Converts pixel centers to the corner-origin pixels of reports.
     fn from(circle: LensCircle) -> Self {
         Self {
             cx: pixels(circle.cx + 0.5),

@@ -89,7 +89,7 @@ pub(in crate::api) struct ViewInfo {
     size: [u32; 2],
     /// Focal length, pixels.
     focal: f64,
-    /// Principal point, in pixels with integer coordinates at pixel centres.
+    /// Principal point, in pixels with integer coordinates at pixel centers.
     principal_point: [f64; 2],
     /// Border of the view in the frame, clockwise from its top left corner, corner-origin pixels.
     /// Points beyond the lens image are moved to its rim.
@@ -182,7 +182,7 @@ pub(in crate::api) async fn try_views(
     answered(&state, deadline, &caller, plan).await
 }
 
-/// Returns a view plan as JSON. A plan may have megabytes, so it is built and serialised under a
+/// Returns a view plan as JSON. A plan may have megabytes, so it is built and serialized under a
 /// permit of the frame queue.
 async fn answered(
     state: &ApiState,

@@ -102,7 +102,7 @@ pub(super) fn to(
 fn unknown(url: &Url) -> String {
     let scheme = url.scheme();
     format!(
-        "{scheme}:// is no bucket's address: give s3://BUCKET/PREFIX, gs://BUCKET/PREFIX, \
+        "{scheme}:// is not a bucket's address: give s3://BUCKET/PREFIX, gs://BUCKET/PREFIX, \
          az://CONTAINER/PREFIX, the https:// address of a bucket of these providers, or a folder"
     )
 }

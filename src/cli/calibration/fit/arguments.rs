@@ -30,7 +30,7 @@ pub(in crate::cli) struct Arguments {
     #[arg(long, value_name = "DEGREES", value_parser = field_of_view)]
     pub(super) field_of_view: Option<f64>,
     /// Height of the camera above the floor: enables floor positions of persons
-    #[arg(long, value_name = "METRES", value_parser = height)]
+    #[arg(long, value_name = "METERS", value_parser = height)]
     pub(super) height: Option<f64>,
     /// Find the height of the camera from the people in the frames
     #[arg(long, conflicts_with = "height")]
@@ -96,5 +96,5 @@ fn height(text: &str) -> Result<f64, &'static str> {
     let metres = text.parse().ok();
     metres
         .filter(|metres| *metres > 0.0 && *metres <= 100.0)
-        .ok_or("give metres above 0, at most 100")
+        .ok_or("give meters above 0, at most 100")
 }

@@ -129,7 +129,7 @@ fn verdict(arguments: &Arguments, agreed: &AgreedCircle) -> String {
         ),
     };
     format!(
-        "circle: centre {:.1}, {:.1}, radius {:.1} pixels, {how_sure}; the lens ({}) and the field \
+        "circle: center {:.1}, {:.1}, radius {:.1} pixels, {how_sure}; the lens ({}) and the field \
          of view of {}° were not measured, and the camera is assumed to look straight \
          down; check it with `lookdown calibration check FILE --preview FRAME --out P.jpg`",
         circle.cx + 0.5,

@@ -33,7 +33,7 @@ fn each_new_crossing_is_an_event() {
     });
     assert_eq!(found.len(), 2);
     assert!(found.iter().all(|event| event.body == body), "{found:?}");
-    // The totals of the store are no events.
+    // The totals of the store are not events.
     assert!(events(&Snapshot::default(), &snapshot(14, Some(1))).is_empty());
     assert_eq!(
         events(&snapshot(0, None), &snapshot(u64::MAX, None)).len(),

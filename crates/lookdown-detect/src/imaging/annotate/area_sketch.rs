@@ -127,7 +127,7 @@ pub fn sketch_lines(frame: &mut Frame, lines: &[CountingLine], lens: &Lens, moun
     sketch_outlines(frame, &outlines, LINE);
 }
 
-/// Draws outlines with their names in a colour.
+/// Draws outlines with their names in a color.
 fn sketch_outlines(frame: &mut Frame, outlines: &[ZoneOutline], colour: Rgb) {
     let width = line_width(frame);
     for outline in outlines {
@@ -167,7 +167,7 @@ mod tests {
         assert_eq!(frame.pixel(30, 30), [0; 3]);
         assert_ne!(frame.pixel(10, 30), [0; 3]);
         assert_ne!(frame.pixel(120, 135), [90; 3]);
-        // A metre to the left of the camera and 3 m below it, on an equidistant lens.
+        // A meter to the left of the camera and 3 m below it, on an equidistant lens.
         let left = 100.0 - 100.0 / 1.5 * (1.0_f64 / 3.0).atan();
         #[expect(
             clippy::cast_possible_truncation,

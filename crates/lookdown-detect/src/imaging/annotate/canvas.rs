@@ -1,14 +1,14 @@
-//! Anti-aliased shapes. The coverage of a pixel follows from the distance of its centre to the
+//! Anti-aliased shapes. The coverage of a pixel follows from the distance of its center to the
 //! shape.
 
 use std::ops::Range;
 
 use crate::imaging::frame::Frame;
 
-/// A colour, 8 bits a channel.
+/// A color, 8 bits a channel.
 pub(super) type Rgb = [u8; 3];
 
-/// Mixes a colour into one pixel. `opacity` ranges from 0 to 1.
+/// Mixes a color into one pixel. `opacity` ranges from 0 to 1.
 pub(super) fn blend(frame: &mut Frame, x: u32, y: u32, colour: Rgb, opacity: f64) {
     let start = 3 * (y as usize * frame.width() as usize + x as usize);
     let Some(pixel) = frame.pixels_mut().get_mut(start..start + 3) else {
@@ -28,7 +28,7 @@ pub(super) fn blend(frame: &mut Frame, x: u32, y: u32, colour: Rgb, opacity: f64
     }
 }
 
-/// Pixels whose centres lie between two coordinates, clipped to `0..length`.
+/// Pixels whose centers lie between two coordinates, clipped to `0..length`.
 pub(super) fn pixels(from: f64, to: f64, length: u32) -> Range<u32> {
     // `as` saturates, which clips. NaN becomes 0.
     #[expect(

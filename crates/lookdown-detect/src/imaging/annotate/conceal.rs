@@ -1,5 +1,5 @@
-//! Conceals persons in a frame: each pixel of the boxes along them is replaced by the mean colour
-//! of its surroundings or by one colour.
+//! Conceals persons in a frame: each pixel of the boxes along them is replaced by the mean color
+//! of its surroundings or by one color.
 //!
 //! Concealing is not limited by the budget of drawings, because a person must not stay visible in a
 //! crowded frame. Its work is one read of the frame, and one write of each concealed pixel.
@@ -16,16 +16,16 @@ use crate::imaging::frame::Frame;
 /// The replacement of concealed pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Concealment {
-    /// The mean colour of areas as large as a person is wide.
+    /// The mean color of areas as large as a person is wide.
     Blur,
-    /// One colour.
+    /// One color.
     Silhouette,
 }
 
 const SILHOUETTE: Rgb = [96, 96, 96];
 /// Concealed area, as a multiple of the sides of the box: boxes may cut off feet and hands.
 const MARGIN: f64 = 1.3;
-/// Smallest side of the areas of mean colour, pixels.
+/// Smallest side of the areas of mean color, pixels.
 const MIN_BLOCK: u32 = 16;
 /// Rows between two cancellation checks.
 const ROWS_PER_CHECK: u32 = 64;
@@ -154,7 +154,7 @@ fn bounds<const N: usize>(values: [f64; N]) -> [f64; 2] {
     ]
 }
 
-/// The mean colours of square blocks of a frame.
+/// The mean colors of square blocks of a frame.
 struct BlockMeans {
     side: u32,
     columns: u32,
@@ -194,7 +194,7 @@ impl BlockMeans {
         }
     }
 
-    /// The colour at a pixel, between those of the four nearest blocks.
+    /// The color at a pixel, between those of the four nearest blocks.
     fn at(&self, x: u32, y: u32) -> Rgb {
         let (column, across) = self.position(x, self.columns);
         let (row, down) = self.position(y, self.rows);
@@ -217,7 +217,7 @@ impl BlockMeans {
         mix(above, below, down, self.side)
     }
 
-    /// The block whose centre is before a position, and the distance from that centre.
+    /// The block whose center is before a position, and the distance from that center.
     fn position(&self, at: u32, count: u32) -> (u32, u32) {
         let half = self.side / 2;
         if at < half {
@@ -232,7 +232,7 @@ impl BlockMeans {
     }
 }
 
-/// The colour `part` of `whole` on the way from one to the other.
+/// The color `part` of `whole` on the way from one to the other.
 fn mix(from: Rgb, to: Rgb, part: u32, whole: u32) -> Rgb {
     std::array::from_fn(|channel| {
         let sum = u32::from(from[channel]) * (whole - part) + u32::from(to[channel]) * part;
@@ -245,7 +245,7 @@ mod tests {
     use super::*;
     use crate::imaging::annotate::OrientedMark;
 
-    /// Columns of two colours, which no mean has.
+    /// Columns of two colors, which no mean has.
     fn stripes(side: u32) -> Frame {
         let pixels = (0..side * side).flat_map(|index| [if index % 2 == 0 { 0 } else { 255 }; 3]);
         Frame::new(side, side, pixels.collect()).unwrap()

@@ -32,7 +32,7 @@ impl EncodeError {
     }
 }
 
-/// Encodes the frame as JPEG with colours at half resolution. `quality` is clamped to 1 to 100.
+/// Encodes the frame as JPEG with colors at half resolution. `quality` is clamped to 1 to 100.
 ///
 /// # Errors
 /// Returns an error if a side is longer than the 65535 pixels that JPEG can hold.

@@ -79,7 +79,7 @@ fn circle(theta: f64) -> impl Iterator<Item = Ray> {
         .map(move |step| ray(theta, TAU * f64::from(step) / f64::from(CIRCLE_POINTS)))
 }
 
-/// Draws a line through points (pixel centres), interrupted where a point is outside the lens
+/// Draws a line through points (pixel centers), interrupted where a point is outside the lens
 /// image.
 fn draw(frame: &mut Frame, points: impl Iterator<Item = Option<Pixel>>, colour: Rgb, width: f64) {
     let mut previous = None;
@@ -113,7 +113,7 @@ mod tests {
         let lens = Lens::equidistant_circle(99.5, 99.5, 80.0, 1.5).expect("a plausible lens");
         let mut frame = frame();
         sketch_lens(&mut frame, &lens, &[]);
-        // Corner-origin (180, 100) lies at pixel centre (179.5, 99.5).
+        // Corner-origin (180, 100) lies at pixel center (179.5, 99.5).
         let [red, ..] = colour_at(&frame, 179, 103);
         assert!(red > 100, "{:?}", colour_at(&frame, 179, 103));
         assert_eq!(colour_at(&frame, 190, 60), [0, 0, 0]);

@@ -21,9 +21,9 @@ pub struct Mark {
 /// A rotated box.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct OrientedMark {
-    /// Column of the centre.
+    /// Column of the center.
     pub cx: f64,
-    /// Row of the centre.
+    /// Row of the center.
     pub cy: f64,
     /// Extent across the height axis, in pixels.
     pub width: f64,
@@ -36,9 +36,9 @@ pub struct OrientedMark {
 /// A circle around a head.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Head {
-    /// Column of the centre.
+    /// Column of the center.
     pub cx: f64,
-    /// Row of the centre.
+    /// Row of the center.
     pub cy: f64,
     /// Radius in pixels.
     pub radius: f64,

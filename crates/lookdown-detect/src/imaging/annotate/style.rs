@@ -1,4 +1,4 @@
-//! Sizes, colours and limits of everything that is drawn.
+//! Sizes, colors and limits of everything that is drawn.
 
 use super::canvas::Rgb;
 use crate::imaging::frame::Frame;

@@ -1,7 +1,7 @@
 //! Checks of an image's container structure before any pixel is decoded.
 //!
 //! The decoders are too lenient for a service. The JPEG decoder fills the missing rows of a
-//! truncated file with grey. The PNG decoder reports the size only when it reaches the pixels. The
+//! truncated file with gray. The PNG decoder reports the size only when it reaches the pixels. The
 //! WebP decoder allocates memory for an inner frame before it compares that frame with the canvas.
 //! The functions here close those gaps. They only skip over lengths and never read outside the
 //! bytes.

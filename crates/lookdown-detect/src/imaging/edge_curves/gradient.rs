@@ -20,7 +20,7 @@ pub(super) struct Gradient {
     pub along_x: Vec<f32>,
     pub along_y: Vec<f32>,
     pub size: Vec<f32>,
-    /// Smaller gradients are no edges.
+    /// Smaller gradients are not edges.
     pub threshold: f32,
 }
 

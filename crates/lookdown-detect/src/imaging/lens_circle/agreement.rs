@@ -8,9 +8,9 @@ pub struct AgreedCircle {
     /// The median of the frames' circles, coordinate by coordinate. A single frame that is too dark
     /// or too crowded does not change it.
     pub circle: LensCircle,
-    /// Number of frames whose centre and radius lie within half a percent of the radius from it.
+    /// Number of frames whose center and radius lie within half a percent of the radius from it.
     pub agreeing: usize,
-    /// The greatest distance of an agreeing frame's centre or radius from it, in pixels.
+    /// The greatest distance of an agreeing frame's center or radius from it, in pixels.
     pub spread: f64,
 }
 

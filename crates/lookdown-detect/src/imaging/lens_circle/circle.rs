@@ -1,11 +1,11 @@
 //! The edge of the lens image.
 
-/// The edge of the lens image in pixel centres: the centre of the top-left pixel is (0, 0).
+/// The edge of the lens image in pixel centers: the center of the top-left pixel is (0, 0).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LensCircle {
-    /// Column of the centre, in pixels.
+    /// Column of the center, in pixels.
     pub cx: f64,
-    /// Row of the centre, in pixels.
+    /// Row of the center, in pixels.
     pub cy: f64,
     /// Radius in pixels. The circle may extend beyond the frame.
     pub radius: f64,

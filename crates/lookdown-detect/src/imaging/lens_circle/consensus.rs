@@ -60,7 +60,7 @@ fn draw(state: &mut u64, points: &[[f64; 2]]) -> Option<[f64; 2]> {
 
 /// The circle through three points, or `None` when they are nearly collinear.
 ///
-/// Its centre has the same distance from all three points, which gives two linear equations, solved
+/// Its center has the same distance from all three points, which gives two linear equations, solved
 /// by Cramer's rule.
 fn through(first: [f64; 2], second: [f64; 2], third: [f64; 2]) -> Option<LensCircle> {
     let [u, v] = [second[0] - first[0], second[1] - first[1]];

@@ -7,7 +7,7 @@ use crate::imaging::frame::Frame;
 /// circle almost evenly.
 const LINES: u32 = 160;
 
-/// One point per scan line and side, in pixel centres, precise to about a pixel. Lines that start
+/// One point per scan line and side, in pixel centers, precise to about a pixel. Lines that start
 /// inside the lens image, because the circle is cut off there, give no point.
 pub(super) fn points(frame: &Frame, surround: &Surround) -> Vec<[f64; 2]> {
     let (width, height) = (frame.width(), frame.height());
@@ -34,7 +34,7 @@ pub(super) fn points(frame: &Frame, surround: &Surround) -> Vec<[f64; 2]> {
     points
 }
 
-/// The pixel in the centre of one of [`LINES`] equal slices of a side.
+/// The pixel in the center of one of [`LINES`] equal slices of a side.
 fn middle_of_slice(line: u32, side: u32) -> u32 {
     let middle = u64::from(2 * line + 1) * u64::from(side) / u64::from(2 * LINES);
     u32::try_from(middle).unwrap_or(side - 1)

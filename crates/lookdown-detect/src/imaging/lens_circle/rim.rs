@@ -18,13 +18,13 @@ const LIT_RUN: usize = 3;
 
 /// Intersection of one ray with the rim.
 pub(super) struct RimPoint {
-    /// Direction of the ray from the centre of the searched circle, in radians.
+    /// Direction of the ray from the center of the searched circle, in radians.
     pub angle: f64,
-    /// The rim in pixel centres.
+    /// The rim in pixel centers.
     pub at: [f64; 2],
 }
 
-/// Brightness at a distance from the centre.
+/// Brightness at a distance from the center.
 #[derive(Clone, Copy)]
 struct Sample {
     radius: f64,

@@ -35,7 +35,7 @@ impl Surround {
     /// cover the others. Returns `None` when even that corner is too bright to be a surround.
     ///
     /// `min_contrast` (0 to 1) is the least contrast between lens image and surround, relative to
-    /// the brightness of the frame's centre.
+    /// the brightness of the frame's center.
     pub(super) fn of(frame: &Frame, min_contrast: f64) -> Option<Self> {
         let (width, height) = (frame.width(), frame.height());
         let margin = margin(frame);

@@ -59,9 +59,9 @@ fn render_with_avx2(source: &Source, band: &Band, planes: Planes) {
 
 /// Sampling positions and weights of eight pixels.
 struct Samples {
-    /// Index of the first byte of each upper left neighbour.
+    /// Index of the first byte of each upper left neighbor.
     first_bytes: [u32; LANES],
-    /// As 16-bit numbers, the weights of left and right neighbours.
+    /// As 16-bit numbers, the weights of left and right neighbors.
     weights: __m256i,
     lower_weight: __m256,
     /// All bits set where something is seen.
@@ -134,7 +134,7 @@ impl Samples {
     }
 }
 
-/// Along one axis, of two neighbours each the lower one (the left or upper one in the frame), and the
+/// Along one axis, of two neighbors each the lower one (the left or upper one in the frame), and the
 /// weight of the other.
 struct Neighbours {
     lower: __m256i,
@@ -186,7 +186,7 @@ fn positions(start: f32, step: f32) -> __m256 {
     _mm256_add_ps(_mm256_set1_ps(start), steps)
 }
 
-/// As `scalar::split`: neighbours, and whether that is within.
+/// As `scalar::split`: neighbors, and whether that is within.
 #[target_feature(enable = "avx2")]
 fn split(start: f32, step: f32, count: usize) -> (Neighbours, __m256) {
     let position = positions(start, step);

@@ -36,12 +36,12 @@ impl FrameFromPlane {
         }
     }
 
-    /// The frame's pixel (pixel centres) at a place of the plane.
+    /// The frame's pixel (pixel centers) at a place of the plane.
     pub(super) fn pixel_at(&self, [x, y]: [f32; 2]) -> [f32; 2] {
         self.pixels_at(&[x], &[y]).map(|[coordinate]| coordinate)
     }
 
-    /// Columns and rows of the frame's pixels (pixel centres) at some places of the plane.
+    /// Columns and rows of the frame's pixels (pixel centers) at some places of the plane.
     #[expect(
         clippy::inline_always,
         reason = "this becomes vector code only within a function that may use it"

@@ -2,11 +2,11 @@
 
 use super::rendering::Source;
 
-/// The bytes of two neighbouring pixels, and two more.
+/// The bytes of two neighboring pixels, and two more.
 pub(super) const PAIR_BYTES: usize = 8;
 
 /// The frame seen from two places. Eight bytes from the first one's start are a pixel and its right
-/// neighbour and two more bytes; eight from the second one's are two bytes and then the pixels
+/// neighbor and two more bytes; eight from the second one's are two bytes and then the pixels
 /// below these. So no read reaches beyond the frame: at its last pixels both end with a line.
 pub(super) struct FrameLines<'a> {
     pub(super) upper: &'a [u8],

@@ -63,7 +63,7 @@ fn render_with_neon(source: &Source, band: &Band, planes: Planes) {
 
 /// Sampling positions and weights of four pixels.
 struct Samples {
-    /// Index of the first byte of each upper left neighbour.
+    /// Index of the first byte of each upper left neighbor.
     first_bytes: [u32; QUARTET],
     left_weight: uint32x4_t,
     right_weight: uint32x4_t,
@@ -130,7 +130,7 @@ impl Samples {
     }
 }
 
-/// Along one axis, of two neighbours each the lower one (the left or upper one in the frame), and the
+/// Along one axis, of two neighbors each the lower one (the left or upper one in the frame), and the
 /// weight of the other.
 struct Neighbours {
     lower: int32x4_t,
@@ -154,7 +154,7 @@ fn positions(start: f32, step: f32, first_lane: usize) -> float32x4_t {
     vaddq_f32(vdupq_n_f32(start), vmulq_f32(vdupq_n_f32(step), lanes))
 }
 
-/// As `scalar::split`: neighbours, and whether that is within.
+/// As `scalar::split`: neighbors, and whether that is within.
 #[target_feature(enable = "neon")]
 fn split(position: float32x4_t, count: usize) -> (Neighbours, uint32x4_t) {
     let (first, last) = (vdupq_n_f32(0.0), vcvtq_f32_s32(whole(count - 1)));

@@ -1,4 +1,4 @@
-//! Node grids: where a view samples, at every eighth pixel: in the lens's normalised plane, or, of a
+//! Node grids: where a view samples, at every eighth pixel: in the lens's normalized plane, or, of a
 //! frame crop, in the frame.
 
 use lookdown_lens::geometry::{
@@ -9,7 +9,7 @@ use lookdown_lens::geometry::{
 use super::{block_size::NODE_STEP, visibility::Visibility};
 
 /// One view's nodes. Patches of 8×8 pixels lie between them, the last ones beyond the view's right
-/// and lower border where its sides are no multiples of 8.
+/// and lower border where its sides are not multiples of 8.
 #[derive(Debug)]
 pub(super) struct NodeGrid {
     /// Row by row.
@@ -19,7 +19,7 @@ pub(super) struct NodeGrid {
     visibility: Visibility,
 }
 
-/// A row of nodes: places in the normalised plane, coordinate by coordinate.
+/// A row of nodes: places in the normalized plane, coordinate by coordinate.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Nodes<'a> {
     pub(super) x: &'a [f32],
@@ -36,7 +36,7 @@ impl NodeGrid {
         })
     }
 
-    /// The nodes of a crop, in pixels of the frame (pixel centres).
+    /// The nodes of a crop, in pixels of the frame (pixel centers).
     pub(super) fn of_crop(crop: &FrameCrop) -> Self {
         let size = [crop.width, crop.height];
         Self::of_positions(size, Visibility::everywhere(size), |pixel| {

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::imaging::{Frame, NetworkInput};
 
-/// Weights of right neighbours are whole fractions of this: with pixels of eight bits, a product
+/// Weights of right neighbors are whole fractions of this: with pixels of eight bits, a product
 /// of 16-bit numbers loses nothing.
 pub(super) const WEIGHT_ONE: i16 = 1 << 14;
 

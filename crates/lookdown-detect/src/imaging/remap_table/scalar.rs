@@ -6,14 +6,14 @@ use super::{
     rendering::{Planes, Source, Values, WEIGHT_ONE, render_band},
 };
 
-/// Four neighbours of a position in the frame and their weights.
+/// Four neighbors of a position in the frame and their weights.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Sample {
-    /// The upper left neighbour's index, row by row.
+    /// The upper left neighbor's index, row by row.
     first_pixel: usize,
-    /// Weight of the right neighbours, as a part of [`WEIGHT_ONE`].
+    /// Weight of the right neighbors, as a part of [`WEIGHT_ONE`].
     right_weight: i32,
-    /// Weight of the lower neighbours, 0 to 1.
+    /// Weight of the lower neighbors, 0 to 1.
     lower_weight: f32,
 }
 
@@ -45,7 +45,7 @@ impl Block {
         })
     }
 
-    /// The position in the frame (pixel centres) that one of its pixels samples.
+    /// The position in the frame (pixel centers) that one of its pixels samples.
     pub(super) fn position(&self, lane: usize) -> [f32; 2] {
         #[expect(clippy::cast_precision_loss, reason = "below 8")]
         let lane = lane as f32;
@@ -63,8 +63,8 @@ fn sample_block(source: &Source, samples: &[Option<Sample>; LANES]) -> Values {
 }
 
 impl Sample {
-    /// The sample at a position (pixel centres) in a frame of `width` × `height` pixels, both at
-    /// least 2; `None` outside. Within the outer half of a border pixel its centre is sampled.
+    /// The sample at a position (pixel centers) in a frame of `width` × `height` pixels, both at
+    /// least 2; `None` outside. Within the outer half of a border pixel its center is sampled.
     fn at([x, y]: [f32; 2], width: usize, height: usize) -> Option<Self> {
         let (left, right_weight) = split(x, width)?;
         let (top, lower_weight) = split(y, height)?;
@@ -77,7 +77,7 @@ impl Sample {
         })
     }
 
-    /// Column and row of its four neighbours.
+    /// Column and row of its four neighbors.
     pub(super) fn neighbours(&self, width: usize) -> impl Iterator<Item = [u32; 2]> {
         let upper_left = [self.first_pixel % width, self.first_pixel / width];
         #[expect(clippy::cast_possible_truncation, reason = "a frame's sides are u32")]
@@ -103,8 +103,8 @@ impl Sample {
     }
 }
 
-/// The lower neighbour of `position` among `count` pixels and the weight of the upper one. The
-/// last pixel is reached with full weight from its neighbour, so both always exist.
+/// The lower neighbor of `position` among `count` pixels and the weight of the upper one. The
+/// last pixel is reached with full weight from its neighbor, so both always exist.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_precision_loss,

@@ -12,7 +12,7 @@ use super::{
 };
 
 /// DETR and its successors (RT-DETR, D-FINE, RF-DETR) before decoding: class logits `[views,
-/// queries, classes]` and boxes `[views, queries, 4]` (centre x, centre y, width, height, as shares
+/// queries, classes]` and boxes `[views, queries, 4]` (center x, center y, width, height, as shares
 /// of the view).
 ///
 /// The score is a sigmoid per class. The original DETR uses a softmax over the classes and "no

@@ -64,7 +64,7 @@ pub enum PriorPosition {
     /// The top-left corner, as in NanoDet-Plus.
     #[default]
     Corner,
-    /// The centre, as in `NanoDet` before Plus.
+    /// The center, as in `NanoDet` before Plus.
     Center,
 }
 

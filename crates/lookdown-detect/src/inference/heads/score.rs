@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-/// Deviation from 0 to 1 that is accepted as rounding of a quantised network.
+/// Deviation from 0 to 1 that is accepted as rounding of a quantized network.
 const PROBABILITY_TOLERANCE: f32 = 0.01;
 /// Logits below the floor's logit by this much are dropped without the sigmoid. The margin is far
 /// larger than `f64` rounding.

@@ -15,7 +15,7 @@ use super::{
 /// `YOLOv2`'s region layer before decoding: `[views, anchors × (5 + classes), rows, columns]`, with
 /// `t_x, t_y, t_w, t_h, t_o` and the class logits per anchor.
 ///
-/// In cells: centre `(σ(t_x) + column, σ(t_y) + row)`, size `(p_w e^t_w, p_h e^t_h)` for the anchor
+/// In cells: center `(σ(t_x) + column, σ(t_y) + row)`, size `(p_w e^t_w, p_h e^t_h)` for the anchor
 /// `(p_w, p_h)`. Score: `σ(t_o) · softmax(classes)`.
 ///
 /// Source: Redmon and Farhadi, "YOLO9000: Better, Faster, Stronger", 2017, section 2 (direct

@@ -15,7 +15,7 @@ use super::{
 };
 
 /// `YOLOv8`, YOLO11 and relatives, exported without suppression: `[views, 4 + classes, cells]`.
-/// Each cell has centre x, centre y, width, height (pixels) and class scores. Further channels
+/// Each cell has center x, center y, width, height (pixels) and class scores. Further channels
 /// (mask coefficients, key points) are ignored.
 ///
 /// Source: the export of the reference implementation. The graph decodes the boxes and applies the

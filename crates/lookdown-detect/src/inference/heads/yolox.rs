@@ -17,7 +17,7 @@ use super::{
 /// YOLOX: `[views, cells, 5 + classes]`, with `t_x, t_y, t_w, t_h`, objectness and class scores per
 /// cell. Cells are ordered level by level, row by row.
 ///
-/// Centre `((t_x + column) · stride, (t_y + row) · stride)`, size `(stride · e^t_w, stride ·
+/// Center `((t_x + column) · stride, (t_y + row) · stride)`, size `(stride · e^t_w, stride ·
 /// e^t_h)`. Score: `objectness · class`.
 ///
 /// Sources: Ge et al., "YOLOX: Exceeding YOLO Series in 2021", section 2.1; `decode_outputs` of
@@ -28,7 +28,7 @@ use super::{
 /// head = "yolox"
 /// person_class = 0            # COCO, 80 classes
 /// strides = [8, 16, 32]       # default
-/// decode_in_graph = false     # default; true: centre and size are in pixels
+/// decode_in_graph = false     # default; true: center and size are in pixels
 /// score_activation = "none"   # default; or "sigmoid"
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
@@ -39,7 +39,7 @@ pub struct YoloxHead {
     /// Pixels per cell of each level, in the network's order.
     #[serde(default = "default_strides")]
     pub strides: Vec<NonZeroU32>,
-    /// True if the graph returns boxes as centre and size in pixels.
+    /// True if the graph returns boxes as center and size in pixels.
     #[serde(default)]
     pub decode_in_graph: bool,
     /// Activation applied to objectness and class scores.

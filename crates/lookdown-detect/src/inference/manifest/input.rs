@@ -40,7 +40,7 @@ pub struct ManifestInput {
     pub batch: Option<NonZeroU32>,
     /// Order of the axes, for models that leave them open.
     pub layout: Option<Layout>,
-    /// Order of the colour planes.
+    /// Order of the color planes.
     pub channel_order: ChannelOrder,
     /// Factor per plane.
     pub scale: Option<[f32; 3]>,

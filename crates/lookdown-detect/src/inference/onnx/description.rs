@@ -17,7 +17,7 @@ use crate::{
 pub struct ModelDescription {
     /// Its manifest, `onnx` as a path that can be opened.
     pub manifest: ModelManifest,
-    /// The licence from the manifest, or else from the ONNX file's metadata.
+    /// The license from the manifest, or else from the ONNX file's metadata.
     pub licence: Option<String>,
     /// The ONNX file's SHA-256, hexadecimal.
     pub sha256: String,

@@ -19,7 +19,7 @@ fn detected(
     engine.detect(&job).unwrap()
 }
 
-/// Zones around a person to the right of the image centre, where feet point left. The disc's box
+/// Zones around a person to the right of the image center, where feet point left. The disc's box
 /// and the person extend from about 400 to 440, with the foot at 400.
 const ZONES: &str = r#", "zones": [
     {"name": "foot", "frame_px": [[380, 280], [410, 280], [410, 320], [380, 320]]},

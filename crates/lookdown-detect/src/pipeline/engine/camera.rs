@@ -35,7 +35,7 @@ const CIRCLE_STEP_SHARE: f64 = 1.0 / 400.0;
     reason = "steps within a bounded frame"
 )]
 fn rounded(circle: &LensCircle) -> RigCamera {
-    // The step of the radius grows with the radius; the centre uses the same step.
+    // The step of the radius grows with the radius; the center uses the same step.
     let radius = (circle.radius.max(1.0).ln() / CIRCLE_STEP_SHARE).round();
     let step = ((radius * CIRCLE_STEP_SHARE).exp() * CIRCLE_STEP_SHARE).max(0.5);
     RigCamera::Assumed {

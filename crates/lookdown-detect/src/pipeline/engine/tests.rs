@@ -31,7 +31,7 @@ fn a_blob_is_found_at_its_position_in_every_profile() {
             best.bbox.width()
         );
         assert!(best.views >= 1);
-        // To the right of the centre, 120 of 300 pixels out: 36° off axis.
+        // To the right of the center, 120 of 300 pixels out: 36° off axis.
         let bearing = best.bearing.unwrap();
         assert!((bearing.off_axis.to_degrees() - 36.0).abs() < 2.0);
         assert!(bearing.azimuth.sin().abs() < 0.06);

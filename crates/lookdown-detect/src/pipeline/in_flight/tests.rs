@@ -45,7 +45,7 @@ fn work_without_progress_is_a_stall_until_an_item_ends() {
     let (waits, _) = fixture.add("waits", 30);
     assert!(!fixture.is_stalled(60));
     assert!(fixture.is_stalled(61));
-    // Arrivals are no progress.
+    // Arrivals are not progress.
     let _late = fixture.add("late", 100);
     assert!(fixture.is_stalled(101));
     waits.end(fixture.at(102));

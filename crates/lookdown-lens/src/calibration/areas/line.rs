@@ -13,10 +13,10 @@ use crate::{
     geometry::{CountingLine, LineEnds, Mount, Polygon, polygon::Edge},
 };
 
-/// Shortest line on the floor, metres, and in the frame, pixels.
+/// Shortest line on the floor, meters, and in the frame, pixels.
 const SHORTEST_M: f64 = 0.1;
 const SHORTEST_PX: f64 = 4.0;
-/// Farthest coordinate on the floor, metres.
+/// Farthest coordinate on the floor, meters.
 const MAX_FLOOR_M: f64 = 1000.0;
 
 pub(super) fn checked(
@@ -64,12 +64,12 @@ fn line_ends(
                                the line in the frame with frame_px";
                 return Err(FormatError::invalid(field, problem));
             }
-            return two_ends(&field, ends, SHORTEST_M, MAX_FLOOR_M, "metres").map(LineEnds::Floor);
+            return two_ends(&field, ends, SHORTEST_M, MAX_FLOOR_M, "meters").map(LineEnds::Floor);
         }
         (Some(_), Some(_)) => "it has both frame_px and floor_m: leave one out",
         (None, None) => {
             "it has no ends: give two points as frame_px in pixels of the frame, or as floor_m in \
-             metres on the floor"
+             meters on the floor"
         }
     };
     Err(FormatError::invalid(field, problem))

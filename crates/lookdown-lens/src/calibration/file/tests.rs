@@ -169,7 +169,7 @@ fn what_makes_no_camera_is_refused_with_field_value_and_remedy() {
         (
             "\"cx\": 839.5",
             "\"cx\": 8390.5",
-            "lens: its centre, cx 8390.5 and cy 839.5, lies outside the frame of 1680×1680 pixels",
+            "lens: its center, cx 8390.5 and cy 839.5, lies outside the frame of 1680×1680 pixels",
         ),
         (
             "\"focal\": 534.76",
@@ -179,7 +179,7 @@ fn what_makes_no_camera_is_refused_with_field_value_and_remedy() {
         (
             "534.76",
             "53.476",
-            "lens: its image ends 84 pixels from the centre, a speck in a frame of 1680×1680",
+            "lens: its image ends 84 pixels from the center, a speck in a frame of 1680×1680",
         ),
         (
             "534.76",
@@ -221,7 +221,7 @@ fn what_makes_no_camera_is_refused_with_field_value_and_remedy() {
             "[0, 0, -2]",
             "mount: world_up is [0, 0, -2], of length 2.000: give a unit",
         ),
-        ("2.8", "0", "mount: height_m is 0: give metres above 0"),
+        ("2.8", "0", "mount: height_m is 0: give meters above 0"),
         (
             "equidistant",
             "equidistance",

@@ -15,7 +15,7 @@ use crate::{
 /// The content of a calibration file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibrationFile {
-    /// The format that was recognised.
+    /// The format that was recognized.
     pub format: Format,
     /// Its cameras, in the file's order; at least one.
     pub cameras: Vec<FileCamera>,

@@ -10,7 +10,7 @@ const MAX_DEPTH: usize = 32;
 /// Most values in one file.
 const MAX_NODES: usize = 100_000;
 
-/// The content of a file before its format is recognised.
+/// The content of a file before its format is recognized.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Document<'a> {
     /// Maps, lists, texts and numbers.
@@ -38,7 +38,7 @@ pub(super) fn text_of(bytes: &[u8]) -> Result<(&str, Syntax), FormatError> {
         )));
     }
     let text = std::str::from_utf8(bytes)
-        .map_err(|error| FormatError::malformed(format!("it is no UTF-8 text: {error}")))?;
+        .map_err(|error| FormatError::malformed(format!("it is not UTF-8 text: {error}")))?;
     let text = text.trim_start_matches('\u{feff}');
     Ok((text, syntax_of(text)))
 }
@@ -119,7 +119,7 @@ fn first_line(error: &impl std::fmt::Display) -> String {
     text.lines().next().unwrap_or_default().to_owned()
 }
 
-/// OpenCV up to 4 begins its files with `%YAML:1.0`, which is no YAML directive, and others leave
+/// OpenCV up to 4 begins its files with `%YAML:1.0`, which is not a YAML directive, and others leave
 /// out the `---` that has to follow one; as a comment it does no harm and lines keep their numbers.
 fn without_directive(text: &str) -> String {
     if text.starts_with("%YAML") {

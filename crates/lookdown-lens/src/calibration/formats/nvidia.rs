@@ -2,7 +2,7 @@
 //! `docs/data/sensor_models.rst`).
 //!
 //! Only the polynomial named by `reference_poly` is exact, not the other one. The principal point
-//! speaks of pixel centres, unlike that of ncore's other cameras.
+//! speaks of pixel centers, unlike that of ncore's other cameras.
 
 use serde_json::Value;
 

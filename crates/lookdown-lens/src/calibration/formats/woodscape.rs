@@ -1,8 +1,8 @@
 //! `WoodScape`: `intrinsic` with the radius in pixels as a polynomial of the angle
 //! (<https://github.com/valeoai/WoodScape>, `scripts/calibration`).
 //!
-//! The principal point is an offset from the centre of the image, which lies half a pixel before
-//! `width / 2` because pixel centres are whole numbers.
+//! The principal point is an offset from the center of the image, which lies half a pixel before
+//! `width / 2` because pixel centers are whole numbers.
 
 use super::{Camera, FormatError, fields::Fields};
 use crate::geometry::lens::RadialPolynomial;

@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// A named area, in pixels of the frame or in metres on the floor.
+/// A named area, in pixels of the frame or in meters on the floor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NativeZone {
@@ -12,12 +12,12 @@ pub struct NativeZone {
     /// Corners `[x, y]`, frame pixels.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frame_px: Option<Vec<[f64; 2]>>,
-    /// Corners `[x, y]`, metres on the floor from the place below the camera.
+    /// Corners `[x, y]`, meters on the floor from the place below the camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub floor_m: Option<Vec<[f64; 2]>>,
 }
 
-/// A named line, in pixels of the frame or in metres on the floor.
+/// A named line, in pixels of the frame or in meters on the floor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NativeLine {
@@ -26,7 +26,7 @@ pub struct NativeLine {
     /// Its two ends `[x, y]`, frame pixels.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frame_px: Option<Vec<[f64; 2]>>,
-    /// Its two ends `[x, y]`, metres on the floor from the place below the camera.
+    /// Its two ends `[x, y]`, meters on the floor from the place below the camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub floor_m: Option<Vec<[f64; 2]>>,
     /// The names of the crossings from left to right and from right to left, as seen from the first
@@ -43,7 +43,7 @@ fn is_in_and_out(directions: &[String; 2]) -> bool {
     directions == &["in", "out"]
 }
 
-/// A place where people count or do not count, in pixels of the frame or in metres on the floor.
+/// A place where people count or do not count, in pixels of the frame or in meters on the floor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NativePlace {
@@ -53,7 +53,7 @@ pub struct NativePlace {
     /// Corners `[x, y]`, frame pixels.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frame_px: Option<Vec<[f64; 2]>>,
-    /// Corners `[x, y]`, metres on the floor from the place below the camera.
+    /// Corners `[x, y]`, meters on the floor from the place below the camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub floor_m: Option<Vec<[f64; 2]>>,
 }

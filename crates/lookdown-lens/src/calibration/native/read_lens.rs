@@ -21,7 +21,7 @@ impl<'de> Deserialize<'de> for LensModel {
         let parameters = Value::Object(parameters);
         let parameters = serde_path_to_error::Deserializer::new(parameters, &mut track);
         let Some(lens) = Self::deserialize_named(&name, parameters) else {
-            // Enough to recognise it by, not enough to fill a log.
+            // Enough to recognize it by, not enough to fill a log.
             let name: String = name.chars().take(64).collect();
             let known = Self::NAMES.join(", ");
             let problem = format!("lens.model: {name:?} is none of {known}");

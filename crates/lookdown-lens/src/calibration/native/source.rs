@@ -26,7 +26,7 @@ pub struct NativeSource {
     /// Kind of source.
     pub source: ValueSource,
     /// Standard deviation: of `lens` in percent of the radius, of `center` in pixels, of `world_up`
-    /// in degrees, of `height_m` in metres.
+    /// in degrees, of `height_m` in meters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub uncertainty: Option<f64>,
 }

@@ -4,7 +4,7 @@ use super::{Lens, curve::Curve};
 use crate::geometry::{Pixel, Ray};
 
 impl Lens {
-    /// Returns the point at which `ray` (camera frame) meets the normalised plane, which
+    /// Returns the point at which `ray` (camera frame) meets the normalized plane, which
     /// [`Lens::image_plane`] takes to pixels. Beyond `max_theta` the curve is its own mirror image,
     /// `r(max_theta + t) = 2 r(max_theta) − r(max_theta − t)`: smooth across the rim, but nothing
     /// that the lens sees. `None` exactly behind the camera and where nothing finite comes out.

@@ -10,7 +10,7 @@ use super::{
 /// Curves with a pole end this far before it, in radians.
 pub(super) const POLE_MARGIN: f64 = 1e-6;
 
-/// The normalised radius as a function of the angle from the optical axis, in radians.
+/// The normalized radius as a function of the angle from the optical axis, in radians.
 pub(super) trait Curve {
     /// Returns the largest angle up to which the curve is one-to-one; 0 or NaN when it never rises.
     fn limit(&self) -> f64;

@@ -1,4 +1,4 @@
-//! Radial and tangential distortion in the normalised image plane.
+//! Radial and tangential distortion in the normalized image plane.
 
 use super::{LensError, check::finite, inversion::rising_root};
 

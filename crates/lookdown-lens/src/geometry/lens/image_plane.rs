@@ -1,4 +1,4 @@
-//! The affine map from normalised image coordinates to pixels.
+//! The affine map from normalized image coordinates to pixels.
 
 use super::{
     LensError,
@@ -6,10 +6,10 @@ use super::{
 };
 use crate::geometry::Pixel;
 
-/// `fx, fy, cx, cy`: focal lengths and principal point in pixels, pixel centres.
+/// `fx, fy, cx, cy`: focal lengths and principal point in pixels, pixel centers.
 pub type Pinhole = [f64; 4];
 
-/// `u = fx·x + skew·y + cx`, `v = row_skew·x + fy·y + cy`: normalised coordinates to pixel centres.
+/// `u = fx·x + skew·y + cx`, `v = row_skew·x + fy·y + cy`: normalized coordinates to pixel centers.
 ///
 /// Kannala-Brandt files give the skew as `alpha` with `skew = fx·alpha`
 /// (OpenCV's fisheye module).
@@ -19,13 +19,13 @@ pub struct ImagePlane {
     pub fx: f64,
     /// Vertical focal length, pixels.
     pub fy: f64,
-    /// Horizontal shift per unit of normalised `y`, pixels; 0 for almost every camera.
+    /// Horizontal shift per unit of normalized `y`, pixels; 0 for almost every camera.
     pub skew: f64,
-    /// Vertical shift per unit of normalised `x`, pixels; only `ocam` and `f_theta` files have it.
+    /// Vertical shift per unit of normalized `x`, pixels; only `ocam` and `f_theta` files have it.
     pub row_skew: f64,
-    /// Principal point, horizontal, pixel centres.
+    /// Principal point, horizontal, pixel centers.
     pub cx: f64,
-    /// Principal point, vertical, pixel centres.
+    /// Principal point, vertical, pixel centers.
     pub cy: f64,
 }
 

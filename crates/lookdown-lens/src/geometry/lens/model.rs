@@ -10,7 +10,7 @@ pub(super) trait Model {
     /// Returns the curve, or an error that names the first parameter outside its range.
     fn curve(&self) -> Result<Self::Curve, LensError>;
 
-    /// Returns the distortion that follows the curve, in the normalised image plane.
+    /// Returns the distortion that follows the curve, in the normalized image plane.
     fn distortion(&self) -> Result<Option<RadialTangential>, LensError> {
         Ok(None)
     }
@@ -46,7 +46,7 @@ macro_rules! lens_parameters {
         }
 
         impl $Model {
-            /// Creates the lens with these focal lengths and centre.
+            /// Creates the lens with these focal lengths and center.
             #[must_use]
             pub fn new([fx, fy, cx, cy]: $crate::geometry::lens::Pinhole) -> Self {
                 Self { focal: None, fx: Some(fx), fy: Some(fy), cx, cy, max_theta: None }
@@ -60,7 +60,7 @@ macro_rules! lens_parameters {
                 Self { focal: Some(focal), fx: None, fy: None, cx, cy, max_theta }
             }
 
-            /// Returns the focal lengths and the centre, unless a focal length is missing.
+            /// Returns the focal lengths and the center, unless a focal length is missing.
             #[must_use]
             pub fn pinhole(&self) -> Option<$crate::geometry::lens::Pinhole> {
                 Some([self.fx.or(self.focal)?, self.fy.or(self.focal)?, self.cx, self.cy])
@@ -92,7 +92,7 @@ macro_rules! lens_parameters {
     ($(#[$doc:meta])* pub struct $Model:ident: SkewedPinhole { $($own:tt)* }) => {
         lens_parameters! {
             @pinhole $(#[$doc])* $Model { $($own)* } {
-                /// Horizontal shift per unit of normalised `y`, pixels.
+                /// Horizontal shift per unit of normalized `y`, pixels.
                 #[serde(default)]
                 pub skew: f64,
             } { skew }
@@ -118,13 +118,13 @@ macro_rules! lens_parameters {
         }
 
         impl $Model {
-            /// Creates the lens with these focal lengths, centre and parameters, without skew.
+            /// Creates the lens with these focal lengths, center and parameters, without skew.
             #[must_use]
             pub fn new([fx, fy, cx, cy]: $crate::geometry::lens::Pinhole, $($own: $Own),*) -> Self {
                 Self { fx, fy, cx, cy, $($own,)* $($skew: 0.0,)? max_theta: None }
             }
 
-            /// Returns the focal lengths and the centre.
+            /// Returns the focal lengths and the center.
             #[must_use]
             pub fn pinhole(&self) -> $crate::geometry::lens::Pinhole {
                 [self.fx, self.fy, self.cx, self.cy]
@@ -148,9 +148,9 @@ macro_rules! lens_parameters {
         #[serde(deny_unknown_fields)]
         pub struct $Model {
             $($before)*
-            /// Principal point, horizontal, pixel centres.
+            /// Principal point, horizontal, pixel centers.
             pub cx: f64,
-            /// Principal point, vertical, pixel centres.
+            /// Principal point, vertical, pixel centers.
             pub cy: f64,
             $($after)*
             /// The largest angle from the optical axis in the lens image, radians. Without it the

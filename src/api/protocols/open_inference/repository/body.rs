@@ -61,7 +61,7 @@ impl<T: DeserializeOwned + Default> FromRequest<ApiState> for SmallBody<T> {
         if bytes.is_empty() {
             return Ok(Self(T::default()));
         }
-        // serde also deserialises structs from arrays.
+        // serde also deserializes structs from arrays.
         let fields: Result<Option<Map<String, Value>>, _> = serde_json::from_slice(&bytes);
         let read =
             fields.and_then(|fields| T::deserialize(Value::Object(fields.unwrap_or_default())));

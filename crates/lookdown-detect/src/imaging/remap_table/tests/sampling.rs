@@ -15,7 +15,7 @@ pub(super) fn noise(width: u32, height: u32) -> Frame {
     clippy::cast_sign_loss,
     reason = "clamped to the frame first"
 )]
-/// The slow, obvious way: four neighbours by index, weights in f64, the border repeated.
+/// The slow, obvious way: four neighbors by index, weights in f64, the border repeated.
 pub(super) fn reference(frame: &Frame, position: &Pixel, channel: usize) -> f64 {
     let at = |x: f64, y: f64| {
         let x = x.clamp(0.0, f64::from(frame.width() - 1)) as u32;

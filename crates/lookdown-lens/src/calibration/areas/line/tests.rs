@@ -52,11 +52,11 @@ fn invalid_lines_are_refused_with_field_and_remedy() {
         ),
         (
             line(r#""name": "a", "floor_m": [[0, 0], [0.05, 0]]"#),
-            "lines[0].floor_m: it is 0.05 metres long: give ends at least 0.1 metres apart",
+            "lines[0].floor_m: it is 0.05 meters long: give ends at least 0.1 meters apart",
         ),
         (
             line(r#""name": "a", "floor_m": [[0, 0], [1e9, 0]]"#),
-            "lines[0].floor_m: an end is [1000000000, 0]: give numbers from -1000 to 1000 metres",
+            "lines[0].floor_m: an end is [1000000000, 0]: give numbers from -1000 to 1000 meters",
         ),
         (
             line(r#""name": "a", "frame_px": [[900, 0], [900, 100]]"#),

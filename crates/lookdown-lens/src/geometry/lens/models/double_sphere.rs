@@ -13,7 +13,7 @@ lens_parameters! {
     /// `d = √(sin²(theta) + g²)`. Usenko, Demmel and Cremers 2018, eq. 40 to 45, also for the valid
     /// range.
     pub struct DoubleSphere: Pinhole {
-        /// Distance between the two spheres' centres, above −1.
+        /// Distance between the two spheres' centers, above −1.
         pub xi: f64,
         /// 0 to 1.
         pub alpha: f64,

@@ -13,7 +13,7 @@ lens_parameters! {
     /// `cos(theta) > −xi` (`−1 / xi` for `xi > 1`) and the distortion is one-to-one. Mei and Rives
     /// 2007.
     pub struct Mei: SkewedPinhole {
-        /// Distance of the projection centre from the sphere's centre, above −1.
+        /// Distance of the projection center from the sphere's center, above −1.
         pub xi: f64,
         /// First radial coefficient.
         pub k1: f64,
@@ -67,8 +67,8 @@ impl Curve for SphereCurve {
     }
 }
 
-/// Returns the angle at the centre of the unit sphere of the point that is seen at `shifted` from a
-/// centre `xi` behind it, by the law of sines.
+/// Returns the angle at the center of the unit sphere of the point that is seen at `shifted` from a
+/// center `xi` behind it, by the law of sines.
 pub(super) fn angle_before_shift(xi: f64, shifted: f64) -> f64 {
     shifted + (xi * shifted.sin()).clamp(-1.0, 1.0).asin()
 }
