@@ -160,21 +160,55 @@ fn responses_of_an_inference_server_are_bounded() {
     }
 }
 
+fn bucket_at(address: SocketAddr) -> BucketStore {
+    let variables = [
+        ("AWS_ENDPOINT", format!("http://{address}")),
+        ("AWS_ALLOW_HTTP", "true".to_owned()),
+        ("AWS_ACCESS_KEY_ID", "me".to_owned()),
+        ("AWS_SECRET_ACCESS_KEY", "secret".to_owned()),
+    ];
+    let variables = variables.map(|(name, value)| (name.to_owned(), value));
+    BucketStore::new(&"s3://cameras".parse().unwrap(), variables.into_iter()).unwrap()
+}
+
+/// Answers a request for an object of 50 MB, or for a part of it.
+fn answer_huge_object(mut stream: TcpStream) {
+    let mut request = [0; 1 << 13];
+    let length = stream.read(&mut request).unwrap();
+    let request = String::from_utf8_lossy(&request[..length]).to_ascii_lowercase();
+    let head =
+        "ETag: \"1\"\r\nLast-Modified: Mon, 23 Nov 2026 09:00:00 GMT\r\nConnection: close\r\n";
+    let answer = if request.contains("range: bytes=0-1023\r\n") {
+        let part = "Content-Range: bytes 0-1023/50000000\r\nContent-Length: 1024\r\n\r\n";
+        let body = " ".repeat(1024);
+        format!("HTTP/1.1 206 Partial Content\r\n{head}{part}{body}")
+    } else {
+        format!("{HEAD}{head}Content-Length: 50000000\r\n\r\n")
+    };
+    // The client does not wait for the rest.
+    let _ = stream.write_all(answer.as_bytes());
+}
+
+#[test]
+fn a_huge_object_of_a_bucket_is_read_up_to_the_limit() {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap();
+    named(move || {
+        for stream in listener.incoming().map_while(Result::ok) {
+            named(move || answer_huge_object(stream));
+        }
+    });
+    let contents = bucket_at(address).read(&["huge.json"], 1024);
+    assert_eq!(contents[0].as_ref().unwrap().len(), 1024);
+}
+
 #[test]
 fn responses_of_a_bucket_are_bounded() {
     let tests = every_kind().into_iter().map(|evil| {
         named(move || {
             let name = evil.name;
             let peer = EvilServer::start(evil);
-            let variables = [
-                ("AWS_ENDPOINT", format!("http://{}", peer.address)),
-                ("AWS_ALLOW_HTTP", "true".to_owned()),
-                ("AWS_ACCESS_KEY_ID", "me".to_owned()),
-                ("AWS_SECRET_ACCESS_KEY", "secret".to_owned()),
-            ];
-            let variables = variables.map(|(name, value)| (name.to_owned(), value));
-            let url = "s3://cameras".parse().unwrap();
-            let store = BucketStore::new(&url, variables.into_iter()).unwrap();
+            let store = bucket_at(peer.address);
             let began = Instant::now();
             let error = store.list().unwrap_err().to_string();
             assert!(!error.contains('\n'), "{name}: {error}");

@@ -86,8 +86,8 @@ const CLOCK_READERS: [&str; 18] = [
 /// Calls that make HTTP clients. That of `http_transport.rs` bounds the provisional responses of its
 /// peers; the others end every request at a timeout.
 const CLIENTS: [&str; 3] = [
-    "Client::builder()",
-    "Client::new()",
+    " Client::builder()",
+    " Client::new()",
     "legacy::Client::builder(",
 ];
 /// The files that may make them.

@@ -175,12 +175,11 @@ async fn list(objects: Arc<dyn Objects>, level: Path) -> Result<Vec<ObjectMeta>,
 }
 
 async fn read(objects: Arc<dyn Objects>, path: Path, at_most: u64) -> Result<Vec<u8>, Error> {
-    let answer = objects.get(&path).await?;
-    // The body of a larger one is not waited for.
-    let content = if answer.meta.size > at_most {
-        objects.get_range(&path, 0..at_most).await?
-    } else {
-        answer.bytes().await?
+    let content = match objects.get(&path).await {
+        Ok(answer) if answer.meta.size <= at_most => answer.bytes().await?,
+        Err(error) if !bounded::is_too_large(&error) => return Err(error),
+        // The body of a larger one is not waited for.
+        _ => objects.get_range(&path, 0..at_most).await?,
     };
     Ok(content.into())
 }

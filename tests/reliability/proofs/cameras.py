@@ -18,8 +18,8 @@ MAX_CORES = 0.5
 """Most CPU time of `lookdown watch` beside cameras whose responses never begin; without a limit one core for each."""
 MIN_FRAMES = 8
 """Fewest frames of the good camera, which has one each second."""
-LARGE_CAMERAS = 24
-MAX_MEBIBYTES = 700
+LARGE_CAMERAS = 80
+MAX_MEBIBYTES = 600
 """The budget of all frames, 512 MiB, and the program with what it reads."""
 
 
@@ -50,7 +50,7 @@ def _provisional(target: str, camera: str) -> Row:
 
 
 def _large(target: str, camera: str) -> Row:
-    row = Row("large frames of many cameras", f"{LARGE_CAMERAS} MJPEG cameras with parts of 32 MiB, beside a good one")
+    row = Row("large frames of many cameras", f"{LARGE_CAMERAS} MJPEG cameras with parts of 12 MiB, beside a good one")
     large = [f"{camera}/large/{number}" for number in range(LARGE_CAMERAS)]
     used = _watch(target, [f"{camera}/good", *large])
     row.seen = f"at most {used.peak_mebibytes} MiB; {used.frames:.0f} frames of the good camera in {SECONDS:.0f} s"

@@ -2,7 +2,6 @@
 //! listings and error messages of any size into memory, and reserves the declared length at once.
 
 use std::{
-    io,
     pin::Pin,
     task::{Context, Poll, ready},
 };
@@ -10,8 +9,9 @@ use std::{
 use async_trait::async_trait;
 use bytes::Bytes;
 use http_body::{Body, Frame, SizeHint};
+use lookdown_common::text::causes;
 use object_store::{
-    ClientOptions, Result,
+    ClientOptions, Error, Result,
     client::{
         HttpClient, HttpConnector, HttpError, HttpErrorKind, HttpRequest, HttpResponse,
         HttpResponseBody, HttpService, ReqwestConnector,
@@ -86,7 +86,16 @@ impl Body for BoundedBody {
     }
 }
 
+/// A response beyond the limit.
+#[derive(Debug, thiserror::Error)]
+#[error("it sent a response of more than {MAX_RESPONSE_BYTES} bytes")]
+struct TooLarge;
+
 fn too_large() -> HttpError {
-    let problem = format!("it sent a response of more than {MAX_RESPONSE_BYTES} bytes");
-    HttpError::new(HttpErrorKind::Decode, io::Error::other(problem))
+    HttpError::new(HttpErrorKind::Decode, TooLarge)
+}
+
+/// Returns true if a request failed because its response exceeds the limit.
+pub(super) fn is_too_large(error: &Error) -> bool {
+    causes(error).any(|cause| cause.is::<TooLarge>())
 }
