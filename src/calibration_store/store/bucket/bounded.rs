@@ -97,5 +97,5 @@ fn too_large() -> HttpError {
 
 /// Returns true if a request failed because its response exceeds the limit.
 pub(super) fn is_too_large(error: &Error) -> bool {
-    causes(error).any(|cause| cause.is::<TooLarge>())
+    causes(error).any(<dyn std::error::Error>::is::<TooLarge>)
 }
