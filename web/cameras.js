@@ -32,6 +32,7 @@ async function listen(signal) {
   cameras.sort((one, other) => one.age_seconds - other.age_seconds);
   const known = cameras.slice(0, MAX_CARDS);
   await withProgress(wall, "Loading the history", () => Promise.all(known.map((row) => loadHistory(row, signal))));
+  showNumbers(known);
   hasLoaded = true;
   arrange();
   while (!signal.aborted) {
@@ -59,11 +60,15 @@ async function followNumbers(signal) {
   while (!signal.aborted) {
     await new Promise((resolve) => setTimeout(resolve, NUMBERS_MILLIS));
     // While the server does not respond, the events report it.
-    const rows = await askJson("results", { signal }).catch(() => []);
-    for (const { camera, persons, received_at: receivedAt } of rows) {
-      const card = cards.get(camera);
-      if (card) addNumber(card, Date.parse(receivedAt), persons);
-    }
+    showNumbers(await askJson("results", { signal }).catch(() => []));
+  }
+}
+
+/** Shows the present numbers of cameras: those of the history are the numbers of their times. */
+function showNumbers(rows) {
+  for (const { camera, persons, received_at: receivedAt } of rows) {
+    const card = cards.get(camera);
+    if (card) addNumber(card, Date.parse(receivedAt), persons);
   }
 }
 
