@@ -1,6 +1,6 @@
 //! One encoded frame of a camera.
 
-use std::{sync::Arc, time::Instant};
+use std::time::Instant;
 
 use bytes::Bytes;
 use jiff::Timestamp;
@@ -44,7 +44,7 @@ impl ImageFormat {
 /// A complete image file of a camera, not decoded.
 #[derive(Debug, Clone)]
 pub struct Frame {
-    /// The image file.
+    /// The image file. It counts against the budget of all frames until its last clone is dropped.
     pub image: Bytes,
     /// Its format.
     pub format: ImageFormat,
@@ -52,8 +52,6 @@ pub struct Frame {
     pub captured_at: Timestamp,
     /// The time at which the frame was received.
     pub received: Instant,
-    /// The memory of the image.
-    _memory: Arc<Reservation>,
 }
 
 /// The reason why bytes are not a frame.
@@ -77,13 +75,12 @@ impl Frame {
     /// [`FrameError`] if they are another file, or the end is missing.
     pub fn new(image: Bytes, captured_at: Timestamp) -> Result<Self, FrameError> {
         let format = format_of(&image)?;
-        let memory = Reservation::of(image.len()).map_err(|_| FrameError::Memory)?;
+        let image = Reservation::default().hold(image);
         Ok(Self {
-            image,
+            image: image.map_err(|_| FrameError::Memory)?,
             format,
             captured_at,
             received: Instant::now(),
-            _memory: memory,
         })
     }
 }

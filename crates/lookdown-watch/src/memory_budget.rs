@@ -4,10 +4,9 @@
 //! being sent. A thousand hostile ones must not add up, so all frames count against one budget. A
 //! camera with small frames is served however much the others hold.
 
-use std::sync::{
-    Arc,
-    atomic::{AtomicUsize, Ordering},
-};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use bytes::Bytes;
 
 /// Most bytes of all frames, beside those of small ones.
 const MAX_BYTES: usize = 512 << 20;
@@ -52,15 +51,30 @@ impl Default for Reservation {
     }
 }
 
+/// Bytes with their reservation.
+struct Reserved {
+    bytes: Bytes,
+    _memory: Reservation,
+}
+
+impl AsRef<[u8]> for Reserved {
+    fn as_ref(&self) -> &[u8] {
+        &self.bytes
+    }
+}
+
 impl Reservation {
-    /// Reserves this many bytes for a frame, which may be shared.
+    /// Returns the bytes with this reservation. It is released with their last clone, as a connection
+    /// may still send a frame whose response has arrived.
     ///
     /// # Errors
     /// [`Exhausted`].
-    pub(crate) fn of(bytes: usize) -> Result<Arc<Self>, Exhausted> {
-        let mut reservation = Self::default();
-        reservation.resize(bytes)?;
-        Ok(Arc::new(reservation))
+    pub(crate) fn hold(mut self, bytes: Bytes) -> Result<Bytes, Exhausted> {
+        self.resize(bytes.len())?;
+        Ok(Bytes::from_owner(Reserved {
+            bytes,
+            _memory: self,
+        }))
     }
 
     /// Changes the number of bytes.
@@ -113,5 +127,20 @@ mod tests {
         other.resize(2 << 20).unwrap();
         other.resize(0).unwrap();
         assert_eq!(SMALL.used.load(Ordering::Relaxed), 0);
+    }
+
+    #[test]
+    fn a_frame_counts_until_its_last_clone_is_dropped() {
+        static BUDGET: MemoryBudget = MemoryBudget::new(4 << 20);
+        let reservation = Reservation {
+            budget: &BUDGET,
+            bytes: 0,
+        };
+        let frame = reservation.hold(Bytes::from(vec![1; 3 << 20])).unwrap();
+        let sent = frame.clone();
+        drop(frame);
+        assert_eq!(BUDGET.used.load(Ordering::Relaxed), sent.len());
+        drop(sent);
+        assert_eq!(BUDGET.used.load(Ordering::Relaxed), 0);
     }
 }

@@ -105,6 +105,10 @@ impl PartReader {
                     };
                     let Some(body) = body else { return Ok(None) };
                     self.state = State::Boundary;
+                    if body.len() > self.buffer.len() {
+                        // The rest would keep the memory of the body.
+                        self.buffer = BytesMut::from(&self.buffer[..]);
+                    }
                     if !body.is_empty() {
                         return Ok(Some(body));
                     }
@@ -248,6 +252,17 @@ mod tests {
             assert_eq!(parts(doubled, stream, chunk).unwrap(), ["one", "two"]);
             assert_eq!(parts(doubled, declared, chunk).unwrap(), ["one", "two"]);
         }
+    }
+
+    #[test]
+    fn the_rest_of_a_stream_does_not_keep_a_part_in_memory() {
+        let mut reader = PartReader::new(TYPE, 100).unwrap();
+        reader.push(b"--frame\r\nContent-Length: 90\r\n\r\n");
+        reader.push(&[b'x'; 90]);
+        reader.push(b"\r\n--frame\r\n");
+        let part = reader.next_part().unwrap().unwrap();
+        assert!(part.is_unique());
+        assert!(reader.buffered() > 0);
     }
 
     #[test]
