@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
 
 use lookdown::{api::Report, app::engine_for, settings};
 use lookdown_detect::{
-    imaging::Frame,
+    imaging::{Frame, decode::DecodeLimits},
     parameters::DetectParameters,
     pipeline::{DetectJob, Engine, JobImage},
 };
@@ -76,11 +76,11 @@ impl PyDetector {
             )));
         }
         let side = |side: usize| u32::try_from(side).map_err(python_error);
-        let frame = Frame::new(
-            side(width)?,
-            side(height)?,
-            pixels.iter().copied().collect(),
-        );
+        let (width, height) = (side(width)?, side(height)?);
+        // An array without memory of its own, such as a broadcast one, may have any shape.
+        let fits = DecodeLimits::default().check((width, height));
+        fits.map_err(python_error)?;
+        let frame = Frame::new(width, height, pixels.iter().copied().collect());
         let image = JobImage::Decoded(Arc::new(frame.map_err(python_error)?));
         py.detach(|| self.detect(name, image, calibration))
     }

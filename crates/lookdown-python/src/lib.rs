@@ -11,10 +11,13 @@ mod error;
 mod lens;
 mod view;
 
-use std::{ffi::OsString, path::PathBuf, process::ExitCode};
+use std::{borrow::Cow, ffi::OsString, path::PathBuf, process::ExitCode};
 
 use lookdown::settings::{PackagedFiles, use_packaged_files};
+use lookdown_common::files::{self, MAX_IMAGE_BYTES};
 use pyo3::prelude::*;
+
+use crate::error::python_error;
 
 /// Runs the command line. Returns true if it succeeded. Ends the process if a flag is invalid.
 #[pyfunction]
@@ -27,6 +30,15 @@ fn run(py: Python<'_>, arguments: Vec<OsString>) -> bool {
 #[pyfunction]
 fn use_files(library: PathBuf, models: PathBuf) {
     use_packaged_files(PackagedFiles { library, models });
+}
+
+/// Returns the content of an image file, within the limits of the command line.
+#[pyfunction]
+fn read_image(py: Python<'_>, path: PathBuf) -> PyResult<Cow<'static, [u8]>> {
+    let content = py.detach(|| files::read(&path, MAX_IMAGE_BYTES));
+    let unreadable =
+        |error| python_error(format!("image: {} cannot be read: {error}", path.display()));
+    content.map(Cow::Owned).map_err(unreadable)
 }
 
 #[pymodule]
@@ -42,5 +54,5 @@ mod _lookdown {
     #[pymodule_export]
     use super::view::PyView;
     #[pymodule_export]
-    use super::{run, use_files};
+    use super::{read_image, run, use_files};
 }

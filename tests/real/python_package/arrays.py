@@ -5,6 +5,7 @@ The maps of the views are compared with the lens.
 The file is made a PNG first, because decoders of JPEG differ by a level.
 """
 
+import os
 import sys
 from pathlib import Path
 
@@ -31,4 +32,16 @@ for view in detector.views(calibration):
     seen = lens.project(ray[np.newaxis])[0]
     mapped = [part[row, column] for part in view.maps()]
     assert np.allclose(seen, mapped, atol=1e-3, equal_nan=True), (seen, mapped)
+
+# 30 GB, if they were copied.
+huge = np.broadcast_to(np.uint8(0), (100_000, 100_000, 3))
+# Neither ends.
+os.mkfifo("pipe.jpg")
+for unusable, reason in ((huge, "8192"), ("/dev/zero", "cannot be read"), ("pipe.jpg", "cannot be read")):
+    try:
+        detector.detect(unusable, calibration)
+    except lookdown.LookdownError as refusal:
+        assert reason in str(refusal), refusal
+    else:
+        raise AssertionError(f"{reason}: accepted")
 print("equal" if persons[0] == persons[1] == persons[2] else persons)

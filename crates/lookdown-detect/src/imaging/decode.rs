@@ -43,6 +43,36 @@ impl Default for DecodeLimits {
     }
 }
 
+impl DecodeLimits {
+    /// Checks the width and the height of an image, pixels.
+    ///
+    /// # Errors
+    /// [`DecodeError::TooLarge`].
+    pub fn check(&self, (width, height): (u32, u32)) -> Result<(), DecodeError> {
+        let Self {
+            max_width,
+            max_height,
+            max_pixels,
+            ..
+        } = *self;
+        let limit = if width > max_width || height > max_height {
+            ExceededLimit::Side {
+                max_width,
+                max_height,
+            }
+        } else if u64::from(width) * u64::from(height) > max_pixels {
+            ExceededLimit::Pixels { max_pixels }
+        } else {
+            return Ok(());
+        };
+        Err(DecodeError::TooLarge {
+            width,
+            height,
+            limit,
+        })
+    }
+}
+
 /// A decoded, upright image.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DecodedFrame {
@@ -96,7 +126,7 @@ pub fn declared_size(bytes: &[u8]) -> Option<(u32, u32)> {
 fn decode_jpeg(bytes: &[u8], limits: &DecodeLimits) -> Result<DecodedFrame, DecodeError> {
     let task = Task::new("JPEG", limits);
     let decoder = JpegDecoder::new(Cursor::new(bytes)).map_err(|e| task.refusal(e))?;
-    task.check_size(decoder.dimensions())?;
+    limits.check(decoder.dimensions())?;
     task.require(container::jpeg_is_whole(bytes), "the file ends early")?;
     task.read(decoder)
 }
@@ -104,7 +134,7 @@ fn decode_jpeg(bytes: &[u8], limits: &DecodeLimits) -> Result<DecodedFrame, Deco
 fn decode_png(bytes: &[u8], limits: &DecodeLimits) -> Result<DecodedFrame, DecodeError> {
     let task = Task::new("PNG", limits);
     let size = container::png_size(bytes);
-    task.check_size(size.ok_or_else(|| task.corrupt("its header is incomplete"))?)?;
+    limits.check(size.ok_or_else(|| task.corrupt("its header is incomplete"))?)?;
     task.require(container::png_is_whole(bytes), "the file ends early")?;
     let mut memory = Limits::no_limits();
     memory.max_alloc = Some(limits.max_alloc_bytes);
@@ -117,7 +147,7 @@ fn decode_webp(bytes: &[u8], limits: &DecodeLimits) -> Result<DecodedFrame, Deco
     let task = Task::new("WebP", limits);
     let decoder = WebPDecoder::new(Cursor::new(bytes)).map_err(|e| task.refusal(e))?;
     let size = decoder.dimensions();
-    task.check_size(size)?;
+    limits.check(size)?;
     task.require(container::webp_is_whole(bytes), "the file ends early")?;
     task.require(
         container::webp_frames_fit(bytes, size),
@@ -135,30 +165,6 @@ struct Task<'a> {
 impl<'a> Task<'a> {
     fn new(format: &'static str, limits: &'a DecodeLimits) -> Self {
         Self { format, limits }
-    }
-
-    fn check_size(&self, (width, height): (u32, u32)) -> Result<(), DecodeError> {
-        let DecodeLimits {
-            max_width,
-            max_height,
-            max_pixels,
-            ..
-        } = *self.limits;
-        let limit = if width > max_width || height > max_height {
-            ExceededLimit::Side {
-                max_width,
-                max_height,
-            }
-        } else if u64::from(width) * u64::from(height) > max_pixels {
-            ExceededLimit::Pixels { max_pixels }
-        } else {
-            return Ok(());
-        };
-        Err(DecodeError::TooLarge {
-            width,
-            height,
-            limit,
-        })
     }
 
     fn require(&self, holds: bool, otherwise: &str) -> Result<(), DecodeError> {

@@ -83,6 +83,9 @@ class Detector:
     def views(self, calibration: Calibration) -> list[View]:
         """Returns the views of the profile, in the order in which the network receives them."""
 
+def read_image(path: str | os.PathLike[str]) -> bytes:
+    """Returns the content of an image file: a regular file, with a limit of its size."""
+
 def run(arguments: list[str]) -> bool:
     """Runs the command line. Returns true if it succeeded. Ends the process if a flag is invalid."""
 

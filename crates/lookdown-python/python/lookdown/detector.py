@@ -46,12 +46,7 @@ class Detector:
         elif isinstance(image, bytes):
             report = self._detector.detect_file(image, "", calibration)
         else:
-            try:
-                with open(image, "rb") as file:
-                    content = file.read()
-            except OSError as error:
-                raise LookdownError(f"image: {os.fspath(image)} cannot be read: {error.strerror}") from error
-            report = self._detector.detect_file(content, os.fspath(image), calibration)
+            report = self._detector.detect_file(_lookdown.read_image(image), os.fspath(image), calibration)
         if isinstance(image, np.ndarray) and channel_order == "BGR":
             image = image[..., ::-1]
         return Detections.from_json(report, image)

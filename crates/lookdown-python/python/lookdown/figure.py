@@ -4,11 +4,12 @@ import base64
 import os
 import struct
 import zlib
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+
+from lookdown import _lookdown
 
 Source = str | os.PathLike[str] | bytes | npt.NDArray[Any]
 """A frame as `Detector.detect` takes it; an array in RGB."""
@@ -42,7 +43,7 @@ def data_url(source: Source) -> str:
     if isinstance(source, np.ndarray):
         content = png(source)
     else:
-        content = source if isinstance(source, bytes) else Path(source).read_bytes()
+        content = source if isinstance(source, bytes) else _lookdown.read_image(source)
     media_type = STARTS.get(content[:2], "application/octet-stream")
     return f"data:{media_type};base64,{base64.b64encode(content).decode()}"
 
