@@ -178,7 +178,10 @@ class Entities(unittest.TestCase):
             self.broker.stop(signal.SIGKILL)
             self.home.until(dict.fromkeys(ENTITIES, "unavailable"))
             self.broker.start()
-            # The broker has kept nothing: the server publishes all again.
+            # The broker has kept nothing: the server publishes all again. Home Assistant shows the states of before
+            # as soon as it is connected itself.
+            online = "the server is connected"
+            wait_until(lambda: self.broker.retained().get("lookdown/status") == "online", online, START_SECONDS)
             self.home.until(counts, START_SECONDS)
             os.kill(server.pid, signal.SIGKILL)
             self.home.until(dict.fromkeys(ENTITIES, "unavailable"))
