@@ -33,7 +33,7 @@ const REFUSED: [&str; 6] = [
     "ceiling/a&#10;b",
 ];
 /// More objects than a page of a listing has.
-const OTHERS: usize = 5000;
+const OTHERS: usize = 1500;
 const PAGE: usize = 1000;
 const HEAD: &str = "ETag: \"1\"\r\nLast-Modified: Mon, 23 Nov 2026 09:00:00 GMT\r\n";
 
