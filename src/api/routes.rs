@@ -33,6 +33,7 @@ pub(super) fn of_clients() -> OpenApiRouter<ApiState> {
         .routes(routes!(cameras::get, cameras::put, cameras::delete))
         .routes(routes!(cameras::test))
         .routes(routes!(cameras::get_frame))
+        .routes(routes!(cameras::suggestion::get))
         .routes(routes!(results::list))
         .routes(routes!(results::delete::delete))
         .routes(routes!(results::followed::put))

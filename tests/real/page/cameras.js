@@ -69,6 +69,29 @@ pageTest(
   { server: RUN, expected: /status of 4(04|22)/ },
 );
 
+pageTest(
+  "a calibration that was found in a running camera is looked at and applied",
+  "",
+  async (page) => {
+    const body = JSON.stringify({ url: `${CAMERA}/room.png`, user: "viewer", password: PASSWORD });
+    await fetch(`${RUN}/cameras/attic`, { method: "PUT", body });
+    const suggestion = page.getByRole("group", { name: "Suggested calibration of attic" });
+    await suggestion.getByText(/A calibration was found in \d of 5 frames: 18\d° field of view, tilted by \d\.\d°/).waitFor();
+    await assertAccessible(page);
+    await suggestion.getByRole("button", { name: "Look" }).click();
+    await page.locator("#found-values").getByText(/of \d+ follow the room/).waitFor();
+    await page.locator("#previews canvas").first().waitFor();
+    assert.equal(await page.locator("#calibrate-id").inputValue(), "attic");
+    assert.equal((await fetch(`${RUN}/calibrations/attic`)).status, 404);
+    await page.getByRole("navigation").getByRole("link", { name: "Cameras" }).click();
+    await suggestion.getByRole("button", { name: "Apply" }).click();
+    await page.waitForFunction(async (url) => (await fetch(url)).ok, `${RUN}/calibrations/attic`);
+    await suggestion.getByText("field of view").waitFor({ state: "detached" });
+    await fetch(`${RUN}/cameras/attic`, { method: "DELETE" });
+  },
+  { server: RUN, expected: /status of 404/ },
+);
+
 for (const [device, viewport, colorScheme] of [["wide", WIDE, "dark"], ["phone", PHONE, "light"]]) {
   pageTest(
     `the address of a camera and the form are well on a ${device} screen`,

@@ -1,0 +1,189 @@
+//! The thread that finds lenses and heights.
+
+use std::sync::{Arc, mpsc::Receiver};
+
+use lookdown_detect::imaging::{
+    decode::decode,
+    room_fit::{RoomFrame, fit_room},
+};
+use lookdown_lens::{
+    calibration::{Calibration, CalibrationId, export::Target, native::NativeCalibration},
+    self_calibration::{CameraHeight, KnownLens},
+};
+
+use super::{
+    FRAMES, Shared, Suggestion,
+    observed::{Observed, Subject},
+};
+use crate::{
+    calibration_store::{CalibrationEntry, Reading, WriteCondition},
+    room_calibration::{checked, room_calibration, set_height},
+};
+
+/// The lowest priority: frames that are answered come first.
+const NICE: i32 = 19;
+
+/// Work of the thread.
+pub(super) enum Work {
+    /// An encoded frame of a camera.
+    Frame(CalibrationId, Vec<u8>),
+    /// New people of a camera.
+    People(CalibrationId),
+}
+
+/// The thread that finds lenses and heights, one after the other.
+pub(super) struct Worker(pub(super) Arc<Shared>);
+
+impl Worker {
+    /// Works until the sender is gone.
+    pub(super) fn run(self, waiting: &Receiver<Work>) {
+        // Of this thread alone, on Linux.
+        if let Err(error) = rustix::process::setpriority_process(None, NICE) {
+            tracing::warn!("calibrations are found without a lower priority: {error}");
+        }
+        for work in waiting {
+            match work {
+                Work::Frame(camera, image) => {
+                    self.fit(&camera, &image);
+                    self.measure_height(&camera);
+                    self.apply(&camera);
+                }
+                Work::People(camera) => self.measure_height(&camera),
+            }
+        }
+    }
+
+    /// Fits the lens to this frame and the frames before.
+    fn fit(&self, camera: &CalibrationId, image: &[u8]) {
+        // A frame that was detected can be decoded.
+        let Ok(decoded) = decode(image, &self.0.limits) else {
+            return;
+        };
+        let edges = RoomFrame::of(&decoded.frame);
+        drop(decoded);
+        let mut cameras = self.0.cameras.lock();
+        let Some(observed) = cameras.get_mut(camera) else {
+            return;
+        };
+        let frames = observed.add_frame(edges);
+        drop(cameras);
+        if frames.is_empty() {
+            return;
+        }
+        let fit = fit_room(&frames, KnownLens::default());
+        if let Some(observed) = self.0.cameras.lock().get_mut(camera) {
+            if let Ok(fit) = &fit {
+                tracing::info!(
+                    %camera,
+                    "a lens of {:.0}° was found from {} of {FRAMES} frames",
+                    2.0 * fit.max_theta.to_degrees(),
+                    frames.len()
+                );
+            }
+            observed.fit = Some(fit);
+            if observed.is_complete() {
+                observed.forget_frames();
+            }
+        }
+    }
+
+    /// Finds the height of a camera whose lens is known.
+    fn measure_height(&self, camera: &CalibrationId) {
+        let Some(known) = self.0.known_camera(camera) else {
+            return;
+        };
+        let people = self.0.cameras.lock().get(camera).map(Observed::people);
+        let Some(people) = people.filter(|people| !people.is_empty()) else {
+            return;
+        };
+        let height = CameraHeight::from_people(&people, known.lens(), known.mount());
+        if let Some(observed) = self.0.cameras.lock().get_mut(camera) {
+            observed.height = Some(height);
+        }
+    }
+
+    /// Stores the calibration of a camera that has none, if the settings permit it.
+    fn apply(&self, camera: &CalibrationId) {
+        let is_complete = |shared: &Shared| {
+            let cameras = shared.cameras.lock();
+            cameras.get(camera).is_some_and(Observed::is_complete)
+        };
+        if !self.0.applies || !is_complete(&self.0) {
+            return;
+        }
+        let found = self.0.suggestion(camera);
+        let Some(native) = found.and_then(|found| found.calibration) else {
+            return;
+        };
+        let written = match Target::Native.write(&native) {
+            Ok(written) => written.content,
+            Err(error) => return tracing::warn!(%camera, "the calibration is not stored: {error}"),
+        };
+        let put = self.0.calibrations.put(
+            camera,
+            written.as_bytes(),
+            &Reading::default(),
+            &WriteCondition::IfAbsent,
+        );
+        match put {
+            Ok(_) => tracing::info!(%camera, "the calibration that was found is in use"),
+            Err(error) => tracing::warn!(%camera, "the calibration is not stored: {error}"),
+        }
+    }
+}
+
+impl Shared {
+    /// The findings about a camera, if it is observed.
+    pub(super) fn suggestion(&self, camera: &CalibrationId) -> Option<Suggestion> {
+        let cameras = self.cameras.lock();
+        let observed = cameras.get(camera)?;
+        let (size, subject) = (observed.size(), observed.subject().clone());
+        let (fit, height) = (observed.fit.clone(), observed.height);
+        let frames = observed.frame_count();
+        drop(cameras);
+        let (base, replaces) = match &subject {
+            Subject::Lens => {
+                let found = fit.as_ref().and_then(|fit| fit.as_ref().ok());
+                let native = found.map(|fit| room_calibration(camera, size, fit));
+                (native, None)
+            }
+            Subject::Height(id) => {
+                let entry = self.calibrations.entry(id)?;
+                let revision = entry.calibration.revision().to_owned();
+                let native = matches!(height, Some(Ok(_))).then(|| entry.native.clone());
+                (native, Some(revision))
+            }
+        };
+        let calibration = base.map(|mut native: NativeCalibration| {
+            if let Some(Ok(height)) = &height {
+                set_height(&mut native, height);
+            }
+            native
+        });
+        let replaces = replaces.filter(|_| calibration.is_some());
+        Some(Suggestion {
+            frames,
+            fit,
+            height,
+            calibration,
+            replaces,
+        })
+    }
+
+    /// The camera of the calibration in use, or that of the lens that was found.
+    fn known_camera(&self, camera: &CalibrationId) -> Option<Arc<Calibration>> {
+        let cameras = self.cameras.lock();
+        let observed = cameras.get(camera)?;
+        match observed.subject() {
+            Subject::Height(id) => {
+                let entry: Arc<CalibrationEntry> = self.calibrations.entry(id)?;
+                Some(Arc::clone(&entry.calibration))
+            }
+            Subject::Lens => {
+                let fit = observed.fit.as_ref()?.as_ref().ok()?;
+                let native = room_calibration(camera, observed.size(), fit);
+                checked(&native).ok().map(Arc::new)
+            }
+        }
+    }
+}
