@@ -4,6 +4,7 @@
 //! frame at a time. Neither frames nor images of people are kept.
 
 mod observed;
+mod shared;
 mod worker;
 
 use std::{
@@ -17,17 +18,15 @@ use std::{
 };
 
 use lookdown_detect::{imaging::decode::DecodeLimits, pipeline::DetectedFrame};
-use lookdown_lens::{
-    calibration::{CalibrationId, native::NativeCalibration},
-    self_calibration::{CameraHeight, FitRefusal, HeightRefusal, RoomFit},
-};
+use lookdown_lens::calibration::CalibrationId;
 use parking_lot::Mutex;
 
 use crate::calibration_store::Calibrations;
 use observed::{Observed, Subject};
+use shared::Shared;
 use worker::{Work, Worker};
 
-pub(crate) use observed::FRAMES;
+pub(crate) use {observed::FRAMES, shared::Suggestion};
 
 /// Most cameras that are observed. The one that has been silent for longest is forgotten first.
 const MAX_CAMERAS: usize = 32;
@@ -39,31 +38,6 @@ pub(crate) struct Suggestions {
     shared: Arc<Shared>,
     /// The thread, started for the first frame. `None` if the operating system gives none.
     worker: OnceLock<Option<SyncSender<Work>>>,
-}
-
-/// The parts that the thread uses, too.
-struct Shared {
-    cameras: Mutex<BTreeMap<CalibrationId, Observed>>,
-    calibrations: Arc<Calibrations>,
-    limits: DecodeLimits,
-    /// True if a calibration from all frames is stored without a request.
-    applies: bool,
-}
-
-/// The findings about a camera.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Suggestion {
-    /// The number of frames of the lens.
-    pub frames: usize,
-    /// The lens, or the reason why the frames do not determine it. `None` before the first frame,
-    /// and for a camera with a calibration, which lacks the height only.
-    pub fit: Option<Result<RoomFit, FitRefusal>>,
-    /// The height, or the reason why the people do not determine it.
-    pub height: Option<Result<CameraHeight, HeightRefusal>>,
-    /// The calibration, if there is one to store.
-    pub calibration: Option<NativeCalibration>,
-    /// The revision of the calibration that it replaces.
-    pub replaces: Option<String>,
 }
 
 impl Suggestions {

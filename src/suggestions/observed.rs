@@ -195,6 +195,7 @@ mod tests {
     fn refused_frames_are_followed_by_one_each_hour() {
         let mut observed = Observed {
             fit: Some(Err(FitRefusal::Ambiguous)),
+            size: SIZE,
             ..Observed::default()
         };
         let start = Instant::now();

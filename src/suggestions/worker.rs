@@ -7,18 +7,15 @@ use lookdown_detect::imaging::{
     room_fit::{RoomFrame, fit_room},
 };
 use lookdown_lens::{
-    calibration::{Calibration, CalibrationId, export::Target, native::NativeCalibration},
+    calibration::{CalibrationId, export::Target},
     self_calibration::{CameraHeight, KnownLens},
 };
 
 use super::{
-    FRAMES, Shared, Suggestion,
-    observed::{Observed, Subject},
+    observed::{FRAMES, Observed},
+    shared::Shared,
 };
-use crate::{
-    calibration_store::{CalibrationEntry, Reading, WriteCondition},
-    room_calibration::{checked, room_calibration, set_height},
-};
+use crate::calibration_store::{Reading, WriteCondition};
 
 /// The lowest priority: frames that are answered come first.
 const NICE: i32 = 19;
@@ -128,62 +125,6 @@ impl Worker {
         match put {
             Ok(_) => tracing::info!(%camera, "the calibration that was found is in use"),
             Err(error) => tracing::warn!(%camera, "the calibration is not stored: {error}"),
-        }
-    }
-}
-
-impl Shared {
-    /// The findings about a camera, if it is observed.
-    pub(super) fn suggestion(&self, camera: &CalibrationId) -> Option<Suggestion> {
-        let cameras = self.cameras.lock();
-        let observed = cameras.get(camera)?;
-        let (size, subject) = (observed.size(), observed.subject().clone());
-        let (fit, height) = (observed.fit.clone(), observed.height);
-        let frames = observed.frame_count();
-        drop(cameras);
-        let (base, replaces) = match &subject {
-            Subject::Lens => {
-                let found = fit.as_ref().and_then(|fit| fit.as_ref().ok());
-                let native = found.map(|fit| room_calibration(camera, size, fit));
-                (native, None)
-            }
-            Subject::Height(id) => {
-                let entry = self.calibrations.entry(id)?;
-                let revision = entry.calibration.revision().to_owned();
-                let native = matches!(height, Some(Ok(_))).then(|| entry.native.clone());
-                (native, Some(revision))
-            }
-        };
-        let calibration = base.map(|mut native: NativeCalibration| {
-            if let Some(Ok(height)) = &height {
-                set_height(&mut native, height);
-            }
-            native
-        });
-        let replaces = replaces.filter(|_| calibration.is_some());
-        Some(Suggestion {
-            frames,
-            fit,
-            height,
-            calibration,
-            replaces,
-        })
-    }
-
-    /// The camera of the calibration in use, or that of the lens that was found.
-    fn known_camera(&self, camera: &CalibrationId) -> Option<Arc<Calibration>> {
-        let cameras = self.cameras.lock();
-        let observed = cameras.get(camera)?;
-        match observed.subject() {
-            Subject::Height(id) => {
-                let entry: Arc<CalibrationEntry> = self.calibrations.entry(id)?;
-                Some(Arc::clone(&entry.calibration))
-            }
-            Subject::Lens => {
-                let fit = observed.fit.as_ref()?.as_ref().ok()?;
-                let native = room_calibration(camera, observed.size(), fit);
-                checked(&native).ok().map(Arc::new)
-            }
         }
     }
 }
