@@ -96,14 +96,14 @@ export async function drawTools(card, info) {
   card.state.classList.toggle("failing", Boolean(info?.problem));
   showSuggestion(card);
   const { can_change: may } = await options();
-  const isStored = Boolean(may && info?.stored);
-  if (Boolean(card.manage.firstChild) === isStored && before?.paused === info?.paused) return;
-  card.manage.replaceChildren(...(isStored ? managing(card) : []));
+  const isManaged = Boolean(may && info);
+  if (Boolean(card.manage.firstChild) === isManaged && before?.paused === info?.paused) return;
+  card.manage.replaceChildren(...(isManaged ? managing(card) : []));
 }
 
 function stateOf(info) {
   if (!info) return "";
-  if (info.paused) return info.stored ? "Paused: no frames are read." : "Paused by its switch over MQTT: no frames are read.";
+  if (info.paused) return "Paused: no frames are read.";
   if (info.problem) return `No frames: ${info.problem}`;
   return info.warning ?? "";
 }
@@ -115,17 +115,12 @@ function managing(card) {
     await withProgress(card.strip, label, work);
     await card.reread();
   });
-  const pause = async () => {
-    const { user, every, calibration, profile } = card.info;
-    await ask(path, { method: "PUT", body: JSON.stringify({ user, every, calibration, profile, paused: !card.info.paused }) });
-  };
+  const pause = () => ask(path, { method: "PATCH", body: JSON.stringify({ paused: !card.info.paused }) });
   const remove = () => confirm(`Remove the camera ${camera}? Its reports and counts stay.`) && act("Removing", () => ask(path, { method: "DELETE" }))();
   const button = (label, onclick) => element("button", { type: "button", class: "quiet", onclick }, label);
-  return [
-    button("Settings", () => card.onchange(card.info)),
-    button(info.paused ? "Resume" : "Pause", act("Saving", pause)),
-    button("Remove", remove),
-  ];
+  const pausing = button(info.paused ? "Resume" : "Pause", act("Saving", pause));
+  // A camera of the settings is changed and removed there.
+  return info.stored ? [button("Settings", () => card.onchange(card.info)), pausing, button("Remove", remove)] : [pausing];
 }
 
 export function tellAge({ age, reportedAt }) {

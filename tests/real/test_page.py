@@ -137,8 +137,11 @@ class Page(unittest.TestCase):
 
     @contextlib.contextmanager
     def with_a_camera(self, folder: Path) -> Iterator[dict[str, str]]:
-        """A `lookdown run` without cameras, and a camera with a user. Yields variables of the tests."""
-        port, camera_port = free_ports(2)
+        """A `lookdown run` without cameras, one with a camera of its settings, and a camera with a user.
+
+        Yields variables of the tests.
+        """
+        port, settings_port, camera_port = free_ports(3)
         (folder / "run").mkdir()
         settings = {
             "SERVER__LISTEN": f"127.0.0.1:{port}",
@@ -148,14 +151,26 @@ class Page(unittest.TestCase):
             "DETECT__PROFILE": "fast",
             "LOG__FILTER": "warn",
         }
-        environment = {f"LOOKDOWN__{name}": str(value) for name, value in settings.items()}
+        others = {
+            "SERVER__LISTEN": f"127.0.0.1:{settings_port}",
+            "STATE__PATH": folder / "run" / "others",
+            "COUNTS__PATH": folder / "run" / "others.sqlite",
+        }
+        environment, other_environment = (
+            {f"LOOKDOWN__{name}": str(value) for name, value in chosen.items()}
+            for chosen in (settings, settings | others)
+        )
+        run = [str(LOOKDOWN), "run"]
+        run_with_camera = [*run, f"http://127.0.0.1:{camera_port}/snapshot.jpg", "--name", "gate"]
         with (
             http.server.ThreadingHTTPServer(("127.0.0.1", camera_port), Camera) as camera,
-            running("lookdown", [str(LOOKDOWN), "run"], port, "/readyz", environment),
+            running("lookdown", run, port, "/readyz", environment),
+            running("lookdown", run_with_camera, settings_port, "/readyz", other_environment),
         ):
             threading.Thread(target=camera.serve_forever, daemon=True).start()
             yield {
                 "LOOKDOWN_RUN_URL": f"http://127.0.0.1:{port}",
+                "LOOKDOWN_SETTINGS_RUN_URL": f"http://127.0.0.1:{settings_port}",
                 "LOOKDOWN_CAMERA_URL": f"http://127.0.0.1:{camera_port}",
                 "LOOKDOWN_CAMERA_PASSWORD": KEY,
             }

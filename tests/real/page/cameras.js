@@ -3,8 +3,8 @@
 import assert from "node:assert/strict";
 import { PHONE, WIDE, assertAccessible, assertFits, pageTest, picture } from "./browser.js";
 
-/** The address of `lookdown run`, and that of a camera with the user `viewer`. */
-const { LOOKDOWN_RUN_URL: RUN, LOOKDOWN_CAMERA_URL: CAMERA, LOOKDOWN_CAMERA_PASSWORD: PASSWORD } = process.env;
+/** The addresses of `lookdown run` without cameras, of one with a camera of its settings, and of a camera with the user `viewer`. */
+const { LOOKDOWN_RUN_URL: RUN, LOOKDOWN_SETTINGS_RUN_URL: SETTINGS_RUN, LOOKDOWN_CAMERA_URL: CAMERA, LOOKDOWN_CAMERA_PASSWORD: PASSWORD } = process.env;
 const camera = async (name) => (await fetch(`${RUN}/cameras/${name}`)).json();
 
 pageTest(
@@ -90,6 +90,20 @@ pageTest(
     await fetch(`${RUN}/cameras/attic`, { method: "DELETE" });
   },
   { server: RUN, expected: /status of 404/ },
+);
+
+pageTest(
+  "a camera of the settings is paused and resumed in the page",
+  "#camera/gate",
+  async (page) => {
+    const card = page.getByRole("article", { name: "Camera gate" });
+    await card.getByRole("button", { name: "Pause" }).click();
+    await card.getByText("Paused: no frames are read.").waitFor();
+    for (const name of ["Settings", "Remove"]) assert.equal(await card.getByRole("button", { name }).count(), 0);
+    await card.getByRole("button", { name: "Resume" }).click();
+    await card.getByRole("button", { name: "Pause" }).waitFor();
+  },
+  { server: SETTINGS_RUN, expected: /status of 404/ },
 );
 
 for (const [device, viewport, colorScheme] of [["wide", WIDE, "dark"], ["phone", PHONE, "light"]]) {
