@@ -5,6 +5,8 @@
 
 mod observed;
 mod shared;
+#[cfg(test)]
+mod tests;
 mod worker;
 
 use std::{

@@ -85,7 +85,7 @@ impl Worker {
     }
 
     /// Finds the height of a camera whose lens is known.
-    fn measure_height(&self, camera: &CalibrationId) {
+    pub(super) fn measure_height(&self, camera: &CalibrationId) {
         let Some(known) = self.0.known_camera(camera) else {
             return;
         };
@@ -100,7 +100,7 @@ impl Worker {
     }
 
     /// Stores the calibration of a camera that has none, if the settings permit it.
-    fn apply(&self, camera: &CalibrationId) {
+    pub(super) fn apply(&self, camera: &CalibrationId) {
         let is_complete = |shared: &Shared| {
             let cameras = shared.cameras.lock();
             cameras.get(camera).is_some_and(Observed::is_complete)

@@ -32,7 +32,7 @@ const RIVAL_EVIDENCE: f64 = 12.0;
 /// Difference of two maxima that matters: share of the radius, and radians of the level.
 const RIVAL_DISTANCE: (f64, f64) = (0.03, 0.026);
 /// Largest uncertainty of the radius, as a share, and of the level, degrees.
-const MAX_UNCERTAINTY: (f64, f64) = (0.016, 0.8);
+const MAX_UNCERTAINTY: (f64, f64) = (0.012, 0.8);
 /// Largest difference of a fit of half of the edges.
 const MAX_HALF: (f64, f64) = (0.03, 2.0);
 
