@@ -113,7 +113,8 @@ def compare(places, binary, frames, found, true, people):
     """Adds the errors on the floor of the calibrations that are compared."""
     height_m = true["mount"]["height_m"]
     circle, _, _ = run(binary, "fit", "--circle-only", *frames)
-    places["floor, circle and true height, %"] += floor_errors(circle, height_m, people)
+    if circle is not None:
+        places["floor, circle and true height, %"] += floor_errors(circle, height_m, people)
     places["floor, fit and true height, %"] += floor_errors(found, height_m, people)
     measured, _, _ = run(binary, "fit", "--people", *frames)
     if measured is not None:
