@@ -17,8 +17,9 @@ use super::{
 };
 use crate::calibration_store::{Reading, WriteCondition};
 
-/// The lowest priority: frames that are answered come first.
-const NICE: i32 = 19;
+/// A low priority: frames that are answered come first. At the lowest one, a busy machine would not end
+/// a fit for minutes.
+const NICE: i32 = 10;
 
 /// Work of the thread.
 pub(super) enum Work {

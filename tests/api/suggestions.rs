@@ -92,7 +92,7 @@ async fn found(service: &Service) -> Value {
             sleep(Duration::from_millis(20)).await;
         }
     };
-    timeout(Duration::from_mins(1), asking).await.unwrap()
+    timeout(Duration::from_mins(5), asking).await.unwrap()
 }
 
 #[tokio::test]

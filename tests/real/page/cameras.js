@@ -76,7 +76,7 @@ pageTest(
     const body = JSON.stringify({ url: `${CAMERA}/room.png`, user: "viewer", password: PASSWORD });
     await fetch(`${RUN}/cameras/yard`, { method: "PUT", body });
     const suggestion = page.getByRole("group", { name: "Suggested calibration of yard" });
-    await suggestion.getByText(/A calibration was found in \d of 5 frames: 18\d° field of view, tilted by \d\.\d°/).waitFor();
+    await suggestion.getByText(/A calibration was found in \d of 5 frames: 18\d° field of view, tilted by \d\.\d°/).waitFor({ timeout: 180_000 });
     await assertAccessible(page);
     await suggestion.getByRole("button", { name: "Look" }).click();
     await page.locator("#found-values").getByText(/of \d+ follow the room/).waitFor();
