@@ -38,6 +38,7 @@ pub(super) fn of_clients() -> OpenApiRouter<ApiState> {
         ))
         .routes(routes!(cameras::test))
         .routes(routes!(cameras::get_frame))
+        .routes(routes!(cameras::suggestion::get))
         .routes(routes!(results::list))
         .routes(routes!(results::delete::delete))
         .routes(routes!(results::followed::put))

@@ -20,6 +20,7 @@ from pathlib import Path
 
 from harness.places import LOOKDOWN
 from harness.processes import free_ports, running
+from rendered_room import rendered_room
 from support.lookdown import lookdown
 from support.places import FIXTURES, ROOT, SAMPLES
 from test_count import Count
@@ -29,6 +30,7 @@ KEY = "a key that only this test knows"
 PICTURED = "gate,office,canteen,lounge"
 """Cameras whose images are kept."""
 OFFICE = (SAMPLES / "office.jpg").read_bytes()
+ROOM = rendered_room()
 WALKS = HERE.parent / "walks"
 ZONE = {"name": "middle", "floor_m": [[-2, -1], [2, -1], [2, 3], [-2, 3]]}
 
@@ -39,11 +41,12 @@ class Camera(http.server.BaseHTTPRequestHandler):
     def do_GET(self) -> None:
         login = base64.b64encode(f"viewer:{KEY}".encode()).decode()
         is_allowed = self.headers.get("Authorization") == f"Basic {login}"
-        is_found = self.path == "/snapshot.jpg?token=1"
+        images = {"/snapshot.jpg?token=1": OFFICE, "/room.png": ROOM}
+        is_found = self.path in images
         self.send_response(200 if is_allowed and is_found else 404 if is_allowed else 401)
         self.send_header("WWW-Authenticate", 'Basic realm="camera"')
         self.send_header("Content-Type", "image/jpeg")
-        body = OFFICE if is_allowed and is_found else b""
+        body = images[self.path] if is_allowed and is_found else b""
         self.send_header("Content-Length", str(len(body)))
         self.end_headers()
         self.wfile.write(body)

@@ -1,5 +1,7 @@
 //! The cameras of `lookdown run`: the scope `read` reads them, the scope `admin` changes them.
 
+pub(in crate::api) mod suggestion;
+
 use std::sync::Arc;
 
 use axum::{
@@ -88,6 +90,9 @@ pub(in crate::api) struct CameraInfo {
     warning: Option<String>,
     /// The reason why the source gives no frames.
     problem: Option<String>,
+    /// `true` if a calibration was found for the camera that it does not have:
+    /// `GET /cameras/{camera}/suggested-calibration`.
+    has_suggested_calibration: bool,
 }
 
 /// A change of a camera.
@@ -144,7 +149,7 @@ pub(in crate::api) async fn list(
     State(state): State<ApiState>,
     _reader: RequireRead,
 ) -> Result<impl IntoResponse, Problem> {
-    let rows = rows(cameras(&state)?).await?;
+    let rows = rows(&state).await?;
     Ok(([(CACHE_CONTROL, "no-store")], Json(rows)))
 }
 
@@ -162,7 +167,7 @@ pub(in crate::api) async fn get(
     _reader: RequireRead,
     Path(name): Path<String>,
 ) -> Result<impl IntoResponse, Problem> {
-    let rows = rows(cameras(&state)?).await?;
+    let rows = rows(&state).await?;
     let row = rows.into_iter().find(|row| row.name == name);
     let row = row.ok_or_else(unknown)?;
     Ok(([(CACHE_CONTROL, "no-store")], Json(row)))
@@ -315,7 +320,8 @@ async fn change<T: Send + 'static>(
     changed.map_err(Problem::internal)?.map_err(refused)
 }
 
-async fn rows(cameras: Arc<Cameras>) -> Result<Vec<CameraInfo>, Problem> {
+async fn rows(state: &ApiState) -> Result<Vec<CameraInfo>, Problem> {
+    let cameras = cameras(state)?;
     let read = Arc::clone(&cameras);
     let stored = spawn_blocking(move || Ok((read.stored()?, read.paused_of_settings()?))).await;
     let stored: Result<_, ConfigError> = stored.map_err(Problem::internal)?;
@@ -357,6 +363,9 @@ async fn rows(cameras: Arc<Cameras>) -> Result<Vec<CameraInfo>, Problem> {
         row.calibration = camera.calibration;
         row.profile = camera.profile;
         row.name = name;
+    }
+    for row in &mut rows {
+        row.has_suggested_calibration = state.suggestions.has(&row.name);
     }
     rows.sort_unstable_by(|one, other| one.name.cmp(&other.name));
     Ok(rows)

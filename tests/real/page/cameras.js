@@ -70,6 +70,29 @@ pageTest(
 );
 
 pageTest(
+  "a calibration that was found in a running camera is looked at and applied",
+  "",
+  async (page) => {
+    const body = JSON.stringify({ url: `${CAMERA}/room.png`, user: "viewer", password: PASSWORD });
+    await fetch(`${RUN}/cameras/yard`, { method: "PUT", body });
+    const suggestion = page.getByRole("group", { name: "Suggested calibration of yard" });
+    await suggestion.getByText(/A calibration was found in \d of 5 frames: 18\d° field of view, tilted by \d\.\d°/).waitFor({ timeout: 180_000 });
+    await assertAccessible(page);
+    await suggestion.getByRole("button", { name: "Look" }).click();
+    await page.locator("#found-values").getByText(/of \d+ follow the room/).waitFor();
+    await page.locator("#previews canvas").first().waitFor();
+    assert.equal(await page.locator("#calibrate-id").inputValue(), "yard");
+    assert.equal((await fetch(`${RUN}/calibrations/yard`)).status, 404);
+    await page.getByRole("navigation").getByRole("link", { name: "Cameras" }).click();
+    await suggestion.getByRole("button", { name: "Apply" }).click();
+    await page.waitForFunction(async (url) => (await fetch(url)).ok, `${RUN}/calibrations/yard`);
+    await suggestion.getByText("field of view").waitFor({ state: "detached" });
+    await fetch(`${RUN}/cameras/yard`, { method: "DELETE" });
+  },
+  { server: RUN, expected: /status of 404/ },
+);
+
+pageTest(
   "a camera of the settings is paused and resumed in the page",
   "#camera/gate",
   async (page) => {
