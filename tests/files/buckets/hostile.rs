@@ -121,11 +121,11 @@ fn answer(stream: &mut TcpStream, name: &str) -> Option<()> {
     let (rest, pause): (&[u8], _) = match name {
         "endless" => {
             start(length(1 << 50))?;
-            (&[b' '; 1 << 16], 0)
+            (&[b' '; 1 << 13], 0)
         }
         "huge" => {
             start(length(50_000_000))?;
-            (&[b'{'; 1 << 16], 0)
+            (&[b'{'; 1 << 13], 0)
         }
         "slow" => {
             start(length(1000))?;

@@ -104,11 +104,7 @@ mod tests {
             "&unknown;",
         ]
         .map(object);
-        let refused = [
-            &refused[..],
-            &["c//", "c/../", "c/./"].map(|name| prefix(name)),
-        ]
-        .concat();
+        let refused = [&refused[..], &["c//", "c/../", "c/./"].map(prefix)].concat();
         let mixed: Vec<_> = refused[..4]
             .iter()
             .chain(&good[..1])
