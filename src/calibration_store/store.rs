@@ -23,8 +23,8 @@ pub trait CalibrationStore: fmt::Debug + Send + Sync {
     /// once, since a store that is far away reads them side by side. At most [`READ_AT_ONCE`].
     ///
     /// # Errors
-    /// Per file: [`StoreError::Unreachable`] when the whole store does not answer, others when this
-    /// file cannot be read, for example because it has gone meanwhile.
+    /// Per file: [`StoreError::Unreachable`] when the store does not answer, others when this file
+    /// cannot be read, for example because it has gone meanwhile.
     fn read(&self, names: &[&str], at_most: usize) -> Vec<Result<Vec<u8>, StoreError>>;
 
     /// Creates or replaces a file atomically: a reader, also after a crash, sees

@@ -16,6 +16,7 @@ use tokio::{
     signal::unix::{Signal, SignalKind, signal},
     spawn,
     task::spawn_blocking,
+    time::timeout,
 };
 
 use super::SettingsFile;
@@ -30,6 +31,9 @@ const MAX_RUNTIME_THREADS: usize = 2;
 /// Longest time that the end of the process waits for tasks that block. They may take as long as
 /// workers that are stuck.
 const LAST_TASKS: Duration = Duration::from_secs(1);
+/// Longest time that the end of the process waits for the last spans. They are not sent while all
+/// threads for blocking work wait, as for a file system that hangs.
+const LAST_SPANS: Duration = Duration::from_secs(4);
 
 /// Arguments of `lookdown serve`.
 #[derive(Debug, Args)]
@@ -114,13 +118,19 @@ pub(super) async fn serve_app(
 ) -> anyhow::Result<()> {
     let (tracer, at_once) = (app.tracer(), shutdown.clone());
     let outcome = app.serve(sockets, shutdown).await;
-    let last_spans = spawn_blocking(move || tracer.shut_down());
+    let last_spans = in_time(LAST_SPANS, move || tracer.shut_down());
     tokio::select! {
         biased;
         () = at_once.requested_at_once() => {}
-        _ = last_spans => {}
+        () = last_spans => {}
     }
     outcome
+}
+
+/// Runs blocking work, and waits for its end or for the limit.
+async fn in_time(limit: Duration, work: impl FnOnce() + Send + 'static) {
+    // A panic was already logged.
+    let _ = timeout(limit, spawn_blocking(work)).await;
 }
 
 /// Reloads files on each signal. Signals that arrive during a reload cause one more.
@@ -156,6 +166,23 @@ mod tests {
         let (done, stuck) = sync_channel::<()>(0);
         runtime.spawn_blocking(move || stuck.recv());
         let began = Instant::now();
+        end(runtime);
+        assert!(began.elapsed() < Duration::from_secs(3));
+        drop(done);
+    }
+
+    #[test]
+    fn stuck_tasks_on_all_threads_do_not_stop_the_end() {
+        let mut builder = runtime::Builder::new_multi_thread();
+        let runtime = builder.max_blocking_threads(1).enable_time().build();
+        let runtime = runtime.unwrap();
+        let (done, stuck) = sync_channel::<()>(0);
+        runtime.spawn_blocking(move || stuck.recv());
+        let began = Instant::now();
+        runtime.block_on(async {
+            let last = in_time(Duration::from_millis(100), || {});
+            let _ = timeout(Duration::from_secs(3), last).await;
+        });
         end(runtime);
         assert!(began.elapsed() < Duration::from_secs(3));
         drop(done);

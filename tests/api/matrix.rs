@@ -57,12 +57,17 @@ fn counts_document() -> Value {
 /// Every operation of a document, with values in its path.
 fn documented(document: &Value) -> Vec<Operation> {
     let mut operations = Vec::new();
+    let known = METHODS.map(str::to_lowercase);
     for (path, item) in document["paths"].as_object().unwrap() {
         let mut filled = path.clone();
         for (parameter, value) in PARAMETERS {
             filled = filled.replace(parameter, value);
         }
         assert!(!filled.contains('{'), "{path}: give its parameter a value");
+        for key in item.as_object().unwrap().keys() {
+            let is_known = known.contains(key) || ["parameters", "summary"].contains(&&**key);
+            assert!(is_known, "{path}: {key} is not in METHODS");
+        }
         for method in METHODS {
             let operation = &item[method.to_lowercase()];
             if operation.is_object() {

@@ -160,6 +160,54 @@ fn responses_of_an_inference_server_are_bounded() {
     }
 }
 
+/// An answer that only announces another one, without end.
+fn provisional() -> Evil {
+    Evil {
+        name: "endless provisional responses",
+        start: String::new(),
+        rest: b"HTTP/1.1 103 Early Hints\r\nLink: </s.css>; rel=preload\r\n\r\n".repeat(1000),
+        pause: Duration::ZERO,
+    }
+}
+
+/// Returns the memory that this process uses, in bytes.
+fn resident_bytes() -> u64 {
+    let pages = fs::read_to_string("/proc/self/statm").unwrap();
+    let pages = pages.split(' ').nth(1).unwrap();
+    pages.parse::<u64>().unwrap() * 4096
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn provisional_responses_end_at_the_timeout() {
+    let before = resident_bytes();
+    let server = |address: SocketAddr| {
+        let options = RemoteOptions {
+            url: format!("http://{address}").parse().unwrap(),
+            token: None,
+            model: "there".to_owned(),
+            called: "here".to_owned(),
+            patience: Duration::from_secs(3),
+        };
+        RemoteServer::new(options, Arc::default()).unwrap()
+    };
+    let began = Instant::now();
+    let peer = EvilServer::start(provisional());
+    spawn_blocking(move || {
+        let server = server(peer.address);
+        (0..3).for_each(|_| {
+            server.check_health();
+        });
+        assert!(!server.is_available());
+        let bucket = bucket_at(peer.address).list().unwrap_err().to_string();
+        assert!(bucket.contains("no answer in time"), "{bucket}");
+    })
+    .await
+    .unwrap();
+    // Three probes of 2 s and a request of 5 s.
+    assert!(began.elapsed() < Duration::from_secs(20));
+    assert!(resident_bytes() < before + (100 << 20));
+}
+
 fn bucket_at(address: SocketAddr) -> BucketStore {
     let variables = [
         ("AWS_ENDPOINT", format!("http://{address}")),

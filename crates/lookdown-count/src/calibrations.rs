@@ -177,12 +177,12 @@ mod tests {
     fn calibrations_beyond_the_limits_are_forgotten() {
         let content = vec![b' '; CalibrationFile::MAX_BYTES];
         let stored =
-            (0..400).map(|number| (number.to_string(), ("1".to_owned(), Some(content.clone()))));
+            (0..40).map(|number| (number.to_string(), ("1".to_owned(), Some(content.clone()))));
         let mut calibrations = Calibrations::resumed(stored.collect());
         let forgotten = calibrations.forget_oldest("7");
         let kept = MAX_TOTAL_BYTES / CalibrationFile::MAX_BYTES;
         assert_eq!(calibrations.known.len(), kept);
-        assert_eq!(forgotten.len(), 400 - kept);
+        assert_eq!(forgotten.len(), 40 - kept);
         assert!(calibrations.known.contains_key("7"));
     }
 }

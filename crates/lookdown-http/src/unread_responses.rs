@@ -79,3 +79,36 @@ impl AsRef<[u8]> for Held {
         &self.content
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use axum::{Router, http::StatusCode, middleware::from_fn_with_state, routing::get};
+    use tower::ServiceExt as _;
+
+    use super::*;
+
+    #[tokio::test]
+    async fn large_responses_share_a_budget_until_they_are_read() {
+        let large = async || vec![0_u8; 100 << 10];
+        let budget = UnreadResponses::new(250);
+        let routes = Router::new()
+            .route("/large", get(large))
+            .route("/small", get(async || "small"))
+            .layer(from_fn_with_state(budget, bound));
+        let ask = async |path: &str| {
+            let request = Request::get(path).body(Body::empty()).unwrap();
+            routes.clone().oneshot(request).await.unwrap()
+        };
+        let (first, second) = (ask("/large").await, ask("/large").await);
+        assert_eq!(
+            [first.status(), second.status()],
+            [StatusCode::OK, StatusCode::OK]
+        );
+        assert_eq!(ask("/large").await.status(), StatusCode::TOO_MANY_REQUESTS);
+        assert_eq!(ask("/small").await.status(), StatusCode::OK);
+        let read = to_bytes(first.into_body(), usize::MAX).await.unwrap();
+        assert_eq!(read.len(), 100 << 10);
+        drop(read);
+        assert_eq!(ask("/large").await.status(), StatusCode::OK);
+    }
+}

@@ -4,6 +4,7 @@ use std::{future::Future, time::Duration};
 
 use lookdown_detect::pipeline::PipelineError;
 use tokio::{
+    sync::Semaphore,
     task::spawn_blocking,
     time::{Instant, timeout_at},
 };
@@ -12,6 +13,11 @@ use super::problem::{Problem, ProblemKind};
 
 /// The setting of the limit.
 const REQUEST_TIMEOUT: &str = "server.request_timeout_millis";
+
+/// Most changes that run at a time. A change of a store that hangs keeps a thread, of which the
+/// runtime has 512 for blocking work.
+const MAX_CHANGES: usize = 32;
+static CHANGES: Semaphore = Semaphore::const_new(MAX_CHANGES);
 
 /// The time at which a response must be complete.
 #[derive(Debug, Clone, Copy)]
@@ -75,6 +81,30 @@ impl Deadline {
         Ok(done?)
     }
 
+    /// Runs blocking work that changes stored calibrations or models, unless many such changes wait
+    /// already, as for a store that hangs.
+    pub(in crate::api) async fn changing<T, E>(
+        self,
+        work: impl FnOnce() -> Result<T, E> + Send + 'static,
+    ) -> Result<T, Problem>
+    where
+        T: Send + 'static,
+        E: Into<Problem> + Send + 'static,
+    {
+        let permit = CHANGES.try_acquire().map_err(|_| {
+            let detail = format!(
+                "{MAX_CHANGES} changes of calibrations and models wait for their store: retry when \
+                 it responds"
+            );
+            Problem::new(ProblemKind::Overloaded, detail)
+        })?;
+        self.blocking(move || {
+            let _permit = permit;
+            work()
+        })
+        .await
+    }
+
     /// Runs blocking work on a thread outside the async runtime, in the span of the request. Work
     /// that has begun is never interrupted: it continues after the request has timed out.
     pub(in crate::api) async fn blocking<T, E>(
@@ -98,5 +128,42 @@ impl Deadline {
             Problem::new(ProblemKind::Timeout, detail)
         })?;
         done.map_err(Problem::internal)?.map_err(Into::into)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::{Arc, mpsc::sync_channel};
+
+    use parking_lot::Mutex;
+    use tokio::spawn;
+
+    use super::*;
+
+    #[tokio::test]
+    async fn changes_of_a_store_that_hangs_are_refused_beyond_a_limit() {
+        let (release, hang) = sync_channel::<()>(0);
+        let hang = Arc::new(Mutex::new(hang));
+        let deadline = || Deadline::begin(Duration::from_mins(1));
+        let waiting: Vec<_> = (0..MAX_CHANGES)
+            .map(|_| {
+                let hang = Arc::clone(&hang);
+                spawn(deadline().changing(move || {
+                    let _ = hang.lock().recv();
+                    Ok::<_, Problem>(())
+                }))
+            })
+            .collect();
+        while CHANGES.available_permits() > 0 {
+            tokio::task::yield_now().await;
+        }
+        let refused = deadline().changing(|| Ok::<_, Problem>(())).await;
+        assert_eq!(refused.unwrap_err().kind(), ProblemKind::Overloaded);
+        let other = deadline().blocking(|| Ok::<_, Problem>(1)).await;
+        assert_eq!(other.ok(), Some(1));
+        drop(release);
+        for change in waiting {
+            assert!(change.await.unwrap().is_ok());
+        }
     }
 }

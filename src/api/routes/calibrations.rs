@@ -128,7 +128,7 @@ pub(in crate::api) async fn put(
 ) -> Result<Response, Problem> {
     let condition = write_condition(&headers)?;
     let location = format!("/calibrations/{id}");
-    let put = deadline.blocking(move || {
+    let put = deadline.changing(move || {
         let CalibrationUpload { content, reading } = upload;
         state.calibrations.put(&id, &content, &reading, &condition)
     });
@@ -163,7 +163,7 @@ pub(in crate::api) async fn delete(
     headers: HeaderMap,
 ) -> Result<StatusCode, Problem> {
     let condition = write_condition(&headers)?;
-    let delete = deadline.blocking(move || state.calibrations.delete(&id, &condition));
+    let delete = deadline.changing(move || state.calibrations.delete(&id, &condition));
     delete.await?;
     Ok(StatusCode::NO_CONTENT)
 }

@@ -13,6 +13,9 @@ use super::{
 };
 use crate::calibration_store::{READ_AT_ONCE, StoreError};
 
+/// Batches in a row of which no file is answered, after which a scan ends: the store is silent.
+const MAX_SILENT: usize = 2;
+
 /// The files of a store by the ID in their names.
 type Files = BTreeMap<CalibrationId, Arc<LoadedFile>>;
 
@@ -54,40 +57,64 @@ impl Calibrations {
         if before.store_problem.is_none() && gone.is_empty() && changed.is_empty() {
             return Ok(());
         }
-        self.load(changed, &before.files, &mut files)?;
+        // Those that could not be read at the last scan come last, so that they stop no others.
+        changed.sort_by_key(|(id, _)| before.files.get(id).is_none_or(|file| file.has_been_read()));
+        let problem = self.load(changed, &before.files, &mut files);
         for gone in gone {
             tracing::info!(calibration = %gone, "its file is gone");
         }
-        if before.store_problem.is_some() {
-            tracing::info!("calibrations can be read again");
+        match (&problem, &before.store_problem) {
+            (None, Some(_)) => tracing::info!("calibrations can be read again"),
+            (Some(problem), known) if known.as_ref() != Some(problem) => {
+                tracing::error!("some calibrations are not read yet: {problem}");
+            }
+            _ => {}
         }
-        self.replace(Snapshot::of(files));
+        let now = Snapshot::of(files);
+        self.replace(match problem {
+            Some(problem) => now.with_store_problem(problem),
+            None => now,
+        });
         Ok(())
     }
 
-    /// Reads files, as they are listed, into `files`.
+    /// Reads files, as they are listed, into `files`. When several batches in a row are not
+    /// answered, the rest stays as it is in `before`. Returns the reason in that case.
     fn load(
         &self,
         mut listed: Vec<(CalibrationId, NamedFile)>,
         before: &Files,
         files: &mut Files,
-    ) -> Result<(), StoreError> {
+    ) -> Option<String> {
+        let mut silent = 0;
         while !listed.is_empty() {
             let some = listed.split_off(listed.len().saturating_sub(READ_AT_ONCE));
             let names: Vec<_> = some.iter().map(|(_, named)| &*named.file.name).collect();
             // One byte more than is accepted, so that a larger file is known for one.
             let contents = self.store.read(&names, CalibrationFile::MAX_BYTES + 1);
+            let unanswered = |content: &Result<_, _>| match content {
+                Err(error @ StoreError::Unreachable { .. }) => Some(error.to_string()),
+                _ => None,
+            };
+            let reasons: Vec<_> = contents.iter().filter_map(unanswered).collect();
+            let is_silent = reasons.len() == contents.len();
+            silent = if is_silent { silent + 1 } else { 0 };
             for ((id, named), content) in some.into_iter().zip(contents) {
-                if let Err(error @ StoreError::Unreachable { .. }) = content {
-                    return Err(error);
-                }
                 let known = before.get(&id).map(Arc::as_ref);
                 let loaded = LoadedFile::new(&self.reader, &id, named, content, known);
                 self.tell(&loaded, known);
                 files.insert(id, Arc::new(loaded));
             }
+            if silent == MAX_SILENT && !listed.is_empty() {
+                let rest = listed.into_iter().filter_map(|(id, _)| {
+                    let known = before.get(&id)?;
+                    Some((id, Arc::clone(known)))
+                });
+                files.extend(rest);
+                return reasons.into_iter().next();
+            }
         }
-        Ok(())
+        None
     }
 
     /// Counts and logs what a file changes.

@@ -5,6 +5,7 @@ mod background;
 mod bounded;
 mod connection;
 mod failure;
+mod listing;
 
 use std::sync::Arc;
 

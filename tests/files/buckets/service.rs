@@ -12,6 +12,8 @@ use std::{
 use crate::buckets::s3_server::variables;
 
 const PATIENCE: Duration = Duration::from_mins(1);
+/// Pause between two looks.
+const POLL: Duration = Duration::from_millis(20);
 
 /// A server that polls `s3://cameras/ceiling` every second.
 pub(crate) struct Service {
@@ -91,7 +93,7 @@ impl Service {
                 return answer;
             }
             assert!(begun.elapsed() < PATIENCE, "still {answer}; {}", self.log());
-            thread::yield_now();
+            thread::sleep(POLL);
         }
     }
 
@@ -104,7 +106,7 @@ impl Service {
                 return log;
             }
             assert!(begun.elapsed() < PATIENCE, "no {expected:?} in {log}");
-            thread::yield_now();
+            thread::sleep(POLL);
         }
     }
 

@@ -8,6 +8,8 @@ from pathlib import Path
 
 from harness.places import SAMPLES
 
+from .heads import heads
+
 MULTIPART = b"HTTP/1.1 200 OK\r\nContent-Type: multipart/x-mixed-replace; boundary=B\r\n\r\n"
 PART_BYTES = (12 << 20) - 1000
 """Memory of such frames comes from the heaps of malloc, which keep it, unless a variable makes them return it."""
@@ -32,14 +34,7 @@ def http_camera() -> Iterator[str]:
 
 def _serve(connection: socket.socket) -> None:
     with contextlib.suppress(OSError), contextlib.closing(connection):
-        received = b""
-        while True:
-            while b"\r\n\r\n" not in received:
-                chunk = connection.recv(65536)
-                if not chunk:
-                    return
-                received += chunk
-            head, _, received = received.partition(b"\r\n\r\n")
+        for head in heads(connection):
             path = head.split(b" ")[1].strip(b"/")
             if path.startswith(b"provisional"):
                 while True:

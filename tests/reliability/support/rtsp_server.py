@@ -9,6 +9,8 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+from .heads import heads
+
 DESCRIPTION = (
     "v=0\r\no=- 0 0 IN IP4 127.0.0.1\r\ns=x\r\nc=IN IP4 127.0.0.1\r\nt=0 0\r\n"
     "m=video 0 RTP/AVP 96\r\na=rtpmap:96 H264/90000\r\n"
@@ -48,14 +50,7 @@ def rtsp_server(*, redirect: str = "", streams: int = 0, video: bytes = b"") -> 
 
     def serve(connection: socket.socket) -> None:
         with contextlib.suppress(OSError), contextlib.closing(connection):
-            received = b""
-            while True:
-                while b"\r\n\r\n" not in received:
-                    chunk = connection.recv(65536)
-                    if not chunk:
-                        return
-                    received += chunk
-                head, _, received = received.partition(b"\r\n\r\n")
+            for head in heads(connection):
                 server.heads.append(head.decode("latin1"))
                 connection.sendall(_answer(server.heads[-1], redirect, streams))
                 if head.startswith(b"PLAY") and video:

@@ -92,3 +92,51 @@ pub(super) async fn check_known(api: &Shared, owner: &Owner) -> Result<(), Probl
 pub(super) fn rounded(place: [f64; 2]) -> [f64; 2] {
     place.map(|value| (value * 1000.0).round() / 1000.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::{sync::mpsc::sync_channel, time::Duration};
+
+    use tokio::spawn;
+
+    use super::*;
+
+    #[tokio::test]
+    async fn reading_and_drawing_leave_the_runtime_free() {
+        let (release, released) = sync_channel::<()>(1);
+        let work = spawn(blocking(move || {
+            let waited = released.recv_timeout(Duration::from_secs(20));
+            Ok(waited.is_ok())
+        }));
+        // Runs on the only thread of the runtime while the work waits.
+        let other = spawn(async move { release.send(()).is_ok() });
+        assert!(work.await.unwrap().ok().unwrap() && other.await.unwrap());
+    }
+
+    #[tokio::test]
+    async fn a_few_requests_read_or_draw_at_a_time() {
+        let (release, released) = sync_channel::<()>(0);
+        let released = Arc::new(Mutex::new(released));
+        let (begun, beginnings) = sync_channel(100);
+        let works: Vec<_> = (0..3 * MAX_CONCURRENT)
+            .map(|_| {
+                let (begun, released) = (begun.clone(), Arc::clone(&released));
+                spawn(blocking(move || {
+                    let _ = begun.send(());
+                    let _ = released.lock().recv();
+                    Ok(())
+                }))
+            })
+            .collect();
+        for _ in 0..MAX_CONCURRENT {
+            tokio::task::yield_now().await;
+        }
+        let begins = || beginnings.recv_timeout(Duration::from_millis(500)).is_ok();
+        let at_once = (0..3 * MAX_CONCURRENT).take_while(|_| begins()).count();
+        assert_eq!(at_once, MAX_CONCURRENT);
+        drop(release);
+        for work in works {
+            assert!(work.await.unwrap().is_ok());
+        }
+    }
+}

@@ -108,7 +108,7 @@ pub(in crate::api) async fn load(
     Path(name): Path<String>,
     _: SmallBody<LoadRequest>,
 ) -> Result<Json<RepositoryEntry>, Problem> {
-    let model = deadline.blocking(move || state.models.load(&name)).await?;
+    let model = deadline.changing(move || state.models.load(&name)).await?;
     Ok(Json(RepositoryEntry::from(&*model)))
 }
 
@@ -133,7 +133,7 @@ pub(in crate::api) async fn unload(
     _: SmallBody<UnloadRequest>,
 ) -> Result<Json<RepositoryEntry>, Problem> {
     let unloaded = name.clone();
-    let unload = deadline.blocking(move || state.models.unload(&unloaded));
+    let unload = deadline.changing(move || state.models.unload(&unloaded));
     unload.await?;
     Ok(Json(RepositoryEntry::from(RepositoryRow {
         name,

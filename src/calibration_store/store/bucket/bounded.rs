@@ -1,8 +1,11 @@
 //! An HTTP client for buckets that bounds the size of every response. The provider's client reads
 //! listings and error messages of any size into memory, and reserves the declared length at once.
+//! Names that it refuses are removed from listings.
 
 use std::{
+    borrow::Cow,
     pin::Pin,
+    sync::atomic::{AtomicUsize, Ordering},
     task::{Context, Poll, ready},
 };
 
@@ -18,9 +21,14 @@ use object_store::{
     },
 };
 
+use super::listing::{Usable, usable};
+
 /// Most bytes of a response: more than the largest page of a listing, 5000 objects with names of
 /// 1024 bytes.
 const MAX_RESPONSE_BYTES: u64 = 16 << 20;
+
+/// Query parameters of requests for a listing: of S3 and Google Cloud Storage, and of Azure.
+const LISTINGS: [&str; 2] = ["list-type=2", "comp=list"];
 
 /// Creates clients with bounded responses.
 #[derive(Debug, Default)]
@@ -29,26 +37,67 @@ pub(super) struct BoundedConnector(ReqwestConnector);
 impl HttpConnector for BoundedConnector {
     fn connect(&self, options: &ClientOptions) -> Result<HttpClient> {
         let client = self.0.connect(options)?;
-        Ok(HttpClient::new(BoundedClient(client)))
+        Ok(HttpClient::new(BoundedClient {
+            client,
+            most_refused: AtomicUsize::new(0),
+        }))
     }
 }
 
 #[derive(Debug)]
-struct BoundedClient(HttpClient);
+struct BoundedClient {
+    client: HttpClient,
+    /// The most entries of a page that were refused, so that a warning is not repeated.
+    most_refused: AtomicUsize,
+}
+
+impl BoundedClient {
+    fn without_refused_names(&self, page: Bytes) -> Bytes {
+        let Ok(text) = str::from_utf8(&page) else {
+            return page;
+        };
+        let Usable { listing, refused } = usable(text);
+        if refused > self.most_refused.fetch_max(refused, Ordering::Relaxed) {
+            tracing::warn!(
+                "{refused} objects of the bucket of the calibrations are skipped: their names have \
+                 empty or relative parts, such as a//b or ../a, or control characters: remove them"
+            );
+        }
+        match listing {
+            Cow::Borrowed(_) => page,
+            Cow::Owned(listing) => listing.into(),
+        }
+    }
+}
+
+/// Returns true for the request of a page of a listing.
+fn is_listing(request: &HttpRequest) -> bool {
+    let query = request.uri().query().unwrap_or_default();
+    query
+        .split('&')
+        .any(|parameter| LISTINGS.contains(&parameter))
+}
 
 #[async_trait]
 impl HttpService for BoundedClient {
     async fn call(&self, request: HttpRequest) -> Result<HttpResponse, HttpError> {
-        let response = self.0.execute(request).await?;
+        let is_listing = is_listing(&request);
+        let response = self.client.execute(request).await?;
         if response.body().size_hint().lower() > MAX_RESPONSE_BYTES {
             return Err(too_large());
         }
-        Ok(response.map(|body| {
+        let response = response.map(|body| {
             HttpResponseBody::new(BoundedBody {
                 body,
                 left: MAX_RESPONSE_BYTES,
             })
-        }))
+        });
+        if !is_listing || !response.status().is_success() {
+            return Ok(response);
+        }
+        let (head, body) = response.into_parts();
+        let body = self.without_refused_names(body.bytes().await?);
+        Ok(HttpResponse::from_parts(head, body.into()))
     }
 }
 

@@ -17,12 +17,6 @@ const MAX_WORDS: usize = 64;
 /// The failure of a request to `place`.
 pub(super) fn of(place: &str, error: &Error) -> StoreError {
     let place = place.to_owned();
-    if matches!(error, Error::InvalidPath { .. }) {
-        let problem = "an object in it has a name with empty or relative parts, such as ../a or \
-                       a//b: remove it, or use a folder of its own for the calibrations"
-            .to_owned();
-        return StoreError::Failed { place, problem };
-    }
     if let Some(problem) = transport(error) {
         return StoreError::Unreachable { place, problem };
     }
