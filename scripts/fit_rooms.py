@@ -1,21 +1,27 @@
 #!/usr/bin/env python3
-"""Measure `lookdown calibration fit` on frames with true calibrations: `fit_rooms.py DATASET [--binary PATH]`.
+"""Measure `lookdown calibration fit` on the frames of `tilted_rooms.py`: `fit_rooms.py DATASET [--binary PATH] [--people]`.
 
-Prints one line per frame, then median, 95 % quantile and greatest value of three errors: the radius at 20 to 80 degrees
-in percent, the center in percent of the width, the level in degrees. Frames that the program refuses are counted.
+Prints one line per camera, then median, 95 % quantile and greatest value of three errors: the radius at 20 to 80 degrees
+in percent, the center in percent of the width, the level in degrees. Cameras that the program refuses are counted by
+their reason, and those that are wrong by more than 5 % or 3 degrees. With `--people`, the height is found from the people
+of the frames, and the places of the people on the floor are compared with the true ones, in percent of the distance.
 """
 
 import argparse
+import collections
 import json
 import math
+import re
 import resource
 import subprocess
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
-from tilted_rooms import radius
+from tilted_rooms import level, radius, rays
 
 LIMITS = {"radius": 2.0, "center": 0.7, "level": 1.0}
+WRONG = {"radius": 5.0, "level": 3.0}
 
 
 def errors(found, true):
@@ -32,35 +38,89 @@ def errors(found, true):
     }
 
 
+def floor(calibration, height_m, people):
+    """The places of people on the floor, meters."""
+    down = -np.array(calibration["mount"]["world_up"])
+    ray = rays(calibration["lens"], np.array([person["feet_px"] for person in people])) @ level(down).T
+    return height_m * ray[:, :2] / ray[:, 2:]
+
+
+def floor_errors(calibration, height_m, people):
+    """Errors of the places in percent of the distance from the point below the camera."""
+    true = np.array([person["floor_m"] for person in people])
+    away = np.linalg.norm(true, axis=1)
+    off = np.linalg.norm(floor(calibration, height_m, people) - true, axis=1)
+    # A foot above the horizon of a wrong level is nowhere.
+    off = np.nan_to_num(off, nan=np.inf)
+    return [100 * error / far for error, far in zip(off, away, strict=True) if far > 0.5]
+
+
+def run(binary, *arguments):
+    """The calibration that the program prints, or the reason without its numbers, and the seconds of all threads."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    command = [binary, "calibration", *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    if done.returncode == 0:
+        return json.loads(done.stdout), "", seconds
+    said = done.stderr.strip().splitlines()[-1].rsplit("the rest: ", 1)[-1]
+    return None, re.sub(r"[\d.]+", "N", said), seconds
+
+
+def summary(name, values):
+    """One line about a row of numbers."""
+    if values:
+        median, most, greatest = np.median(values), np.quantile(values, 0.95), max(values)
+        print(f"{name}: {len(values)} values, median {median:.2f}, 95 % {most:.2f}, max {greatest:.2f}")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("dataset", type=Path)
     parser.add_argument("--binary", default="target/release/lookdown")
+    parser.add_argument("--people", action="store_true", help="compare places on the floor")
     arguments = parser.parse_args()
     images = json.loads((arguments.dataset / "annotations.json").read_text())["images"]
-    rows, refused = [], 0
-    for image in images:
-        frame = arguments.dataset / "images" / image["file_name"]
-        command = [arguments.binary, "calibration", "fit", str(frame)]
-        before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        seconds = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
-        if done.returncode:
-            refused += 1
-            print(f"{frame.name}: {done.stderr.strip().splitlines()[-1]}")
+    rows, refused, places = [], collections.Counter(), collections.defaultdict(list)
+    for camera, group in groupby(images, lambda image: image["calibration"]):
+        shots = list(group)
+        frames = [str(arguments.dataset / "images" / image["file_name"]) for image in shots]
+        true = json.loads((arguments.dataset / "calibrations" / f"{camera}.json").read_text())
+        found, reason, seconds = run(arguments.binary, "fit", *frames)
+        if found is None:
+            refused[reason] += 1
+            print(f"{camera}: {reason}")
             continue
-        true = json.loads((arguments.dataset / "calibrations" / f"{image['calibration']}.json").read_text())
-        row = errors(json.loads(done.stdout), true)
+        row = errors(found, true)
         outside = any(row[name] > limit for name, limit in LIMITS.items())
-        print(f"{frame.name}: {row} {seconds:.2f} s{' OUTSIDE' if outside else ''}")
-        rows.append(row | {"seconds": seconds})
+        wrong = any(row[name] > limit for name, limit in WRONG.items())
+        said = {name: source["uncertainty"] for name, source in found["sources"].items()}
+        print(f"{camera}: {row} {said} {seconds:.2f} s{' OUTSIDE' if outside else ''}")
+        rows.append(row | {"seconds": seconds / len(frames), "outside": outside, "wrong": wrong})
+        if arguments.people and shots[0]["people"]:
+            compare(places, arguments.binary, frames, found, true, shots[0]["people"])
     for name in [*LIMITS, "seconds"]:
-        values = [row[name] for row in rows]
-        if values:
-            print(
-                f"{name}: median {np.median(values):.2f}, 95 % {np.quantile(values, 0.95):.2f}, max {max(values):.2f}"
-            )
-    print(f"{len(rows)} fitted, {refused} refused")
+        summary(name, [row[name] for row in rows])
+    outside, wrong = (sum(row[kind] for row in rows) for kind in ("outside", "wrong"))
+    print(f"{len(rows)} fitted, {len(rows) - outside} within {LIMITS}, {wrong} wrong by more than {WRONG}")
+    print(f"{sum(refused.values())} refused: {dict(refused)}")
+    for name, values in places.items():
+        summary(name, values)
+
+
+def compare(places, binary, frames, found, true, people):
+    """Adds the errors on the floor of the calibrations that are compared."""
+    height_m = true["mount"]["height_m"]
+    circle, _, _ = run(binary, "fit", "--circle-only", *frames)
+    if circle is not None:
+        places["floor, circle and true height, %"] += floor_errors(circle, height_m, people)
+    places["floor, fit and true height, %"] += floor_errors(found, height_m, people)
+    measured, _, _ = run(binary, "fit", "--people", *frames)
+    if measured is not None:
+        guess = measured["mount"]["height_m"]
+        places["height from people, %"].append(100 * abs(guess / height_m - 1))
+        places["floor, fit and height from people, %"] += floor_errors(found, guess, people)
 
 
 if __name__ == "__main__":

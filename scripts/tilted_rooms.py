@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """Make frames of tilted cameras from the rendered rooms of a data set, with their true calibrations.
 
-    python scripts/tilted_rooms.py DATASET OUT [--variants 4] [--seed 1] [--first 0] [--step 1]
+    python scripts/tilted_rooms.py DATASET OUT [--variants 4] [--frames 1] [--seed 1] [--first 0] [--step 1]
 
 Each frame of the data set is remapped to another lens: a model of five, a tilt of 0 to 25 degrees, a
 center off by up to 2 % of the width, a circle cut at 75 to 100 degrees. Some variants add noise, blur,
-compression or darkness. OUT becomes a data set folder without persons, for `fit_rooms.py`.
+compression or darkness. With several frames of each camera, things of the size of people are in the way in each, and
+the degradations differ. OUT becomes a data set folder for `fit_rooms.py`; its images have the `people` with their feet.
 Needs numpy and opencv-python-headless.
 """
 
@@ -64,26 +65,65 @@ def made_lens(generator, width, height):
     return lens | ({"fx": focal, "fy": focal} if "fx" in lens else {"focal": focal})
 
 
-def remap(frame, source, lens, down):
-    """The frame of the camera `lens` whose nadir is `down`, from a frame of one that looks straight down."""
-    height, width = frame.shape[:2]
-    x, y = np.meshgrid(np.arange(width) - lens["cx"], np.arange(height) - lens["cy"])
+def level(down):
+    """The smallest rotation that turns a nadir into the axis of the camera."""
+    axis = np.cross(down, [0, 0, 1])
+    skew = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    return np.eye(3) + skew + skew @ skew / (1 + down[2])
+
+
+def rays(lens, pixels):
+    """Unit rays of pixels of shape (..., 2); NaN beyond the circle."""
+    x, y = pixels[..., 0] - lens["cx"], pixels[..., 1] - lens["cy"]
     r = np.hypot(x, y)
     angles = np.linspace(0, lens["max_theta"], 4001)
     theta = np.interp(r, radius(lens, angles), angles, right=np.nan)
     scale = np.where(r > 0, np.sin(theta) / np.maximum(r, 1e-9), 0)
-    ray = np.stack([x * scale, y * scale, np.cos(theta)], -1)
-    # The smallest rotation that turns the nadir into the axis of the source.
-    axis = np.cross(down, [0, 0, 1])
-    skew = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
-    ray = ray @ (np.eye(3) + skew + skew @ skew / (1 + down[2])).T
-    there = np.arccos(np.clip(ray[..., 2], -1, 1))
-    there = np.where(there <= source["max_theta"], there, np.nan)
+    return np.stack([x * scale, y * scale, np.cos(theta)], -1)
+
+
+def project(lens, ray):
+    """Pixels of rays of shape (..., 3); NaN beyond the lens."""
+    theta = np.arccos(np.clip(ray[..., 2] / np.linalg.norm(ray, axis=-1), -1, 1))
+    r = radius(lens, np.where(theta <= lens["max_theta"], theta, np.nan))
     around = np.arctan2(ray[..., 1], ray[..., 0])
-    r = radius(source, there)
-    at = [source["cx"] + r * np.cos(around), source["cy"] + r * np.sin(around)]
-    at = [np.nan_to_num(value, nan=-10).astype(np.float32) for value in at]
-    return cv2.remap(frame, *at, cv2.INTER_CUBIC, borderMode=cv2.BORDER_CONSTANT)
+    return np.stack([lens["cx"] + r * np.cos(around), lens["cy"] + r * np.sin(around)], -1)
+
+
+def remap(frame, source, lens, down):
+    """The frame of the camera `lens` whose nadir is `down`, from a frame of one that looks straight down."""
+    height, width = frame.shape[:2]
+    pixels = np.stack(np.meshgrid(np.arange(width), np.arange(height)), -1)
+    at = np.nan_to_num(project(source, rays(lens, pixels) @ level(down).T), nan=-10).astype(np.float32)
+    return cv2.remap(frame, at[..., 0], at[..., 1], cv2.INTER_CUBIC, borderMode=cv2.BORDER_CONSTANT)
+
+
+def people(persons, source, lens, down):
+    """The feet of the persons in the new frame, and their places on the floor in meters."""
+    found = []
+    for person in persons:
+        ray = rays(source["lens"], np.array(person["feet_px"])) @ level(down)
+        pixel = project(lens, ray)
+        if np.isfinite(pixel).all():
+            floor = rays(source["lens"], np.array(person["feet_px"]))
+            floor = source["mount"]["height_m"] * floor[:2] / floor[2]
+            found.append({"feet_px": pixel.round(2).tolist(), "floor_m": floor.round(4).tolist()})
+    return found
+
+
+def with_things(frame, lens, generator):
+    """The frame with up to six things of the size of people in the way."""
+    frame = frame.copy()
+    for _ in range(generator.integers(1, 7)):
+        far, toward = generator.uniform(0.15, 0.8) * frame.shape[0] / 2, generator.uniform(0, 2 * math.pi)
+        at = (round(lens["cx"] + far * math.cos(toward)), round(lens["cy"] + far * math.sin(toward)))
+        size = (
+            round(generator.uniform(0.05, 0.12) * frame.shape[0]),
+            round(generator.uniform(0.02, 0.04) * frame.shape[0]),
+        )
+        color = [int(value) for value in generator.integers(20, 230, 3)]
+        cv2.ellipse(frame, at, size, math.degrees(toward), 0, 360, color, -1, cv2.LINE_AA)
+    return frame
 
 
 def degrade(frame, kind, generator):
@@ -103,6 +143,7 @@ def main():
     parser.add_argument("dataset", type=Path)
     parser.add_argument("out", type=Path)
     parser.add_argument("--variants", type=int, default=4, help="frames from each room")
+    parser.add_argument("--frames", type=int, default=1, help="frames of each camera")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--first", type=int, default=0, help="number of the first room")
     parser.add_argument("--step", type=int, default=1, help="take each STEPth room")
@@ -110,7 +151,8 @@ def main():
     generator = np.random.default_rng(arguments.seed)
     for folder in ["images", "calibrations"]:
         (arguments.out / folder).mkdir(parents=True, exist_ok=True)
-    rooms = json.loads((arguments.dataset / "annotations.json").read_text())["images"]
+    dataset = json.loads((arguments.dataset / "annotations.json").read_text())
+    rooms = dataset["images"]
     images = []
     for room in rooms[arguments.first :: arguments.step]:
         path = arguments.dataset / "calibrations" / f"{room['calibration']}.json"
@@ -123,23 +165,29 @@ def main():
             tilt, toward = math.radians(generator.uniform(0, 25)), generator.uniform(0, 2 * math.pi)
             flat = math.sin(tilt)
             down = [flat * math.cos(toward), flat * math.sin(toward), math.cos(tilt)]
-            kind = str(generator.choice(list(DEGRADATIONS), p=list(DEGRADATIONS.values())))
-            made = degrade(remap(frame, source["lens"], lens, np.array(down)), kind, generator)
-            quality = 50 if kind == "jpeg" else 92
-            cv2.imwrite(str(arguments.out / "images" / f"{name}.jpg"), made, [cv2.IMWRITE_JPEG_QUALITY, quality])
+            remapped = remap(frame, source["lens"], lens, np.array(down))
+            persons = [person for person in dataset["annotations"] if person["image_id"] == room["id"]]
             mount = source["mount"] | {"world_up": [-round(value, 8) for value in down]}
             calibration = {"id": name, "image": source["image"], "lens": lens, "mount": mount}
             (arguments.out / "calibrations" / f"{name}.json").write_text(json.dumps(calibration, indent=1))
-            images.append(
-                {
-                    "id": len(images) + 1,
-                    "file_name": f"{name}.jpg",
-                    "width": width,
-                    "height": height,
-                    "calibration": name,
-                    "degradation": kind,
-                }
-            )
+            for shot in range(arguments.frames):
+                kind = str(generator.choice(list(DEGRADATIONS), p=list(DEGRADATIONS.values())))
+                seen = with_things(remapped, lens, generator) if arguments.frames > 1 else remapped
+                made = degrade(seen, kind, generator)
+                quality = 50 if kind == "jpeg" else 92
+                file = f"{name}.jpg" if arguments.frames == 1 else f"{name}_{shot}.jpg"
+                cv2.imwrite(str(arguments.out / "images" / file), made, [cv2.IMWRITE_JPEG_QUALITY, quality])
+                images.append(
+                    {
+                        "id": len(images) + 1,
+                        "file_name": file,
+                        "width": width,
+                        "height": height,
+                        "calibration": name,
+                        "degradation": kind,
+                        "people": people(persons, source, lens, np.array(down)),
+                    }
+                )
     coco = {"images": images, "annotations": [], "categories": [{"id": 1, "name": "person"}]}
     (arguments.out / "annotations.json").write_text(json.dumps(coco, indent=1))
 

@@ -217,6 +217,7 @@ impl App {
             camera_metrics: settings.results.camera_metrics,
             pictures_of: Arc::new(settings.results.pictures_of.clone()),
             conceal_pictures: settings.results.conceal_pictures,
+            apply_suggested_calibrations: settings.calibrations.apply_suggested,
             metrics_elsewhere: settings.server.metrics_listen.is_some(),
             request_timeout: settings.server.request_timeout,
             min_upload_bytes_per_second: settings.limits.min_upload_bytes_per_second,

@@ -146,12 +146,12 @@ impl Cameras {
         Ok(states)
     }
 
-    /// Pauses a camera or resumes it; it stays so after a restart. Does nothing for an unknown
+    /// Pauses a camera or resumes it; it stays so after a restart. Returns false for an unknown
     /// camera. Blocks.
     ///
     /// # Errors
     /// [`CameraError`].
-    pub fn set_detection(&self, name: &str, is_on: bool) -> Result<(), CameraError> {
+    pub fn set_detection(&self, name: &str, is_on: bool) -> Result<bool, CameraError> {
         let _changing = self.changing.lock();
         let configured: BTreeSet<_> = self.configured.read().keys().cloned().collect();
         if configured.contains(name) {
@@ -162,14 +162,16 @@ impl Cameras {
                 paused.insert(name.to_owned());
             }
             let content = serde_json::to_string(&paused).unwrap_or_default();
-            return self.folder.write(&self.folder.file(PAUSED), &content);
+            self.folder.write(&self.folder.file(PAUSED), &content)?;
+            return Ok(true);
         }
         let mut stored = self.stored()?;
         let Some(camera) = stored.get_mut(name) else {
-            return Ok(());
+            return Ok(false);
         };
         camera.paused = !is_on;
-        self.store(&stored)
+        self.store(&stored)?;
+        Ok(true)
     }
 
     /// Adds the stored cameras that are not paused to those of the settings, which have precedence,

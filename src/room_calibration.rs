@@ -1,17 +1,81 @@
-//! The calibration of a camera that was fitted to the edges of a room.
+//! The calibration of a camera that was fitted to the edges of a room, with its height from people.
+
+pub(crate) mod preview;
 
 use std::collections::BTreeMap;
 
+use anyhow::Context;
+use lookdown_detect::imaging::{
+    Frame,
+    room_fit::{RoomFrame, fit_room},
+};
 use lookdown_lens::{
     calibration::{
-        CalibrationId,
+        Calibration, CalibrationFile, CalibrationId,
+        export::Target,
         native::{NativeCalibration, NativeImage, NativeMount, NativeSource, ValueSource},
     },
     geometry::lens::KannalaBrandt,
-    self_calibration::RoomFit,
+    self_calibration::{CameraHeight, KnownLens, RoomFit},
 };
 
-use crate::rounding::metres as thousandths;
+use crate::rounding::{metres as thousandths, pixels as hundredths};
+
+/// The source of a value of the user.
+pub(crate) const GIVEN: NativeSource = NativeSource {
+    source: ValueSource::Given,
+    uncertainty: None,
+};
+
+/// A camera that was calibrated from its frames.
+pub struct RoomCalibration {
+    /// The camera.
+    pub calibration: Calibration,
+    /// Its native file, JSON.
+    pub file: String,
+    /// Views of the first frame, JPEG: above with an assumed lens, below with the found one.
+    pub preview: Vec<u8>,
+}
+
+/// Calibrates a camera from frames of one size.
+///
+/// # Errors
+/// The reason why the frames do not determine the camera, with the remedy.
+pub fn calibrate(
+    id: &CalibrationId,
+    frames: &[Frame],
+    known: KnownLens,
+    height_m: Option<f64>,
+) -> anyhow::Result<RoomCalibration> {
+    let first = frames.first().context("no frame: give at least one")?;
+    let image = NativeImage {
+        width: first.width(),
+        height: first.height(),
+    };
+    let is_other = |frame: &&Frame| (frame.width(), frame.height()) != (image.width, image.height);
+    if let Some(other) = frames.iter().find(is_other) {
+        anyhow::bail!(
+            "a frame of {} by {} pixels is not of the camera of the first one, which has {} by {}: \
+             give frames of one size",
+            other.width(),
+            other.height(),
+            image.width,
+            image.height
+        );
+    }
+    let edges: Vec<_> = frames.iter().map(RoomFrame::of).collect();
+    let fit = fit_room(&edges, known)?;
+    let mut native = room_calibration(id, image, &fit);
+    if let Some(height_m) = height_m {
+        give_height(&mut native, height_m);
+    }
+    let calibration = checked(&native)?;
+    Ok(RoomCalibration {
+        preview: preview::draw(&calibration, &fit, first)?,
+        file: Target::Native.write(&native)?.content,
+        calibration,
+    })
+}
 
 /// Returns the calibration of a fit. Lens, center and level are measured, the height is unknown.
 pub(crate) fn room_calibration(
@@ -39,6 +103,40 @@ pub(crate) fn room_calibration(
         sources: sources(fit),
         ..NativeCalibration::new(id.to_string(), image, lens.into())
     }
+}
+
+/// Returns the camera of a calibration in the native format.
+///
+/// # Errors
+/// Values that are not those of a camera.
+pub(crate) fn checked(native: &NativeCalibration) -> anyhow::Result<Calibration> {
+    let written = Target::Native.write(native)?.content;
+    let file = CalibrationFile::parse(written.as_bytes())?;
+    let mut cameras = file.calibrations(&native.id, written.as_bytes());
+    Ok(cameras.swap_remove(0).1?)
+}
+
+/// Returns true if the height of a calibration may be set from people: a height that was measured or
+/// given is kept.
+pub(crate) fn may_set_height(native: &NativeCalibration) -> bool {
+    let source = native.sources.get("height_m").map(|source| source.source);
+    native.mount.height_m.is_none() || source == Some(ValueSource::FromPeople)
+}
+
+/// Sets the height of a calibration, which people gave.
+pub(crate) fn set_height(native: &mut NativeCalibration, height: &CameraHeight) {
+    native.mount.height_m = Some(hundredths(height.height_m));
+    let source = NativeSource {
+        source: ValueSource::FromPeople,
+        uncertainty: Some(hundredths(height.sd_m)),
+    };
+    native.sources.insert("height_m".to_owned(), source);
+}
+
+/// Sets the height of a calibration, which the user gave.
+pub(crate) fn give_height(native: &mut NativeCalibration, height_m: f64) {
+    native.mount.height_m = Some((height_m * 1e6).round() / 1e6);
+    native.sources.insert("height_m".to_owned(), GIVEN);
 }
 
 /// Returns the angle at the lens circle, radians. It is rounded down, so that the lens model is valid there.

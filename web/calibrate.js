@@ -204,7 +204,18 @@ async function findLens() {
   const { frame } = shared;
   const name = id();
   const found = await withProgress(find("#find-progress"), "Finding the lens", () => askJson(`calibrations/${name}/fit`, { method: "POST", body: frame.blob }));
-  if (shared.frame !== frame) return;
+  if (shared.frame === frame) await showFit(name, found);
+}
+
+/** Shows a calibration that was found in earlier frames of the camera. */
+export async function openFound(found) {
+  const { id: name } = found.calibration;
+  field("id").value = name;
+  await showFit(name, found);
+}
+
+/** Shows a calibration that was found with its values; nothing is saved. */
+async function showFit(name, found) {
   const base = isServing(name) ? await read(name) : null;
   if (base) opened = base;
   const height = base?.file.mount?.height_m ?? circle.cameraHeight;
@@ -214,11 +225,12 @@ async function findLens() {
   await preview();
 }
 
-function showFound({ calibration: { lens, sources }, field_of_view_deg: fieldOfView, tilt_deg: tilt, edges, explained }) {
+function showFound({ calibration: { lens, mount, sources }, field_of_view_deg: fieldOfView, tilt_deg: tilt, edges, explained }) {
   const rows = [
     ["Field of view", `${fieldOfView.toFixed(1)}°, radius ± ${sources.lens.uncertainty.toFixed(2)} %`],
     ["Center", `${(lens.cx + 0.5).toFixed(1)}, ${(lens.cy + 0.5).toFixed(1)} ± ${sources.center.uncertainty.toFixed(1)} pixels`],
     ["Tilt", `${tilt.toFixed(1)}° ± ${sources.world_up.uncertainty.toFixed(2)}°`],
+    ...(sources.height_m?.source === "from_people" ? [["Height", `${mount.height_m.toFixed(2)} m ± ${sources.height_m.uncertainty.toFixed(2)} m, from people`]] : []),
     ["Edges", `${Math.round(explained * 100)} % of ${edges} follow the room`],
   ];
   find("#found-values").replaceChildren(...rows.map(([title, text]) => element("div", {}, element("dt", {}, title), element("dd", {}, text))));

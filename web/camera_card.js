@@ -9,6 +9,7 @@ import { sketch } from "./marks.js";
 import { stepPlot } from "./plot.js";
 import { shown, withProgress } from "./progress.js";
 import { ask } from "./server.js";
+import { showSuggestion } from "./suggestion.js";
 import { useFrame } from "./use_frame.js";
 
 /** The widths of images in a card, and in one that fills the page. */
@@ -21,16 +22,17 @@ export function addCard(camera, { onchange, reread }) {
   const age = element("span", { class: "age" });
   const now = element("div", { class: "now-shown" });
   const state = element("p", { class: "camera-state", role: "status" });
+  const suggestion = element("div", { class: "suggestion", role: "group", "aria-label": `Suggested calibration of ${camera}` });
   const day = element("section", { class: "day", "aria-label": `The day of ${camera}`, hidden: true });
   const strip = element("div", { class: "strip" });
   const manage = element("span", { class: "manage" });
   const node = element("article", { class: "card", "aria-label": `Camera ${camera}`, "data-camera": camera });
-  const card = { camera, node, now, age, state, day, strip, manage, onchange, reread, info: null, isSingle: false };
-  Object.assign(card, { id: "0", history: [], reportedAt: 0, report: null, drawn: 0, picture: null, hasPicture: true, isAsking: false, message: null });
+  const card = { camera, node, now, age, state, suggestion, day, strip, manage, onchange, reread, info: null, isSingle: false };
+  Object.assign(card, { id: "0", history: [], reportedAt: 0, report: null, drawn: 0, picture: null, suggestedAt: 0, suggested: "", hasPicture: true, isAsking: false, message: null });
   const use = (section) => shown(() => withProgress(strip, "Reading the frame", () => useFrame(card, section)));
   const tools = TOOLS.map((name) => element("button", { type: "button", onclick: use(name.toLowerCase()) }, name));
   const group = element("div", { class: "use-frame", role: "group", "aria-label": `Use this frame of ${camera}` }, element("span", { class: "muted", "aria-hidden": "true" }, "Use this frame:"), ...tools);
-  node.append(element("header", {}, element("h2", {}, link), age), now, state, day, element("footer", {}, group, manage, strip));
+  node.append(element("header", {}, element("h2", {}, link), age), now, state, suggestion, day, element("footer", {}, group, manage, strip));
   return card;
 }
 
@@ -92,15 +94,16 @@ export async function drawTools(card, info) {
   const text = stateOf(info);
   if (card.state.textContent !== text) card.state.textContent = text;
   card.state.classList.toggle("failing", Boolean(info?.problem));
+  showSuggestion(card);
   const { can_change: may } = await options();
-  const isStored = Boolean(may && info?.stored);
-  if (Boolean(card.manage.firstChild) === isStored && before?.paused === info?.paused) return;
-  card.manage.replaceChildren(...(isStored ? managing(card) : []));
+  const isManaged = Boolean(may && info);
+  if (Boolean(card.manage.firstChild) === isManaged && before?.paused === info?.paused) return;
+  card.manage.replaceChildren(...(isManaged ? managing(card) : []));
 }
 
 function stateOf(info) {
   if (!info) return "";
-  if (info.paused) return info.stored ? "Paused: no frames are read." : "Paused by its switch over MQTT: no frames are read.";
+  if (info.paused) return "Paused: no frames are read.";
   if (info.problem) return `No frames: ${info.problem}`;
   return info.warning ?? "";
 }
@@ -112,17 +115,12 @@ function managing(card) {
     await withProgress(card.strip, label, work);
     await card.reread();
   });
-  const pause = async () => {
-    const { user, every, calibration, profile } = card.info;
-    await ask(path, { method: "PUT", body: JSON.stringify({ user, every, calibration, profile, paused: !card.info.paused }) });
-  };
+  const pause = () => ask(path, { method: "PATCH", body: JSON.stringify({ paused: !card.info.paused }) });
   const remove = () => confirm(`Remove the camera ${camera}? Its reports and counts stay.`) && act("Removing", () => ask(path, { method: "DELETE" }))();
   const button = (label, onclick) => element("button", { type: "button", class: "quiet", onclick }, label);
-  return [
-    button("Settings", () => card.onchange(card.info)),
-    button(info.paused ? "Resume" : "Pause", act("Saving", pause)),
-    button("Remove", remove),
-  ];
+  const pausing = button(info.paused ? "Resume" : "Pause", act("Saving", pause));
+  // A camera of the settings is changed and removed there.
+  return info.stored ? [button("Settings", () => card.onchange(card.info)), pausing, button("Remove", remove)] : [pausing];
 }
 
 export function tellAge({ age, reportedAt }) {

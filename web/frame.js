@@ -1,6 +1,7 @@
 /** The frame: from a file, the clipboard, a drop or a sample. */
 
 import { element, find } from "./dom.js";
+import { chooseSample, leaveSample } from "./parameters.js";
 import { showFailure } from "./progress.js";
 import { change, shared } from "./shared.js";
 
@@ -36,6 +37,12 @@ export async function show(blob, name, camera = "") {
   });
 }
 
+/** Shows an image of the user, which has not the calibration of a sample. */
+function showOwn(file, name) {
+  leaveSample();
+  return show(file, name);
+}
+
 const pictureIn = (files) => [...(files ?? [])].find((file) => file.type.startsWith("image/"));
 
 export function start() {
@@ -43,11 +50,11 @@ export function start() {
   input.addEventListener("change", () => {
     const [file] = input.files;
     input.value = "";
-    if (file) show(file, file.name);
+    if (file) showOwn(file, file.name);
   });
   document.addEventListener("paste", (event) => {
     const file = pictureIn(event.clipboardData?.files);
-    if (file) show(file, "the pasted image");
+    if (file) showOwn(file, "the pasted image");
   });
   document.addEventListener("dragover", (event) => {
     event.preventDefault();
@@ -59,7 +66,7 @@ export function start() {
   document.addEventListener("drop", (event) => {
     event.preventDefault();
     const file = pictureIn(event.dataTransfer.files);
-    if (file) show(file, file.name);
+    if (file) showOwn(file, file.name);
     else if (event.dataTransfer.files.length) showFailure(find("#stage"), "The dropped item is not an image.");
   });
   const samples = ["office", "canteen", "lounge"].map((name) => sample(name));
@@ -68,7 +75,11 @@ export function start() {
 
 function sample(name) {
   const path = `assets/${name}.jpg`;
-  const pick = async () => show(await (await fetch(path)).blob(), `${name}.jpg`);
+  const pick = async () => {
+    // Without its calibration, the sample is an image like others: detection then shows what is wrong.
+    await chooseSample(name).catch(leaveSample);
+    await show(await (await fetch(path)).blob(), `${name}.jpg`);
+  };
   const picture = element("img", { src: path, alt: "", width: 56, height: 56 });
   return element("button", { type: "button", class: "sample", onclick: pick }, picture, element("span", {}, name));
 }

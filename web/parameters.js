@@ -1,7 +1,7 @@
 /** The parameters of the section Detect, as in the API. */
 
 import { element, find } from "./dom.js";
-import { askJson } from "./server.js";
+import { ask, askJson } from "./server.js";
 import { change, shared } from "./shared.js";
 
 const SLIDERS = ["score_threshold", "iou_threshold", "sigma"];
@@ -27,9 +27,30 @@ function show() {
   find("#sigma").disabled = refinement !== "soft_nms_gaussian";
 }
 
+/** The calibrations of the opened sample frames, by ID. The server does not list them: they are part of the program. */
+const samples = new Map();
+
+/** Chooses the calibration of the sample frame `name`, unless the user has chosen another one. */
+export async function chooseSample(name) {
+  leaveSample();
+  if (find("#calibration").value) return;
+  const id = `sample-${name}`;
+  const answer = await ask(`calibrations/${id}`);
+  samples.set(id, { id, revision: answer.headers.get("ETag").slice(1, -1) });
+  await loadCalibrations();
+  find("#calibration").value = id;
+}
+
+/** Unchooses the calibration of a sample frame. */
+export function leaveSample() {
+  const choice = find("#calibration");
+  if (samples.has(choice.value)) choice.value = "";
+}
+
 export async function loadCalibrations() {
-  const all = await askJson("calibrations");
-  const serving = all.filter((calibration) => calibration.revision);
+  const listed = await askJson("calibrations");
+  const known = new Map([...samples, ...listed.map((calibration) => [calibration.id, calibration])]);
+  const serving = [...known.values()].filter((calibration) => calibration.revision);
   const choice = find("#calibration");
   const chosen = choice.value;
   choice.replaceChildren(choice.firstElementChild, ...serving.map(({ id }) => element("option", { value: id }, id)));

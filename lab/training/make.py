@@ -13,9 +13,8 @@ FIRST_SEED = 1_000_000
 
 def parse():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument(
-        "what", choices=("textures", "portraits", "persons", "rooms", "frames", "walks", "sheets", "statistics")
-    )
+    items = ("textures", "portraits", "persons", "rooms", "frames", "empty", "walks", "sheets", "statistics")
+    parser.add_argument("what", choices=items)
     parser.add_argument("--work", type=Path, default=Path(__file__).parent / "work")
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
     parser.add_argument("--count", type=int, default=20)
@@ -51,13 +50,13 @@ def main():
         from generator.rooms import render_rooms
 
         render_rooms(work, options.first_seed, options.count, options.split, options.threads, **more)
-    elif options.what == "frames":
+    elif options.what in ("frames", "empty"):
         import cv2
 
         cv2.setNumThreads(options.threads)
         from generator.frames import make_frames
 
-        make_frames(work, options.first_seed, options.count, options.split)
+        make_frames(work, options.first_seed, options.count, options.split, is_empty=options.what == "empty")
     elif options.what == "walks":
         import cv2
 

@@ -30,9 +30,15 @@ pub(super) fn of_clients() -> OpenApiRouter<ApiState> {
         ))
         .routes(routes!(calibrations::fit::fit))
         .routes(routes!(cameras::list))
-        .routes(routes!(cameras::get, cameras::put, cameras::delete))
+        .routes(routes!(
+            cameras::get,
+            cameras::put,
+            cameras::patch,
+            cameras::delete
+        ))
         .routes(routes!(cameras::test))
         .routes(routes!(cameras::get_frame))
+        .routes(routes!(cameras::suggestion::get))
         .routes(routes!(results::list))
         .routes(routes!(results::delete::delete))
         .routes(routes!(results::followed::put))

@@ -32,6 +32,7 @@ use crate::{
     calibration_store::Calibrations,
     metrics::Metrics,
     results::{PicturesOf, ResultStore},
+    suggestions::Suggestions,
     telemetry::Tracer,
 };
 
@@ -40,6 +41,7 @@ const UNAUTHENTICATED_SHARE: usize = 8;
 
 /// The options of the API: access rules and limits.
 #[derive(Debug, Clone)]
+#[expect(clippy::struct_excessive_bools, reason = "independent settings")]
 pub struct ApiOptions {
     /// Largest request body, bytes.
     pub max_body_bytes: usize,
@@ -59,6 +61,8 @@ pub struct ApiOptions {
     pub pictures_of: Arc<PicturesOf>,
     /// The concealment of persons in these images.
     pub conceal_pictures: Option<Concealment>,
+    /// `true` if calibrations that are found for cameras without one are stored.
+    pub apply_suggested_calibrations: bool,
     /// `true` if the metrics have a port of their own.
     pub metrics_elsewhere: bool,
     /// Longest duration of a request, from its first byte to its response.
@@ -116,6 +120,7 @@ impl ApiOptions {
             camera_metrics: false,
             pictures_of: Arc::default(),
             conceal_pictures: None,
+            apply_suggested_calibrations: false,
             metrics_elsewhere: false,
             request_timeout: Duration::from_secs(20),
             min_upload_bytes_per_second: None,
@@ -149,6 +154,8 @@ pub struct Shared {
     pub(super) unauthenticated_uploads: UploadBudget,
     /// The memory for large responses that clients have not read yet.
     pub(super) responses: SharedBudget,
+    /// The calibrations that are found for cameras without one.
+    pub(super) suggestions: Suggestions,
     pub(super) options: ApiOptions,
 }
 
@@ -168,6 +175,11 @@ impl ApiState {
         for kind in ProblemKind::ALL {
             metrics.failures.with_label_values(&[kind.name()]);
         }
+        let suggestions = Suggestions::new(
+            Arc::clone(&calibrations),
+            workers.engine().options().decode_limits,
+            options.apply_suggested_calibrations,
+        );
         Self(Arc::new(Shared {
             workers,
             models,
@@ -186,6 +198,7 @@ impl ApiState {
                 "send the key in a header, X-API-Key: KEY, or retry",
             ),
             responses: SharedBudget::new(options.max_upload_bytes),
+            suggestions,
             options,
         }))
     }

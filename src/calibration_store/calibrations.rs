@@ -7,6 +7,7 @@ mod error;
 mod file_reader;
 mod load;
 mod named_file;
+mod samples;
 mod scan;
 mod snapshot;
 
@@ -143,13 +144,15 @@ impl Calibrations {
         self.is_read.load(Ordering::Relaxed)
     }
 
-    /// Returns the entry of the calibration `id` that serves. Does not block.
+    /// Returns the entry of the calibration `id` that serves: of the store, else of a sample frame.
+    /// Does not block.
     #[must_use]
     pub fn entry(&self, id: &CalibrationId) -> Option<Arc<CalibrationEntry>> {
-        self.now().entry(id).cloned()
+        let now = self.now();
+        now.entry_or_sample(id).cloned()
     }
 
-    /// Every calibration that serves or should, by ID. Does not block.
+    /// Every calibration of the store that serves or should, by ID. Does not block.
     #[must_use]
     pub fn rows(&self) -> Vec<CalibrationRow> {
         self.now().rows()
@@ -179,7 +182,7 @@ impl Calibrations {
 impl CalibrationLookup for Calibrations {
     fn get(&self, id: &CalibrationId) -> Result<Option<Arc<Calibration>>, UnusableCalibration> {
         let now = self.now();
-        if let Some(entry) = now.entry(id) {
+        if let Some(entry) = now.entry_or_sample(id) {
             return Ok(Some(Arc::clone(&entry.calibration)));
         }
         match now.why_unusable(id) {

@@ -129,8 +129,8 @@ fn detection_is_switched_off_until_it_is_switched_on() {
         .put("hall", camera("rtsp://10.0.0.8/s2"), None)
         .unwrap();
     assert_eq!(add(&first), ["gate", "hall"]);
-    for name in ["gate", "hall", "unknown"] {
-        first.set_detection(name, false).unwrap();
+    for (name, is_known) in [("gate", true), ("hall", true), ("unknown", false)] {
+        assert_eq!(first.set_detection(name, false).unwrap(), is_known);
     }
     // After a restart.
     let second = cameras(folder.path());

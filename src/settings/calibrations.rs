@@ -28,6 +28,10 @@ settings! {
         /// `true` if calibrations can be changed over HTTP by clients with the scope `admin`;
         /// `false` for replicas that only read.
         writable: bool = true => flag();
+        /// `true` if a calibration that the server finds in five frames of a named camera is stored
+        /// under the name of the camera, if it has none. `false`: it is only offered
+        /// (docs/calibrate.md).
+        apply_suggested: bool = false => flag();
         /// `true` if `/metrics` shows the number of persons in each zone, with the names of its
         /// camera and of the zone as labels: 1000 zones at most.
         zone_metrics: bool = false => flag();

@@ -41,6 +41,7 @@ mod serve;
 mod server;
 mod service;
 mod slow;
+mod suggestions;
 mod tls;
 mod traces;
 mod v2;

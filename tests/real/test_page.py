@@ -20,6 +20,7 @@ from pathlib import Path
 
 from harness.places import LOOKDOWN
 from harness.processes import free_ports, running
+from rendered_room import rendered_room
 from support.lookdown import lookdown
 from support.places import FIXTURES, ROOT, SAMPLES
 from test_count import Count
@@ -29,6 +30,7 @@ KEY = "a key that only this test knows"
 PICTURED = "gate,office,canteen,lounge"
 """Cameras whose images are kept."""
 OFFICE = (SAMPLES / "office.jpg").read_bytes()
+ROOM = rendered_room()
 WALKS = HERE.parent / "walks"
 ZONE = {"name": "middle", "floor_m": [[-2, -1], [2, -1], [2, 3], [-2, 3]]}
 
@@ -39,11 +41,12 @@ class Camera(http.server.BaseHTTPRequestHandler):
     def do_GET(self) -> None:
         login = base64.b64encode(f"viewer:{KEY}".encode()).decode()
         is_allowed = self.headers.get("Authorization") == f"Basic {login}"
-        is_found = self.path == "/snapshot.jpg?token=1"
+        images = {"/snapshot.jpg?token=1": OFFICE, "/room.png": ROOM}
+        is_found = self.path in images
         self.send_response(200 if is_allowed and is_found else 404 if is_allowed else 401)
         self.send_header("WWW-Authenticate", 'Basic realm="camera"')
         self.send_header("Content-Type", "image/jpeg")
-        body = OFFICE if is_allowed and is_found else b""
+        body = images[self.path] if is_allowed and is_found else b""
         self.send_header("Content-Length", str(len(body)))
         self.end_headers()
         self.wfile.write(body)
@@ -134,8 +137,11 @@ class Page(unittest.TestCase):
 
     @contextlib.contextmanager
     def with_a_camera(self, folder: Path) -> Iterator[dict[str, str]]:
-        """A `lookdown run` without cameras, and a camera with a user. Yields variables of the tests."""
-        port, camera_port = free_ports(2)
+        """A `lookdown run` without cameras, one with a camera of its settings, and a camera with a user.
+
+        Yields variables of the tests.
+        """
+        port, settings_port, camera_port = free_ports(3)
         (folder / "run").mkdir()
         settings = {
             "SERVER__LISTEN": f"127.0.0.1:{port}",
@@ -145,14 +151,26 @@ class Page(unittest.TestCase):
             "DETECT__PROFILE": "fast",
             "LOG__FILTER": "warn",
         }
-        environment = {f"LOOKDOWN__{name}": str(value) for name, value in settings.items()}
+        others = {
+            "SERVER__LISTEN": f"127.0.0.1:{settings_port}",
+            "STATE__PATH": folder / "run" / "others",
+            "COUNTS__PATH": folder / "run" / "others.sqlite",
+        }
+        environment, other_environment = (
+            {f"LOOKDOWN__{name}": str(value) for name, value in chosen.items()}
+            for chosen in (settings, settings | others)
+        )
+        run = [str(LOOKDOWN), "run"]
+        run_with_camera = [*run, f"http://127.0.0.1:{camera_port}/snapshot.jpg", "--name", "gate"]
         with (
             http.server.ThreadingHTTPServer(("127.0.0.1", camera_port), Camera) as camera,
-            running("lookdown", [str(LOOKDOWN), "run"], port, "/readyz", environment),
+            running("lookdown", run, port, "/readyz", environment),
+            running("lookdown", run_with_camera, settings_port, "/readyz", other_environment),
         ):
             threading.Thread(target=camera.serve_forever, daemon=True).start()
             yield {
                 "LOOKDOWN_RUN_URL": f"http://127.0.0.1:{port}",
+                "LOOKDOWN_SETTINGS_RUN_URL": f"http://127.0.0.1:{settings_port}",
                 "LOOKDOWN_CAMERA_URL": f"http://127.0.0.1:{camera_port}",
                 "LOOKDOWN_CAMERA_PASSWORD": KEY,
             }

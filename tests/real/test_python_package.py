@@ -12,6 +12,7 @@ from pathlib import Path
 from urllib.request import Request, urlopen
 
 from harness.places import ROOT, SAMPLES
+from rendered_room import rendered_room
 from support.lookdown import lookdown
 
 HERE = Path(__file__).resolve().parent / "python_package"
@@ -105,6 +106,18 @@ class PythonPackage(unittest.TestCase):
         self.checked("example.py", SAMPLES)
         for name in ("straightened.png", "persons.png"):
             self.assertGreater((self.folder / name).stat().st_size, 10_000)
+
+    def test_a_calibration_is_found_in_frames_of_a_room(self):
+        example, room = ROOT / "examples" / "calibrate.py", self.folder / "room.png"
+        room.write_bytes(rendered_room())
+        said = self.checked(example, room)
+        self.assertIn("lens measured", said)
+        file = json.loads((self.folder / "camera.json").read_text(encoding="utf-8"))
+        self.assertAlmostEqual(file["lens"]["cx"], 279.5, delta=2)
+        self.assertEqual(file["mount"]["height_m"], 2.8)
+        self.assertTrue((self.folder / "preview.jpg").read_bytes().startswith(b"\xff\xd8"))
+        with self.assertRaisesRegex(AssertionError, "not calibrated: .*give further frames"):
+            self.checked(example, OFFICE)
 
 
 def clean() -> dict[str, str]:

@@ -1,7 +1,8 @@
-//! Points and directions as NumPy arrays of shape (N, 2) and (N, 3).
+//! NumPy arrays: points and directions of shape (N, 2) and (N, 3), and pixels.
 
-use numpy::PyReadonlyArray2;
+use lookdown_detect::imaging::{Frame, decode::DecodeLimits};
 use numpy::ndarray::{Array2, ArrayView1};
+use numpy::{PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::PyResult;
 
 use crate::error::python_error;
@@ -27,4 +28,21 @@ pub(crate) fn array<const N: usize>(rows: &[Option<[f64; N]>]) -> Array2<f64> {
     Array2::from_shape_fn((rows.len(), N), |(row, column)| {
         rows[row].map_or(f64::NAN, |values| values[column])
     })
+}
+
+/// Copies RGB pixels of shape (height, width, 3).
+pub(crate) fn frame(pixels: &PyReadonlyArray3<'_, u8>) -> PyResult<Frame> {
+    let pixels = pixels.as_array();
+    let (height, width, channels) = pixels.dim();
+    if channels != 3 {
+        return Err(python_error(format!(
+            "image: the shape is ({height}, {width}, {channels}); give (height, width, 3)"
+        )));
+    }
+    let side = |side: usize| u32::try_from(side).map_err(python_error);
+    let (width, height) = (side(width)?, side(height)?);
+    // An array without memory of its own, such as a broadcast one, may have any shape.
+    let fits = DecodeLimits::default().check((width, height));
+    fits.map_err(python_error)?;
+    Frame::new(width, height, pixels.iter().copied().collect()).map_err(python_error)
 }

@@ -4,7 +4,6 @@ use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
 
 use lookdown::{api::Report, app::engine_for, settings};
 use lookdown_detect::{
-    imaging::{Frame, decode::DecodeLimits},
     parameters::DetectParameters,
     pipeline::{DetectJob, Engine, JobImage},
 };
@@ -12,7 +11,7 @@ use lookdown_lens::calibration::Calibration;
 use numpy::PyReadonlyArray3;
 use pyo3::prelude::*;
 
-use crate::{calibration::PyCalibration, error::python_error, view::PyView};
+use crate::{arrays::frame, calibration::PyCalibration, error::python_error, view::PyView};
 
 /// Finds persons in frames. May be used by several threads.
 #[pyclass(name = "Detector", module = "lookdown._lookdown", frozen)]
@@ -53,7 +52,7 @@ impl PyDetector {
         name: String,
         calibration: Option<&PyCalibration>,
     ) -> PyResult<String> {
-        let calibration = calibration.map(|given| Arc::clone(&given.0));
+        let calibration = calibration.map(|given| Arc::clone(&given.camera));
         let image = JobImage::Encoded(content.into());
         py.detach(|| self.detect(name, image, calibration))
     }
@@ -67,27 +66,14 @@ impl PyDetector {
         name: String,
         calibration: Option<&PyCalibration>,
     ) -> PyResult<String> {
-        let calibration = calibration.map(|given| Arc::clone(&given.0));
-        let pixels = pixels.as_array();
-        let (height, width, channels) = pixels.dim();
-        if channels != 3 {
-            return Err(python_error(format!(
-                "image: the shape is ({height}, {width}, {channels}); give (height, width, 3)"
-            )));
-        }
-        let side = |side: usize| u32::try_from(side).map_err(python_error);
-        let (width, height) = (side(width)?, side(height)?);
-        // An array without memory of its own, such as a broadcast one, may have any shape.
-        let fits = DecodeLimits::default().check((width, height));
-        fits.map_err(python_error)?;
-        let frame = Frame::new(width, height, pixels.iter().copied().collect());
-        let image = JobImage::Decoded(Arc::new(frame.map_err(python_error)?));
+        let calibration = calibration.map(|given| Arc::clone(&given.camera));
+        let image = JobImage::Decoded(Arc::new(frame(&pixels)?));
         py.detach(|| self.detect(name, image, calibration))
     }
 
     /// Returns the views of the profile, in the order in which the network receives them.
     fn views(&self, py: Python<'_>, calibration: &PyCalibration) -> PyResult<Vec<PyView>> {
-        let (calibration, profile) = (Arc::clone(&calibration.0), self.parameters.profile);
+        let (calibration, profile) = (Arc::clone(&calibration.camera), self.parameters.profile);
         let plan = py.detach(|| self.engine.planned_views(&calibration, profile));
         let views = plan.map_err(python_error)?.views.into_iter();
         let calibration = || Arc::clone(&calibration);

@@ -5,6 +5,7 @@
 #![allow(clippy::needless_pass_by_value)]
 
 mod arrays;
+mod calibrate;
 mod calibration;
 mod detector;
 mod error;
@@ -43,6 +44,8 @@ fn read_image(py: Python<'_>, path: PathBuf) -> PyResult<Cow<'static, [u8]>> {
 
 #[pymodule]
 mod _lookdown {
+    #[pymodule_export]
+    use super::calibrate::calibrate;
     #[pymodule_export]
     use super::calibration::PyCalibration;
     #[pymodule_export]

@@ -98,12 +98,13 @@ def distractors(ids):
 
 
 def make_frame(seed, rooms, files, folder, split):
+    """Composes a frame of one of `rooms`. Without `files` of persons, the room is empty."""
     rng = np.random.default_rng(seed)
     room = RoomFile(rooms[rng.integers(len(rooms))])
     calibration = random_camera(rng, room.about)
     look = random_look(rng)
     prefer = {"infrared": "infrared"}.get(look["kind"], "sun" if look["sun"] else None)
-    placements = place(rng, room.about, files, wanted_persons(rng, room.about), prefer)
+    placements = place(rng, room.about, files, wanted_persons(rng, room.about), prefer) if files else []
     composition = compose(calibration, room, placements, rng, look["sun"])
     image = apply_look(rng, look, composition, calibration)
     name = str(seed)
@@ -149,18 +150,19 @@ def write_annotations(folder):
     return len(images), len(annotations)
 
 
-def make_frames(work, first_seed, count, split="train"):
-    folder = work / "frames" / split
+def make_frames(work, first_seed, count, split="train", is_empty=False):
+    """Composes `count` frames, with persons or, if `is_empty`, without in `WORK/frames/SPLIT-empty`."""
+    folder = work / "frames" / (f"{split}-empty" if is_empty else split)
     for part in ("images", "ids", "calibrations", "records"):
         (folder / part).mkdir(parents=True, exist_ok=True)
     listed = lambda kind: [p for p in sorted((work / kind / split).glob("*.npz")) if "partial" not in p.name]
-    rooms, files = listed("rooms"), [CropFile(p) for p in listed("persons")]
-    if not rooms or not files:
+    rooms, files = listed("rooms"), [] if is_empty else [CropFile(p) for p in listed("persons")]
+    if not rooms or not (files or is_empty):
         raise SystemExit(
             f"{work} has {len(rooms)} rooms and {len(files)} person files of the split {split}; render both first"
         )
     todo = [s for s in range(first_seed, first_seed + count) if not (folder / "records" / f"{s}.json").exists()]
-    progress = Progress(f"frames {split}", len(todo), work / "log" / f"frames-{split}.log")
+    progress = Progress(f"frames {folder.name}", len(todo), work / "log" / f"frames-{folder.name}.log")
     for seed in todo:
         make_frame(seed, rooms, files, folder, split)
         progress.step()

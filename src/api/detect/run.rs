@@ -68,7 +68,11 @@ pub(in crate::api) async fn run_detection<T: Send + 'static>(
     let is_stored = job.parameters.store;
     let concealment = state.options.conceal_pictures;
     let pictures_of = Arc::clone(&state.options.pictures_of);
+    let observer = state.clone();
     let work = state.workers.detect_and(job, move |detected| {
+        if is_stored {
+            observer.suggestions.observe(&detected, Instant::now());
+        }
         // Drawing needs the frame after the report has been taken.
         let report = detected.report.clone();
         let is_kept = is_stored && pictures_of.include(&report.camera);

@@ -39,7 +39,8 @@ use crate::{
 
 /// List calibrations
 ///
-/// Includes calibrations whose file cannot be used, with the reason.
+/// Includes calibrations whose file cannot be used, with the reason. Those of the sample frames
+/// (`sample-office`, `sample-canteen`, `sample-lounge`) are built in and not listed.
 #[utoipa::path(
     get, path = "/calibrations", tag = "calibrations", operation_id = "list_calibrations",
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),

@@ -1,5 +1,7 @@
 //! The cameras of `lookdown run`: the scope `read` reads them, the scope `admin` changes them.
 
+pub(in crate::api) mod suggestion;
+
 use std::sync::Arc;
 
 use axum::{
@@ -12,7 +14,7 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use lookdown_common::{ConfigError, Secret};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use tokio::task::spawn_blocking;
 use utoipa::ToSchema;
 
@@ -88,9 +90,24 @@ pub(in crate::api) struct CameraInfo {
     warning: Option<String>,
     /// The reason why the source gives no frames.
     problem: Option<String>,
+    /// `true` if a calibration was found for the camera that it does not have:
+    /// `GET /cameras/{camera}/suggested-calibration`.
+    has_suggested_calibration: bool,
 }
 
-impl FromRequest<ApiState> for NewCamera {
+/// A change of a camera.
+#[derive(Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+#[schema(example = json!({ "paused": true }))]
+pub(in crate::api) struct CameraChange {
+    /// `true` to read no frames.
+    paused: bool,
+}
+
+/// The JSON of a request about a camera.
+pub(in crate::api) struct CameraBody<T>(T);
+
+impl<T: DeserializeOwned> FromRequest<ApiState> for CameraBody<T> {
     type Rejection = Problem;
 
     async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
@@ -98,7 +115,7 @@ impl FromRequest<ApiState> for NewCamera {
         let context = RequestContext::of(&parts.extensions)?;
         let reader = state.body_reader(&context, MAX_BYTES, "send a camera");
         let bytes = reader.read(&parts.headers, body).await?.into_bytes();
-        serde_json::from_slice(&bytes).map_err(|error| {
+        serde_json::from_slice(&bytes).map(Self).map_err(|error| {
             // The value is not repeated: it may hold a password.
             let fault = format!("line {}: not a camera: compare it with /docs", error.line());
             Problem::of_parameter(ProblemKind::InvalidParameter, "body", &fault)
@@ -132,7 +149,7 @@ pub(in crate::api) async fn list(
     State(state): State<ApiState>,
     _reader: RequireRead,
 ) -> Result<impl IntoResponse, Problem> {
-    let rows = rows(cameras(&state)?).await?;
+    let rows = rows(&state).await?;
     Ok(([(CACHE_CONTROL, "no-store")], Json(rows)))
 }
 
@@ -150,7 +167,7 @@ pub(in crate::api) async fn get(
     _reader: RequireRead,
     Path(name): Path<String>,
 ) -> Result<impl IntoResponse, Problem> {
-    let rows = rows(cameras(&state)?).await?;
+    let rows = rows(&state).await?;
     let row = rows.into_iter().find(|row| row.name == name);
     let row = row.ok_or_else(unknown)?;
     Ok(([(CACHE_CONTROL, "no-store")], Json(row)))
@@ -174,7 +191,7 @@ pub(in crate::api) async fn put(
     State(state): State<ApiState>,
     _admin: RequireAdmin,
     Path(name): Path<String>,
-    camera: NewCamera,
+    CameraBody(camera): CameraBody<NewCamera>,
 ) -> Result<StatusCode, Problem> {
     let (camera, password) = camera.separate();
     let stored_name = name.clone();
@@ -188,6 +205,34 @@ pub(in crate::api) async fn put(
     } else {
         StatusCode::NO_CONTENT
     })
+}
+
+/// Pause or resume a camera
+///
+/// It stays so after a restart. Unlike the other changes, this one applies to cameras of the settings,
+/// too.
+#[utoipa::path(
+    patch, path = "/cameras/{camera}", tag = "cameras", operation_id = "change_camera",
+    params(("camera" = String, Path, description = "The name of the camera.", example = "hall")),
+    request_body(content = CameraChange, content_type = "application/json"),
+    security((), ("bearer" = ["admin"]), ("api_key" = ["admin"])),
+    responses((status = NO_CONTENT, description = "The camera is changed."))
+)]
+pub(in crate::api) async fn patch(
+    State(state): State<ApiState>,
+    _admin: RequireAdmin,
+    Path(name): Path<String>,
+    CameraBody(CameraChange { paused }): CameraBody<CameraChange>,
+) -> Result<StatusCode, Problem> {
+    let changed_name = name.clone();
+    let is_known = change(&state, move |cameras| {
+        cameras.set_detection(&changed_name, !paused)
+    });
+    if !is_known.await? {
+        return Err(unknown());
+    }
+    tracing::info!(camera = name, paused, "the camera was changed");
+    Ok(StatusCode::NO_CONTENT)
 }
 
 /// Delete a camera
@@ -224,7 +269,7 @@ pub(in crate::api) async fn delete(
 pub(in crate::api) async fn test(
     State(state): State<ApiState>,
     _admin: RequireAdmin,
-    camera: NewCamera,
+    CameraBody(camera): CameraBody<NewCamera>,
 ) -> Result<Response, Problem> {
     cameras(&state)?;
     let (camera, password) = camera.separate();
@@ -275,7 +320,8 @@ async fn change<T: Send + 'static>(
     changed.map_err(Problem::internal)?.map_err(refused)
 }
 
-async fn rows(cameras: Arc<Cameras>) -> Result<Vec<CameraInfo>, Problem> {
+async fn rows(state: &ApiState) -> Result<Vec<CameraInfo>, Problem> {
+    let cameras = cameras(state)?;
     let read = Arc::clone(&cameras);
     let stored = spawn_blocking(move || Ok((read.stored()?, read.paused_of_settings()?))).await;
     let stored: Result<_, ConfigError> = stored.map_err(Problem::internal)?;
@@ -317,6 +363,9 @@ async fn rows(cameras: Arc<Cameras>) -> Result<Vec<CameraInfo>, Problem> {
         row.calibration = camera.calibration;
         row.profile = camera.profile;
         row.name = name;
+    }
+    for row in &mut rows {
+        row.has_suggested_calibration = state.suggestions.has(&row.name);
     }
     rows.sort_unstable_by(|one, other| one.name.cmp(&other.name));
     Ok(rows)

@@ -79,6 +79,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "camera_form.js" from "web",
         "camera_states.js" from "web",
         "use_frame.js" from "web",
+        "suggestion.js" from "web",
         "counts.js" from "web",
         "counts_drawing.js" from "web",
         "counts.css" from "web",

@@ -6,7 +6,7 @@ use lookdown_lens::calibration::CalibrationId;
 
 use super::{
     CalibrationEntry, Calibrations, ChangeError, Reading, content::import, load::LoadedFile,
-    named_file::written_name,
+    named_file::written_name, samples::sample,
 };
 use crate::calibration_store::{Replaces, StoredFile};
 
@@ -68,7 +68,7 @@ impl Calibrations {
         // What others have stored since the last look counts, too.
         self.scan(&changing)?;
         let before = self.now();
-        let replaced = before.entry(id);
+        let replaced = before.entry_or_sample(id);
         condition.check(replaced.map(Arc::as_ref))?;
         let file = before.files.get(id);
         if let Some(shared) = file.filter(|file| file.holds_several) {
@@ -107,7 +107,11 @@ impl Calibrations {
         let entry = before.entry(id);
         let file = before.files.get(id);
         if entry.is_none() && file.is_none() {
-            return Err(ChangeError::Unknown { id: id.clone() });
+            let id = id.clone();
+            return Err(match sample(&id) {
+                Some(_) => ChangeError::Sample { id },
+                None => ChangeError::Unknown { id },
+            });
         }
         condition.check(entry.map(Arc::as_ref))?;
         let holder = || {

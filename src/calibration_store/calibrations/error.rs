@@ -20,6 +20,14 @@ pub enum ChangeError {
         /// The ID.
         id: CalibrationId,
     },
+    /// The calibration belongs to a sample frame and is part of the program.
+    #[error(
+        "calibration \"{id}\" is built in and cannot be deleted: leave it, or store another one under this ID"
+    )]
+    Sample {
+        /// The ID.
+        id: CalibrationId,
+    },
     /// The content makes no calibration.
     #[error(transparent)]
     Content(#[from] FormatError),

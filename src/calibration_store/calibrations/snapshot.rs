@@ -8,7 +8,7 @@ use std::{
 use lookdown_detect::metrics::{gauge_value, replace_info};
 use lookdown_lens::{calibration::CalibrationId, revision::revision_of};
 
-use super::{CalibrationEntry, load::LoadedFile};
+use super::{CalibrationEntry, load::LoadedFile, samples::sample};
 use crate::metrics::Metrics;
 
 /// All calibrations at one moment; never changed, only replaced.
@@ -83,6 +83,12 @@ impl Snapshot {
 
     pub(super) fn entry(&self, id: &CalibrationId) -> Option<&Arc<CalibrationEntry>> {
         self.by_id.get(id)
+    }
+
+    /// Returns the entry of `id`; that of a sample frame if the store has no file of this name.
+    pub(super) fn entry_or_sample(&self, id: &CalibrationId) -> Option<&Arc<CalibrationEntry>> {
+        let own_sample = || sample(id).filter(|_| !self.files.contains_key(id));
+        self.entry(id).or_else(own_sample)
     }
 
     /// The file that has this ID's name, and why it gives no calibration of this ID.

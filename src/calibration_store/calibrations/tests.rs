@@ -288,3 +288,40 @@ fn invalid_file_leaves_calibrations_with_longer_names_alone() {
     assert_eq!(calibrations.get(&id("lobby-2")).unwrap(), None);
     assert!(calibrations.get(&id("lobby")).is_err());
 }
+
+#[test]
+fn a_stored_calibration_takes_the_place_of_a_sample() {
+    let folder = tempfile::tempdir().unwrap();
+    let calibrations = open(folder.path());
+    let office = id("sample-office");
+    let sample = calibrations.get(&office).unwrap().unwrap();
+    assert!(calibrations.rows().is_empty());
+
+    let revision = WriteCondition::IfRevision(vec![sample.revision().to_owned()]);
+    let changed = content("sample-office", 200.25);
+    let reading = Reading::default();
+    let put = calibrations.put(&office, changed.as_bytes(), &reading, &revision);
+    assert!(!put.unwrap().created);
+    assert_ne!(*calibrations.get(&office).unwrap().unwrap(), *sample);
+
+    calibrations
+        .delete(&office, &WriteCondition::Always)
+        .unwrap();
+    assert_eq!(calibrations.get(&office).unwrap().unwrap(), sample);
+    let refused = calibrations
+        .delete(&office, &WriteCondition::Always)
+        .unwrap_err();
+    assert!(matches!(refused, ChangeError::Sample { .. }), "{refused}");
+}
+
+#[test]
+fn an_unusable_file_is_not_hidden_by_a_sample() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("sample-office.json"), "{").unwrap();
+    let refused = open(folder.path()).get(&id("sample-office")).unwrap_err();
+    assert!(
+        refused.place.ends_with("sample-office.json"),
+        "{}",
+        refused.place
+    );
+}

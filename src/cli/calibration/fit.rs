@@ -2,7 +2,6 @@
 
 mod arguments;
 mod circle;
-mod preview;
 mod room;
 
 use std::process::ExitCode;

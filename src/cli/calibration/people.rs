@@ -9,15 +9,15 @@ use lookdown_detect::{
     pipeline::{DetectJob, JobImage},
 };
 use lookdown_lens::{
-    calibration::{
-        CalibrationFile, CalibrationId,
-        export::Target,
-        native::{NativeCalibration, NativeSource, ValueSource},
-    },
+    calibration::{CalibrationId, native::NativeCalibration},
     self_calibration::CameraHeight,
 };
 
-use crate::{app::engine_for, cli::settings_file::SettingsFile};
+use crate::{
+    app::engine_for,
+    cli::settings_file::SettingsFile,
+    room_calibration::{self, checked, may_set_height},
+};
 
 /// Sets the height of the calibration from the people in the frames, and reports it. A height that
 /// was measured or given is kept.
@@ -26,22 +26,15 @@ pub(super) fn set_height(
     frames: &[Frame],
     settings: &SettingsFile,
 ) -> anyhow::Result<()> {
-    let source = calibration.sources.get("height_m");
-    let from_people = source.is_some_and(|source| source.source == ValueSource::FromPeople);
     if let Some(known) = calibration.mount.height_m
-        && !from_people
+        && !may_set_height(calibration)
     {
         anyhow::bail!(
             "mount.height_m is {known} m: remove it from the file to find it from people"
         );
     }
     let height = height_of(calibration, frames, settings)?;
-    calibration.mount.height_m = Some(hundredths(height.height_m));
-    let source = NativeSource {
-        source: ValueSource::FromPeople,
-        uncertainty: Some(hundredths(height.sd_m)),
-    };
-    calibration.sources.insert("height_m".to_owned(), source);
+    room_calibration::set_height(calibration, &height);
     eprintln!(
         "lookdown: the camera is {:.2} m above the floor (standard deviation {:.2} m), by {} people \
          whose mean stature is taken as 1.70 m",
@@ -56,10 +49,7 @@ fn height_of(
     frames: &[Frame],
     settings: &SettingsFile,
 ) -> anyhow::Result<CameraHeight> {
-    let written = Target::Native.write(calibration)?.content;
-    let file = CalibrationFile::parse(written.as_bytes())?;
-    let mut checked = file.calibrations(&calibration.id, written.as_bytes());
-    let camera = Arc::new(checked.swap_remove(0).1?);
+    let camera = Arc::new(checked(calibration)?);
     let id: &CalibrationId = camera.id();
     let parameters = DetectParameters::parse([("calibration", id.as_str())])?;
     let settings = settings.load()?;
@@ -75,9 +65,4 @@ fn height_of(
     }
     CameraHeight::from_people(&people, camera.lens(), camera.mount())
         .context("the height of the camera cannot be found")
-}
-
-/// Rounds to centimeters.
-fn hundredths(meters: f64) -> f64 {
-    (meters * 100.0).round() / 100.0
 }

@@ -56,11 +56,12 @@ export function pageTest(name, path, act, options = {}) {
   });
 }
 
-/** Opens a sample and waits for its persons; `lens` names a calibration. */
+/** Opens a sample and waits for its persons. `lens` names its calibration; without one, it is an image of the user. */
 export async function detectSample(page, name, lens = "") {
   await page.locator(`#calibration option[value="${lens}"]`).waitFor({ state: "attached" });
   await page.selectOption("#calibration", lens);
-  await page.getByRole("button", { name, exact: true }).click();
+  if (lens) await page.getByRole("button", { name, exact: true }).click();
+  else await page.locator("#frame-file").setInputFiles(`${SAMPLES}/${name}.jpg`);
   await page.locator("#persons li").first().waitFor();
 }
 

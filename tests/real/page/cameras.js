@@ -3,8 +3,8 @@
 import assert from "node:assert/strict";
 import { PHONE, WIDE, assertAccessible, assertFits, pageTest, picture } from "./browser.js";
 
-/** The address of `lookdown run`, and that of a camera with the user `viewer`. */
-const { LOOKDOWN_RUN_URL: RUN, LOOKDOWN_CAMERA_URL: CAMERA, LOOKDOWN_CAMERA_PASSWORD: PASSWORD } = process.env;
+/** The addresses of `lookdown run` without cameras, of one with a camera of its settings, and of a camera with the user `viewer`. */
+const { LOOKDOWN_RUN_URL: RUN, LOOKDOWN_SETTINGS_RUN_URL: SETTINGS_RUN, LOOKDOWN_CAMERA_URL: CAMERA, LOOKDOWN_CAMERA_PASSWORD: PASSWORD } = process.env;
 const camera = async (name) => (await fetch(`${RUN}/cameras/${name}`)).json();
 
 pageTest(
@@ -67,6 +67,43 @@ pageTest(
     assert.equal((await fetch(`${RUN}/cameras/hall`)).status, 404);
   },
   { server: RUN, expected: /status of 4(04|22)/ },
+);
+
+pageTest(
+  "a calibration that was found in a running camera is looked at and applied",
+  "",
+  async (page) => {
+    const body = JSON.stringify({ url: `${CAMERA}/room.png`, user: "viewer", password: PASSWORD });
+    await fetch(`${RUN}/cameras/yard`, { method: "PUT", body });
+    const suggestion = page.getByRole("group", { name: "Suggested calibration of yard" });
+    await suggestion.getByText(/A calibration was found in \d of 5 frames: 18\d° field of view, tilted by \d\.\d°/).waitFor({ timeout: 180_000 });
+    await assertAccessible(page);
+    await suggestion.getByRole("button", { name: "Look" }).click();
+    await page.locator("#found-values").getByText(/of \d+ follow the room/).waitFor();
+    await page.locator("#previews canvas").first().waitFor();
+    assert.equal(await page.locator("#calibrate-id").inputValue(), "yard");
+    assert.equal((await fetch(`${RUN}/calibrations/yard`)).status, 404);
+    await page.getByRole("navigation").getByRole("link", { name: "Cameras" }).click();
+    await suggestion.getByRole("button", { name: "Apply" }).click();
+    await page.waitForFunction(async (url) => (await fetch(url)).ok, `${RUN}/calibrations/yard`);
+    await suggestion.getByText("field of view").waitFor({ state: "detached" });
+    await fetch(`${RUN}/cameras/yard`, { method: "DELETE" });
+  },
+  { server: RUN, expected: /status of 404/ },
+);
+
+pageTest(
+  "a camera of the settings is paused and resumed in the page",
+  "#camera/gate",
+  async (page) => {
+    const card = page.getByRole("article", { name: "Camera gate" });
+    await card.getByRole("button", { name: "Pause" }).click();
+    await card.getByText("Paused: no frames are read.").waitFor();
+    for (const name of ["Settings", "Remove"]) assert.equal(await card.getByRole("button", { name }).count(), 0);
+    await card.getByRole("button", { name: "Resume" }).click();
+    await card.getByRole("button", { name: "Pause" }).waitFor();
+  },
+  { server: SETTINGS_RUN, expected: /status of 404/ },
 );
 
 for (const [device, viewport, colorScheme] of [["wide", WIDE, "dark"], ["phone", PHONE, "light"]]) {

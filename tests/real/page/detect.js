@@ -25,15 +25,23 @@ pageTest("a sample is picked with the keyboard, and its persons are found", "#de
   await page.getByRole("button", { name: "office", exact: true }).focus();
   const report = await reportAfter(page, () => page.keyboard.press("Enter"));
   assert.equal(report.persons.length, 6);
-  assert.equal(report.calibration.assumed, true);
+  assert.equal(report.calibration.id, "sample-office");
+  assert.ok(report.persons.every((person) => person.floor));
   assert.equal(report.camera, "web-page");
   await page.locator("#marks [data-person='5']").waitFor();
   assert.equal(await page.locator("#marks [data-person]").count(), 6);
   assert.equal(await page.locator("#count").textContent(), "6");
   assert.match(await page.locator("#announcement").textContent(), /^6 persons found in \d+ milliseconds\.$/);
   assert.equal(await page.locator("#timings dt").count(), 6);
-  assert.match(await page.locator("#warnings").textContent(), /no calibration was named/);
   assert.match(await page.locator("#picture").getAttribute("alt"), /office\.jpg/);
+});
+
+pageTest("an own image has not the calibration of a sample", "#detect", async (page) => {
+  await reportAfter(page, () => page.getByRole("button", { name: "office", exact: true }).click());
+  const path = `${SAMPLES}/lounge.jpg`;
+  const report = await reportAfter(page, () => page.locator("#frame-file").setInputFiles(path));
+  assert.equal(report.calibration.assumed, true);
+  assert.match(await page.locator("#warnings").textContent(), /no calibration was named/);
 });
 
 pageTest("the marks are at the positions of the report", "#detect", async (page) => {

@@ -20,7 +20,7 @@ use plane::Plane;
 /// Longer sides are halved, or divided by three, and so on.
 const MAX_SIDE: u32 = 1700;
 /// Share of the radius that is used: the rim itself is an edge, too.
-const USED_RADIUS: f64 = 0.975;
+pub(super) const USED_RADIUS: f64 = 0.975;
 
 /// Returns the smooth edges inside a circle, in pixel centers of the frame.
 #[must_use]

@@ -88,6 +88,17 @@ pub enum HeightRefusal {
     },
 }
 
+impl HeightRefusal {
+    /// Returns the name of the reason, for programs.
+    #[must_use]
+    pub fn reason(&self) -> &'static str {
+        match self {
+            Self::TooFewPeople { .. } => "too_few_people",
+            Self::Uncertain { .. } => "uncertain",
+        }
+    }
+}
+
 impl CameraHeight {
     /// Returns the height of a camera from boxes of people on its floor. The height of the mount is
     /// not used.

@@ -54,3 +54,18 @@ pub enum FitRefusal {
         level_deg: f64,
     },
 }
+
+impl FitRefusal {
+    /// Returns the name of the reason, for programs.
+    #[must_use]
+    pub fn reason(&self) -> &'static str {
+        match self {
+            Self::TooFewEdges { .. } => "too_few_edges",
+            Self::NoDirections { .. } => "no_directions",
+            Self::MissingDirection => "missing_direction",
+            Self::Ambiguous => "ambiguous",
+            Self::Uncertain { .. } => "uncertain",
+            Self::HalvesDisagree { .. } => "halves_disagree",
+        }
+    }
+}

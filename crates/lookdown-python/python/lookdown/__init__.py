@@ -12,9 +12,10 @@ import os
 os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
 
 from lookdown._lookdown import Calibration, Lens, LookdownError, View
+from lookdown.calibrating import calibrate
 from lookdown.counting import count
 from lookdown.detections import Detections
 from lookdown.detector import Detector
 from lookdown.evaluation import evaluate
 
-__all__ = ["Calibration", "Detections", "Detector", "Lens", "LookdownError", "View", "count", "evaluate"]
+__all__ = ["Calibration", "Detections", "Detector", "Lens", "LookdownError", "View", "calibrate", "count", "evaluate"]

@@ -37,6 +37,8 @@ class Calibration:
     @property
     def revision(self) -> str:
         """Twelve hexadecimal digits that change with the content of the file."""
+    def to_json(self) -> str:
+        """Returns the calibration in the native format, whatever format its file has."""
     @property
     def image_size(self) -> tuple[int, int]:
         """Width and height of the frames, pixels."""
@@ -82,6 +84,14 @@ class Detector:
         """Detects persons in RGB pixels of shape (height, width, 3). Returns the report as JSON."""
     def views(self, calibration: Calibration) -> list[View]:
         """Returns the views of the profile, in the order in which the network receives them."""
+
+def calibrate(
+    images: list[bytes | npt.NDArray[np.uint8]],
+    id: str,
+    height_m: float | None = None,
+    field_of_view_deg: float | None = None,
+) -> tuple[Calibration, bytes]:
+    """Calibrates a camera from frames of one size. Returns straightened views as a JPEG, too."""
 
 def read_image(path: str | os.PathLike[str]) -> bytes:
     """Returns the content of an image file: a regular file, with a limit of its size."""

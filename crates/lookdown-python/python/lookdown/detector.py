@@ -1,15 +1,16 @@
 """The detector: one model in memory, for any number of frames."""
 
 import os
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from lookdown import _lookdown
 from lookdown._files import use_packaged_files
-from lookdown._lookdown import Calibration, LookdownError, View
+from lookdown._lookdown import Calibration, View
 from lookdown.detections import Detections
+from lookdown.pixels import ChannelOrder, rgb
 
 Path = str | os.PathLike[str]
 
@@ -32,7 +33,7 @@ class Detector:
         image: Path | bytes | npt.NDArray[Any],
         calibration: Calibration | Path | None = None,
         *,
-        channel_order: Literal["RGB", "BGR"] = "RGB",
+        channel_order: ChannelOrder = "RGB",
     ) -> Detections:
         """Detects the persons in an image file, its content, or pixels of shape (height, width, 3).
 
@@ -57,15 +58,10 @@ class Detector:
             calibration = Calibration.read(calibration)
         return self._detector.views(calibration)
 
-    def _detect_pixels(self, pixels: npt.NDArray[Any], calibration: Calibration | None, channel_order: str) -> str:
-        if channel_order not in ("RGB", "BGR"):
-            raise LookdownError(f'channel_order: {channel_order!r}; give "RGB" or "BGR"')
-        if pixels.dtype != np.uint8 or pixels.ndim != 3:
-            raise LookdownError(
-                f"image: an array of {pixels.dtype} and shape {pixels.shape}; give uint8 of shape (height, width, 3)"
-            )
-        rgb = pixels if channel_order == "RGB" else pixels[..., ::-1]
-        return self._detector.detect_pixels(rgb, "", calibration)
+    def _detect_pixels(
+        self, pixels: npt.NDArray[Any], calibration: Calibration | None, channel_order: ChannelOrder
+    ) -> str:
+        return self._detector.detect_pixels(rgb(pixels, channel_order), "", calibration)
 
 
 def _text(value: Any) -> str:

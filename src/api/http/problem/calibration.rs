@@ -13,7 +13,9 @@ impl From<ChangeError> for Problem {
             | ChangeError::SeveralCameras { .. }
             | ChangeError::UnknownCamera { .. } => ProblemKind::InvalidCalibration,
             ChangeError::Outdated { .. } => ProblemKind::PreconditionFailed,
-            ChangeError::Shared { .. } => ProblemKind::CalibrationConflict,
+            ChangeError::Shared { .. } | ChangeError::Sample { .. } => {
+                ProblemKind::CalibrationConflict
+            }
             ChangeError::Unseen(_) => {
                 tracing::warn!("{error}");
                 let detail = "the calibration was changed, but cannot be read now: get it \

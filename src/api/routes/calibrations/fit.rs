@@ -3,7 +3,7 @@
 use axum::{Json, extract::State, response::IntoResponse};
 use lookdown_detect::imaging::{
     decode::{DecodeLimits, decode},
-    room_fit::fit_room,
+    room_fit::{RoomFrame, fit_room},
 };
 use lookdown_lens::{
     calibration::{
@@ -100,7 +100,7 @@ fn fitted(
         width: frame.width(),
         height: frame.height(),
     };
-    let fit = fit_room(&[frame], KnownLens::default());
+    let fit = fit_room(&[RoomFrame::of(&frame)], KnownLens::default());
     let fit = fit.map_err(|error| refused(error.to_string()))?;
     Ok(FittedCamera {
         calibration: room_calibration(id, size, &fit),

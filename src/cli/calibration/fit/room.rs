@@ -3,26 +3,18 @@
 use std::{collections::BTreeMap, fs};
 
 use anyhow::Context;
-use lookdown_detect::imaging::{Frame, room_fit::fit_room};
+use lookdown_detect::imaging::{
+    Frame,
+    room_fit::{RoomFrame, fit_room},
+};
 use lookdown_lens::{
-    calibration::{
-        CalibrationFile,
-        export::Target,
-        native::{NativeCalibration, NativeImage, NativeSource, ValueSource},
-    },
+    calibration::native::{NativeCalibration, NativeImage, NativeSource},
     self_calibration::{KnownLens, RoomFit},
 };
 
-use super::{
-    arguments::{Arguments, IdealLens, thousandths},
-    preview,
-};
-use crate::room_calibration::{max_theta, room_calibration, tilt_deg};
-
-/// The source of a value of the command line.
-const GIVEN: NativeSource = NativeSource {
-    source: ValueSource::Given,
-    uncertainty: None,
+use super::arguments::{Arguments, IdealLens, thousandths};
+use crate::room_calibration::{
+    GIVEN, checked, give_height, max_theta, preview, room_calibration, tilt_deg,
 };
 
 /// Fits the camera and reports its values.
@@ -35,7 +27,8 @@ pub(super) fn fit(
         field_of_view: arguments.field_of_view.map(f64::to_radians),
         k1: arguments.lens.map(IdealLens::k1),
     };
-    let fit = fit_room(frames, known).context(
+    let edges: Vec<_> = frames.iter().map(RoomFrame::of).collect();
+    let fit = fit_room(&edges, known).context(
         "the camera cannot be fitted; --circle-only detects the lens circle and assumes the rest",
     )?;
     let mut calibration = room_calibration(&arguments.id, image, &fit);
@@ -47,15 +40,11 @@ pub(super) fn fit(
         calibration.sources.insert("lens".to_owned(), GIVEN);
     }
     if let Some(height) = arguments.height {
-        calibration.mount.height_m = Some((height * 1e6).round() / 1e6);
-        calibration.sources.insert("height_m".to_owned(), GIVEN);
+        give_height(&mut calibration, height);
     }
     report(arguments, &fit, &calibration.sources);
     if let (Some(out), Some(frame)) = (&arguments.preview, frames.first()) {
-        let written = Target::Native.write(&calibration)?.content;
-        let file = CalibrationFile::parse(written.as_bytes())?;
-        let mut checked = file.calibrations(&calibration.id, written.as_bytes());
-        let drawn = preview::draw(&checked.swap_remove(0).1?, &fit, frame)?;
+        let drawn = preview::draw(&checked(&calibration)?, &fit, frame)?;
         fs::write(out, drawn)
             .with_context(|| format!("--preview: {} cannot be written", out.display()))?;
     }

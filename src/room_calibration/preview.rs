@@ -20,7 +20,7 @@ const JPEG_QUALITY: u8 = 90;
 
 /// Draws views toward the four walls: above with an equidistant lens of 180° that looks straight
 /// down, below with the fitted camera.
-pub(super) fn draw(
+pub(crate) fn draw(
     calibration: &Calibration,
     fit: &RoomFit,
     frame: &Frame,

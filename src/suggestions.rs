@@ -1,0 +1,150 @@
+//! Calibrations that the server finds for named cameras from their own frames and people, and offers.
+//!
+//! Frames of different times become edges (`RoomFrame`) on one thread of a low priority, one
+//! frame at a time. Neither frames nor images of people are kept.
+
+mod observed;
+mod shared;
+#[cfg(test)]
+mod tests;
+mod worker;
+
+use std::{
+    collections::BTreeMap,
+    sync::{
+        Arc, OnceLock,
+        mpsc::{SyncSender, sync_channel},
+    },
+    thread,
+    time::Instant,
+};
+
+use lookdown_detect::{imaging::decode::DecodeLimits, pipeline::DetectedFrame};
+use lookdown_lens::calibration::CalibrationId;
+use parking_lot::Mutex;
+
+use crate::calibration_store::Calibrations;
+use observed::{Observed, Subject};
+use shared::Shared;
+use worker::{Work, Worker};
+
+pub(crate) use {observed::FRAMES, shared::Suggestion};
+
+/// Most cameras that are observed. The one that has been silent for longest is forgotten first.
+const MAX_CAMERAS: usize = 32;
+/// Work that waits for the thread. Further frames are skipped: later ones will do.
+const MAX_WAITING: usize = 2;
+
+/// The observed cameras.
+pub(crate) struct Suggestions {
+    shared: Arc<Shared>,
+    /// The thread, started for the first frame. `None` if the operating system gives none.
+    worker: OnceLock<Option<SyncSender<Work>>>,
+}
+
+impl Suggestions {
+    /// Creates the suggestions for cameras without one of these calibrations. With `applies`, a
+    /// calibration from all frames is stored.
+    pub(crate) fn new(
+        calibrations: Arc<Calibrations>,
+        limits: DecodeLimits,
+        applies: bool,
+    ) -> Self {
+        let shared = Shared {
+            cameras: Mutex::default(),
+            calibrations,
+            limits,
+            applies,
+        };
+        Self {
+            shared: Arc::new(shared),
+            worker: OnceLock::new(),
+        }
+    }
+
+    /// Takes what a suggestion needs from a frame, if it is due. Does not wait.
+    pub(crate) fn observe(&self, detected: &DetectedFrame, now: Instant) {
+        let report = &detected.report;
+        let Ok(camera) = report.camera.parse::<CalibrationId>() else {
+            return;
+        };
+        let Some(subject) = self.subject(detected) else {
+            self.shared.cameras.lock().remove(&camera);
+            return;
+        };
+        let size = (report.image_width, report.image_height);
+        let boxes = report.persons.iter().map(|person| person.oriented_box);
+        let mut cameras = self.shared.cameras.lock();
+        if !cameras.contains_key(&camera) && cameras.len() >= MAX_CAMERAS {
+            forget_one(&mut cameras);
+        }
+        let observed = cameras.entry(camera.clone()).or_default();
+        observed.see(subject, size, now);
+        if observed.add_people(boxes, now) {
+            self.send(Work::People(camera.clone()));
+        }
+        if let Some(encoded) = &detected.encoded
+            && observed.is_frame_due(now)
+            // A copy: the memory of the upload is not held while the frame waits.
+            && self.send(Work::Frame(camera, encoded.to_vec()))
+        {
+            observed.frame_taken(now);
+        }
+    }
+
+    /// Returns the part of the calibration that a frame's camera lacks, if it lacks one.
+    fn subject(&self, detected: &DetectedFrame) -> Option<Subject> {
+        let report = &detected.report;
+        let used = &report.calibration;
+        if used.assumed_circle.is_some() {
+            // A frame without a name has the name of the assumed calibration.
+            return (report.camera != used.id).then_some(Subject::Lens);
+        }
+        let id = used.id.parse().ok()?;
+        let entry = self.shared.calibrations.entry(&id)?;
+        let has_height = entry.native.mount.height_m.is_some();
+        (!has_height).then_some(Subject::Height(id))
+    }
+
+    /// Returns the findings about a camera, if it is observed.
+    pub(crate) fn of(&self, camera: &str) -> Option<Suggestion> {
+        self.shared.suggestion(&camera.parse().ok()?)
+    }
+
+    /// Returns true if there is a calibration to store for a camera.
+    pub(crate) fn has(&self, camera: &str) -> bool {
+        self.of(camera)
+            .is_some_and(|found| found.calibration.is_some())
+    }
+
+    /// Passes work to the thread. Returns false if it has enough.
+    fn send(&self, work: Work) -> bool {
+        let worker = self.worker.get_or_init(|| {
+            let (sender, waiting) = sync_channel(MAX_WAITING);
+            let worker = Worker(Arc::clone(&self.shared));
+            let started = thread::Builder::new()
+                .name("calibration-fit".to_owned())
+                .spawn(move || worker.run(&waiting));
+            match started {
+                Ok(_) => Some(sender),
+                Err(error) => {
+                    tracing::warn!("no calibrations are suggested: {error}");
+                    None
+                }
+            }
+        });
+        worker
+            .as_ref()
+            .is_some_and(|worker| worker.try_send(work).is_ok())
+    }
+}
+
+/// Removes the camera that has been silent for longest.
+fn forget_one(cameras: &mut BTreeMap<CalibrationId, Observed>) {
+    let silent = cameras
+        .iter()
+        .min_by_key(|(_, observed)| observed.seen_at());
+    if let Some(silent) = silent.map(|(camera, _)| camera.clone()) {
+        cameras.remove(&silent);
+    }
+}

@@ -1,0 +1,131 @@
+//! The thread that finds lenses and heights.
+
+use std::sync::{Arc, mpsc::Receiver};
+
+use lookdown_detect::imaging::{
+    decode::decode,
+    room_fit::{RoomFrame, fit_room},
+};
+use lookdown_lens::{
+    calibration::{CalibrationId, export::Target},
+    self_calibration::{CameraHeight, KnownLens},
+};
+
+use super::{
+    observed::{FRAMES, Observed},
+    shared::Shared,
+};
+use crate::calibration_store::{Reading, WriteCondition};
+
+/// A low priority: frames that are answered come first. At the lowest one, a busy machine would not end
+/// a fit for minutes.
+const NICE: i32 = 10;
+
+/// Work of the thread.
+pub(super) enum Work {
+    /// An encoded frame of a camera.
+    Frame(CalibrationId, Vec<u8>),
+    /// New people of a camera.
+    People(CalibrationId),
+}
+
+/// The thread that finds lenses and heights, one after the other.
+pub(super) struct Worker(pub(super) Arc<Shared>);
+
+impl Worker {
+    /// Works until the sender is gone.
+    pub(super) fn run(self, waiting: &Receiver<Work>) {
+        // Of this thread alone, on Linux.
+        if let Err(error) = rustix::process::setpriority_process(None, NICE) {
+            tracing::warn!("calibrations are found without a lower priority: {error}");
+        }
+        for work in waiting {
+            match work {
+                Work::Frame(camera, image) => {
+                    self.fit(&camera, &image);
+                    self.measure_height(&camera);
+                    self.apply(&camera);
+                }
+                Work::People(camera) => self.measure_height(&camera),
+            }
+        }
+    }
+
+    /// Fits the lens to this frame and the frames before.
+    fn fit(&self, camera: &CalibrationId, image: &[u8]) {
+        // A frame that was detected can be decoded.
+        let Ok(decoded) = decode(image, &self.0.limits) else {
+            return;
+        };
+        let edges = RoomFrame::of(&decoded.frame);
+        drop(decoded);
+        let mut cameras = self.0.cameras.lock();
+        let Some(observed) = cameras.get_mut(camera) else {
+            return;
+        };
+        let frames = observed.add_frame(edges);
+        drop(cameras);
+        if frames.is_empty() {
+            return;
+        }
+        let fit = fit_room(&frames, KnownLens::default());
+        if let Some(observed) = self.0.cameras.lock().get_mut(camera) {
+            if let Ok(fit) = &fit {
+                tracing::info!(
+                    %camera,
+                    "a lens of {:.0}° was found from {} of {FRAMES} frames",
+                    2.0 * fit.max_theta.to_degrees(),
+                    frames.len()
+                );
+            }
+            observed.fit = Some(fit);
+            if observed.is_complete() {
+                observed.forget_frames();
+            }
+        }
+    }
+
+    /// Finds the height of a camera whose lens is known.
+    pub(super) fn measure_height(&self, camera: &CalibrationId) {
+        let Some(known) = self.0.known_camera(camera) else {
+            return;
+        };
+        let people = self.0.cameras.lock().get(camera).map(Observed::people);
+        let Some(people) = people.filter(|people| !people.is_empty()) else {
+            return;
+        };
+        let height = CameraHeight::from_people(&people, known.lens(), known.mount());
+        if let Some(observed) = self.0.cameras.lock().get_mut(camera) {
+            observed.height = Some(height);
+        }
+    }
+
+    /// Stores the calibration of a camera that has none, if the settings permit it.
+    pub(super) fn apply(&self, camera: &CalibrationId) {
+        let is_complete = |shared: &Shared| {
+            let cameras = shared.cameras.lock();
+            cameras.get(camera).is_some_and(Observed::is_complete)
+        };
+        if !self.0.applies || !is_complete(&self.0) {
+            return;
+        }
+        let found = self.0.suggestion(camera);
+        let Some(native) = found.and_then(|found| found.calibration) else {
+            return;
+        };
+        let written = match Target::Native.write(&native) {
+            Ok(written) => written.content,
+            Err(error) => return tracing::warn!(%camera, "the calibration is not stored: {error}"),
+        };
+        let put = self.0.calibrations.put(
+            camera,
+            written.as_bytes(),
+            &Reading::default(),
+            &WriteCondition::IfAbsent,
+        );
+        match put {
+            Ok(_) => tracing::info!(%camera, "the calibration that was found is in use"),
+            Err(error) => tracing::warn!(%camera, "the calibration is not stored: {error}"),
+        }
+    }
+}

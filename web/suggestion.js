@@ -1,0 +1,58 @@
+/** The notice of a camera whose calibration was found in its frames: the values, a look at the views, and use at once. */
+
+import { openFound } from "./calibrate.js";
+import { options } from "./camera_states.js";
+import { element } from "./dom.js";
+import { loadCalibrations } from "./parameters.js";
+import { shown, withProgress } from "./progress.js";
+import { ask, askJson } from "./server.js";
+import { useFrame } from "./use_frame.js";
+
+/** The interval between two questions for the same suggestion. */
+const AGE_MILLIS = 20_000;
+
+/** Shows the suggested calibration of a card, or removes the notice. */
+export async function showSuggestion(card) {
+  const { camera, info, suggestion } = card;
+  if (!info?.has_suggested_calibration) {
+    Object.assign(card, { suggestedAt: 0, suggested: "" });
+    suggestion.replaceChildren();
+    return;
+  }
+  if (Date.now() - card.suggestedAt < AGE_MILLIS) return;
+  card.suggestedAt = Date.now();
+  const found = await askJson(`cameras/${encodeURIComponent(camera)}/suggested-calibration`).catch(() => null);
+  const text = found?.calibration ? textOf(found) : "";
+  if (text === card.suggested) return;
+  card.suggested = text;
+  suggestion.replaceChildren(...(text ? await notice(card, found, text) : []));
+}
+
+function textOf({ lens, height, frames, frames_wanted: wanted }) {
+  const above = height ? `${height.height_m.toFixed(2)} m above the floor (± ${height.height_sd_m.toFixed(2)} m, from its people)` : "";
+  if (!lens) return `The camera is ${above}.`;
+  const angles = `${lens.field_of_view_deg.toFixed(0)}° field of view, tilted by ${lens.tilt_deg.toFixed(1)}°`;
+  return `A calibration was found in ${frames} of ${wanted} frames: ${[angles, above].filter(Boolean).join(", ")}.`;
+}
+
+async function notice(card, found, text) {
+  const { can_change: may } = await options();
+  const look = async () => {
+    await useFrame(card, "calibrate");
+    await openFound({ calibration: found.calibration, ...found.lens });
+  };
+  const use = async () => {
+    const headers = found.replaces ? { "If-Match": `"${found.replaces}"` } : { "If-None-Match": "*" };
+    await ask(`calibrations/${found.calibration.id}`, { method: "PUT", body: JSON.stringify(found.calibration), headers });
+    card.suggested = "";
+    card.suggestion.replaceChildren(element("p", { role: "status" }, `${found.calibration.id} is saved and in use.`));
+    await loadCalibrations();
+  };
+  const act = (label, work) => shown(() => withProgress(card.strip, label, work));
+  const button = (label, onclick) => element("button", { type: "button", onclick }, label);
+  return [
+    element("p", {}, text),
+    found.lens ? button("Look", act("Reading the frame", look)) : "",
+    may ? button("Apply", act("Saving", use)) : "",
+  ];
+}
