@@ -23,9 +23,12 @@ pub(super) struct CameraFlags {
     /// The interval between two frames, such as 500ms or 2s [default: 1s]
     #[arg(long, value_name = "DURATION")]
     every: Option<String>,
-    /// Skip views without motion
-    #[arg(long)]
-    motion: bool,
+    /// Skip views without motion [default: true]
+    #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
+    motion: Option<bool>,
+    /// Follow persons between searches of the whole frame, about once a second [default: that of the server]
+    #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
+    follow: Option<bool>,
     /// The user name of the camera
     #[arg(long, value_name = "NAME")]
     user: Option<String>,
@@ -60,7 +63,8 @@ impl CameraFlags {
             stall_after: self.stall_after.clone(),
             calibration: self.calibration.clone(),
             profile: self.profile.clone(),
-            motion: self.motion.then_some(true),
+            motion: self.motion,
+            follow: self.follow,
             hwaccel: self.hwaccel.clone(),
             transport: self.udp.then_some(Transport::Udp),
             keyframes_only: self.keyframes_only.then_some(true),
@@ -76,6 +80,7 @@ impl CameraFlags {
             profile,
             every,
             motion,
+            follow,
             user,
             password_file,
             stall_after,
@@ -94,7 +99,8 @@ impl CameraFlags {
         ];
         texts.iter().any(|text| text.is_some())
             || password_file.is_some()
-            || *motion
+            || motion.is_some()
+            || follow.is_some()
             || *udp
             || *keyframes_only
     }

@@ -8,7 +8,8 @@ use lookdown_detect::{
     detection::{BBox, Refinement, RefinementParameters},
     parameters::Profile,
     pipeline::{
-        CalibrationUsed, DetectionReport, ModelUsed, Person, StageTimings, ViewCounts, ZoneCount,
+        CalibrationUsed, DetectionReport, ModelUsed, Person, Search, StageTimings, ViewCounts,
+        ZoneCount,
     },
 };
 use lookdown_lens::{
@@ -91,6 +92,7 @@ fn report() -> DetectionReport {
             name: "entrance".to_owned(),
             persons: 1,
         }],
+        search: Search::Full,
         views: ViewCounts {
             inferred: 20,
             unchanged: 4,

@@ -6,6 +6,7 @@ mod buffer_pool;
 pub mod decode;
 pub mod edge_curves;
 pub mod frame;
+mod frame_signature;
 pub mod image_grid;
 pub mod lens_circle;
 mod letterbox;
@@ -17,6 +18,7 @@ mod thumbnail;
 mod view_signature;
 
 pub use frame::{Frame, FrameError};
+pub use frame_signature::{FrameSignature, MovedCell};
 pub use letterbox::Letterbox;
 pub use masked_pixels::MaskedPixels;
 pub use network_input::{ChannelOrder, NetworkInput, ViewBatch};

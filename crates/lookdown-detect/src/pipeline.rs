@@ -5,12 +5,14 @@ mod camera_rig;
 mod default_models;
 mod engine;
 mod error;
+mod follow;
 mod frame_cost;
 mod frame_queue;
 mod in_flight;
 mod inference_cache;
 mod job;
 mod merge;
+mod mosaic;
 mod motion_cache;
 mod network;
 mod outline;
@@ -37,7 +39,8 @@ pub use job::{DetectJob, DetectedFrame, JobImage, ViewsJob};
 pub use network::BatchOptions;
 pub use planned_views::{PlannedView, PlannedViews};
 pub use report::{
-    CalibrationUsed, DetectionReport, ModelUsed, Person, StageTimings, ViewCounts, ZoneCount,
+    CalibrationUsed, DetectionReport, ModelUsed, Person, Search, StageTimings, ViewCounts,
+    ZoneCount,
 };
 pub use ticket::Ticket;
 pub use timeline::{Stage, StageSpan, Timeline};

@@ -22,6 +22,7 @@ use utoipa::ToSchema;
         "max_detections": 1000
     },
     "defaults": [{"name": "profile", "value": "quality", "source": "calibration"}],
+    "search": "full",
     "views": {"inferred": 24, "unchanged": 0, "outside": 0, "masked": 0, "outside_areas": 0},
     "persons": [{
         "box": {"x_min": 1102.41, "y_min": 700.08, "x_max": 1341.77, "y_max": 842.6},
@@ -73,6 +74,10 @@ pub struct Report {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     #[schema(required = false)]
     pub defaults: Vec<ReportDefault>,
+    /// The origin of the persons: `full` is a search of the views of the profile. With `follow`,
+    /// `followed` means crops where the persons of the frame before were expected. `unchanged` means
+    /// that nothing had moved, so that detections of earlier frames were reused.
+    pub search: &'static str,
     /// The numbers of views by outcome.
     pub views: ReportViews,
     /// Persons, highest score first.

@@ -7,7 +7,7 @@ use super::NetworkInput;
 const CELL: usize = 16;
 /// Least change of a cell's mean, in gray levels (0 to 255), that counts as motion. The noise of a
 /// mean is below 1. A person's clothes differ from the floor by tens.
-const MOVED_LEVELS: u8 = 4;
+pub(super) const MOVED_LEVELS: u8 = 4;
 
 /// Mean levels (0 to 255) of the cells of a view, for each color channel.
 #[derive(Debug, Clone, PartialEq, Eq)]

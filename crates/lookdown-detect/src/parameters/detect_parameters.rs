@@ -141,6 +141,17 @@ parameter_table! {
         example: None,
         interfaces: REQUESTS_WITH_DEFAULTS,
     };
+    FOLLOW = ParameterSpec {
+        name: "follow",
+        kind: ParameterKind::Switch,
+        default: ParameterDefault::Value("false"),
+        help: "Searches the whole frame about once a second, and when something moves where no person \
+               was. In the frames between, the detector sees only crops at the places where the \
+               persons of this camera are expected, and those without motion stay as they were. \
+               Needs `camera` or `calibration`; up to 256 cameras are followed.",
+        example: None,
+        interfaces: REQUESTS_WITH_DEFAULTS,
+    };
     CACHE = ParameterSpec {
         name: "cache",
         kind: ParameterKind::Switch,
@@ -201,6 +212,8 @@ pub struct DetectParameters {
     pub captured_at: Option<Timestamp>,
     /// Skips views without motion since the last frame of the camera.
     pub motion: bool,
+    /// Follows the persons of the camera between searches of the whole frame.
+    pub follow: bool,
     /// Caches the detections in the views, and uses cached ones.
     pub cache: bool,
     /// Stores the report under the name of its camera.
@@ -248,6 +261,7 @@ impl DetectParameters {
         let is_named = given.text(&CAMERA).or(given.text(&CALIBRATION)).is_some();
         if !is_named {
             given.drop_default(&MOTION);
+            given.drop_default(&FOLLOW);
         }
         let profile: Profile = given.value(&PROFILE)?;
         let refinement = given.optional(&REFINE)?;
@@ -267,16 +281,19 @@ impl DetectParameters {
             },
             captured_at: given.optional(&CAPTURED_AT)?,
             motion: given.value(&MOTION)?,
+            follow: given.value(&FOLLOW)?,
             cache: given.value(&CACHE)?,
             store: given.optional(&STORE)?.unwrap_or(is_named),
             priority: Priority::of_level(given.value(&PRIORITY)?),
             timeout: timeout.map(Duration::from_millis),
             defaults: given.defaults_used(),
         };
-        if parameters.motion && !is_named {
+        let uses = [(parameters.motion, MOTION), (parameters.follow, FOLLOW)];
+        let unnamed = uses.iter().find(|(is_used, _)| *is_used && !is_named);
+        if let Some((_, parameter)) = unnamed {
             let rule = "name the camera, or its calibration: without a name there is no last \
                         frame to compare with";
-            return Err(ParameterError::bad_value(MOTION.name, rule.to_owned()));
+            return Err(ParameterError::bad_value(parameter.name, rule.to_owned()));
         }
         Ok(parameters)
     }

@@ -7,15 +7,22 @@ use std::sync::Arc;
 use lookdown_lens::{
     calibration::CameraGeometry,
     geometry::{
-        BackProjection, Footprint, FrameCrop, Pixel, ViewPlan, VirtualView, foot_filter::AreaReach,
+        BackProjection, Footprint, FrameCrop, Pixel, ViewPlan, VirtualView,
+        foot_filter::AreaReach,
+        pixels::{PixelConvention, cross_half_pixel},
     },
 };
 
+use super::mosaic::Mosaic;
 use super::outline::{crop_outline, view_outline};
 use crate::{
     detection::{BBox, FramePixels, ViewPixels},
     imaging::{Frame, Letterbox, MaskedPixels, NetworkInput, RemapTable},
 };
+
+/// Distance to the view's border, as a share of the view's width, below which a box is considered
+/// cut off.
+const BORDER_SHARE: f64 = 0.0125;
 
 /// A camera ready for frames of one size.
 #[derive(Debug)]
@@ -75,6 +82,8 @@ enum Views {
     Virtual(Vec<(VirtualView, RemapTable)>),
     /// Upright crops of the frame.
     Crops(Vec<(FrameCrop, RemapTable)>),
+    /// Small crops of the frame, several in one input of the network.
+    Mosaics(Vec<Mosaic>),
     /// The whole frame, letterboxed.
     Direct(Letterbox),
 }
@@ -150,6 +159,21 @@ impl CameraRig {
         }
     }
 
+    /// Returns a rig of the same camera with small crops of the frame instead of views, several in
+    /// each input of the network.
+    pub(super) fn with_mosaics(
+        &self,
+        crops: &[FrameCrop],
+        frame_width: u32,
+        frame_height: u32,
+    ) -> Self {
+        let mut rig = self.with_crops(crops, frame_width, frame_height);
+        if let Views::Crops(crops) = rig.views {
+            rig.views = Views::Mosaics(Mosaic::of(crops));
+        }
+        rig
+    }
+
     /// Builds a rig from `views`, without those that can show no person.
     fn of_views(
         geometry: CameraGeometry,
@@ -194,8 +218,17 @@ impl CameraRig {
         match &self.views {
             Views::Virtual(views) => views.len(),
             Views::Crops(crops) => crops.len(),
+            Views::Mosaics(mosaics) => mosaics.len(),
             Views::Direct(_) => 1,
         }
+    }
+
+    /// Returns true if a position in the frame (corner-origin) can show a person who counts.
+    pub(super) fn shows(&self, position: Pixel) -> bool {
+        let pixel = cross_half_pixel(position, PixelConvention::PixelCentre);
+        let reach = self.hidden.reach.as_ref();
+        self.geometry.lens.unproject(&pixel).is_some()
+            && reach.is_none_or(|reach| reach.holds(position))
     }
 
     /// Returns the boxes of the pixels that cannot show a person in an area.
@@ -217,7 +250,7 @@ impl CameraRig {
                 let outlines = outlines.map(|(view, _)| view_outline(view, &self.geometry.lens));
                 outlines.collect()
             }
-            Views::Crops(crops) => crops.iter().map(|(crop, _)| crop_outline(crop)).collect(),
+            Views::Crops(_) | Views::Mosaics(_) => self.crops().map(crop_outline).collect(),
             Views::Direct(_) => Vec::new(),
         }
     }
@@ -227,6 +260,7 @@ impl CameraRig {
         let tables = match &self.views {
             Views::Virtual(views) => RemapTable::bytes(views.iter().map(|(_, table)| table)),
             Views::Crops(crops) => RemapTable::bytes(crops.iter().map(|(_, table)| table)),
+            Views::Mosaics(mosaics) => RemapTable::bytes(mosaics.iter().flat_map(Mosaic::tables)),
             Views::Direct(_) => 0,
         };
         let reach = self.hidden.reach.as_ref().map_or(0, |reach| reach.bytes());
@@ -246,6 +280,7 @@ impl CameraRig {
             Views::Direct(letterbox) => letterbox.render(frame, input, slot),
             Views::Virtual(views) => views[view].1.render(frame, input, slot),
             Views::Crops(crops) => crops[view].1.render(frame, input, slot),
+            Views::Mosaics(mosaics) => mosaics[view].render(frame, input, slot),
         }
     }
 
@@ -267,6 +302,10 @@ impl CameraRig {
             Views::Crops(crops) => {
                 Footprint::of_crop_box(bbox.corners(), &crops[view].0, &self.geometry.lens)
             }
+            Views::Mosaics(mosaics) => {
+                let (crop, corners) = mosaics[view].tile_of(bbox)?;
+                Footprint::of_crop_box(corners, crop, &self.geometry.lens)
+            }
             Views::Direct(letterbox) => Some(Footprint::of_frame_box(
                 bbox.corners().map(|side| letterbox.frame_from_input(side)),
             )),
@@ -275,16 +314,35 @@ impl CameraRig {
 
     /// Returns the crops; empty for a rig without crops.
     pub(super) fn crops(&self) -> impl Iterator<Item = &FrameCrop> {
-        let crops = match &self.views {
-            Views::Crops(crops) => crops.as_slice(),
-            Views::Virtual(_) | Views::Direct(_) => &[],
+        let (crops, mosaics) = match &self.views {
+            Views::Crops(crops) => (crops.as_slice(), [].as_slice()),
+            Views::Mosaics(mosaics) => ([].as_slice(), mosaics.as_slice()),
+            Views::Virtual(_) | Views::Direct(_) => Default::default(),
         };
-        crops.iter().map(|(crop, _)| crop)
+        let crops = crops.iter().map(|(crop, _)| crop);
+        crops.chain(mosaics.iter().flat_map(Mosaic::crops))
+    }
+
+    /// Returns true if a box of a view touches the border of the view, or of its tile.
+    pub(super) fn cuts_off(
+        &self,
+        view: usize,
+        bbox: &BBox<ViewPixels>,
+        input: &NetworkInput,
+    ) -> bool {
+        let tile = match &self.views {
+            Views::Mosaics(mosaics) => mosaics[view].tile_of(bbox),
+            _ => None,
+        };
+        match tile {
+            Some((crop, corners)) => touches_border(corners, crop.width, crop.height),
+            None => touches_border(bbox.corners(), input.width, input.height),
+        }
     }
 
     /// Returns true if boxes of the views are exact in the frame, as the boxes of crops are.
     pub(super) fn is_exact(&self) -> bool {
-        matches!(self.views, Views::Crops(_))
+        matches!(self.views, Views::Crops(_) | Views::Mosaics(_))
     }
 
     /// Returns the number of views that show the whole footprint. The whole frame always does.
@@ -295,13 +353,19 @@ impl CameraRig {
                 let holds = |view: &VirtualView| outline.iter().all(|ray| view.holds(ray));
                 views.iter().filter(|(view, _)| holds(view)).count()
             }
-            Views::Crops(crops) => {
+            Views::Crops(_) | Views::Mosaics(_) => {
                 let [x_min, y_min, x_max, y_max] = footprint.bounds();
                 let corners = [Pixel::new(x_min, y_min), Pixel::new(x_max, y_max)];
-                let holds = |crop: &FrameCrop| corners.iter().all(|corner| crop.holds(corner));
-                crops.iter().filter(|(crop, _)| holds(crop)).count()
+                let holds = |crop: &&FrameCrop| corners.iter().all(|corner| crop.holds(corner));
+                self.crops().filter(holds).count()
             }
             Views::Direct(_) => 1,
         }
     }
+}
+
+fn touches_border([x_min, y_min, x_max, y_max]: [f64; 4], width: u32, height: u32) -> bool {
+    let (width, height) = (f64::from(width), f64::from(height));
+    let margin = BORDER_SHARE * width;
+    x_min < margin || y_min < margin || x_max > width - margin || y_max > height - margin
 }

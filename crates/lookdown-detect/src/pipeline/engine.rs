@@ -2,6 +2,7 @@
 //! and merges detections; the network threads render views and run inference.
 
 mod camera;
+mod follow_pass;
 mod given_views;
 mod observation;
 mod placed;
@@ -21,6 +22,7 @@ use self::placed::Placed;
 use super::{
     BatchOptions, CalibrationLookup, DefaultModels, DetectJob, DetectedFrame, DetectionReport,
     JobImage, Person, PipelineError, Stage, StageTimings,
+    follow::FollowCache,
     inference_cache::{FrameKey, InferenceCache},
     merge,
     motion_cache::{CameraViews, MotionCache},
@@ -101,6 +103,7 @@ pub struct Engine {
     calibrations: Option<Arc<dyn CalibrationLookup>>,
     rigs: RigCache,
     motion_cache: MotionCache,
+    follow_cache: FollowCache,
     /// Round-robin counter for views that bypass the network's queue.
     next_session: AtomicUsize,
     inference_cache: InferenceCache,
@@ -132,6 +135,7 @@ impl Engine {
             calibrations,
             rigs: RigCache::new(options.rig_cache_bytes, Arc::clone(&metrics)),
             motion_cache: MotionCache::default(),
+            follow_cache: FollowCache::default(),
             next_session: AtomicUsize::new(0),
             inference_cache: InferenceCache::new(
                 options.inference_cache_frames,
@@ -153,11 +157,16 @@ impl Engine {
     /// # Errors
     /// Returns a [`PipelineError`], which distinguishes client and server faults.
     pub fn detect(&self, job: &DetectJob) -> Result<DetectedFrame, PipelineError> {
-        let observation = self.observe(job)?;
+        let mut observation = self.observe(job)?;
+        let follow = observation.follow.take();
         let timeline = &job.ticket.timeline;
         let parameters = &job.parameters;
         timeline.enter(Stage::Refine, Instant::now());
-        let persons = self.persons(&observation, &parameters.refinement);
+        let found = |refinement: &RefinementParameters| self.persons(&observation, refinement);
+        let persons = match follow {
+            Some(follow) => follow.persons(&observation.camera.rig, found),
+            None => found(&parameters.refinement),
+        };
         timeline.leave(Instant::now());
         let foot_filter = &observation.camera.rig.geometry().areas.foot_filter;
         let Placed {
@@ -166,6 +175,9 @@ impl Engine {
             outside,
         } = Placed::of(persons, foot_filter);
         let views = observation.view_counts();
+        let search = observation.search();
+        let searches = &self.metrics.frame_searches;
+        searches.with_label_values(&[search.name()]).inc();
         let zones = ZoneCount::of(&observation.camera.rig.geometry().areas.zones, &persons);
         let calibration = observation.camera.used.clone();
         let report = DetectionReport {
@@ -187,6 +199,7 @@ impl Engine {
             persons,
             margin,
             zones,
+            search,
             views,
             batch_count: observation.batch_count,
             non_finite: observation.non_finite,
@@ -255,6 +268,8 @@ impl Engine {
         let mut observation = Observation {
             profile: job.parameters.profile,
             passes: Vec::with_capacity(2),
+            is_searched: true,
+            follow: None,
             unchanged_views: 0,
             batch_count: 0,
             non_finite: 0,
@@ -270,6 +285,13 @@ impl Engine {
         if let Some(passes) = cached {
             observation.passes = passes;
             observation.unchanged_views = observation.view_count();
+            timeline.leave(Instant::now());
+            return Ok(observation);
+        }
+        if let Some(followed) = self.follow_pass(job, &mut observation) {
+            if let Some(task) = followed {
+                observation.wait_for(&task)?;
+            }
             timeline.leave(Instant::now());
             return Ok(observation);
         }
@@ -359,5 +381,7 @@ fn check_size(frame: &Frame) -> Result<(), PipelineError> {
 
 #[cfg(test)]
 mod area_tests;
+#[cfg(test)]
+mod follow_tests;
 #[cfg(test)]
 mod tests;

@@ -16,16 +16,11 @@ use super::{
 };
 use crate::{
     detection::{
-        BBox, Candidate, FramePixels, MergedDetection, Refinement, RefinementParameters,
-        ViewPixels, refine,
+        BBox, Candidate, FramePixels, MergedDetection, Refinement, RefinementParameters, refine,
     },
-    imaging::NetworkInput,
     parameters::Profile,
 };
 
-/// Distance to the view's border, as a share of the view's width, below which a box is considered
-/// cut off.
-const BORDER_SHARE: f64 = 0.0125;
 /// The weight of the coordinates of a cut-off box when boxes are averaged.
 const BORDER_WEIGHT: f64 = 0.1;
 /// The weight of the coordinates of a virtual view's box, relative to the exact box of a crop.
@@ -183,7 +178,7 @@ fn map(find: &PassDetection<'_>, back_projection: BackProjection) -> Option<Mapp
     let footprint = rig.footprint(find.view, &found.bbox, back_projection)?;
     let is_exact = rig.is_exact();
     let bbox = BBox::new(footprint.bounds()).ok()?;
-    let cut_off = touches_border(&found.bbox, model.input());
+    let cut_off = rig.cuts_off(find.view, &found.bbox, model.input());
     let candidate = Candidate {
         bbox,
         score: found.score,
@@ -197,15 +192,6 @@ fn map(find: &PassDetection<'_>, back_projection: BackProjection) -> Option<Mapp
         cut_off,
         is_exact,
     })
-}
-
-fn touches_border(bbox: &BBox<ViewPixels>, input: &NetworkInput) -> bool {
-    let (width, height) = (f64::from(input.width), f64::from(input.height));
-    let margin = BORDER_SHARE * width;
-    bbox.x_min() < margin
-        || bbox.y_min() < margin
-        || bbox.x_max() > width - margin
-        || bbox.y_max() > height - margin
 }
 
 /// Builds a person from the members of a merged box. Returns `None` for a box outside the frame:
@@ -241,18 +227,30 @@ fn person(
     let mut views: Vec<usize> = members.iter().map(|member| member.candidate.view).collect();
     views.sort_unstable();
     views.dedup();
+    Some(placed(bbox, score, oriented_box, views.len(), rig))
+}
+
+/// Returns the person in a box of the frame, with its place on the floor.
+pub(super) fn placed(
+    bbox: BBox<FramePixels>,
+    score: f64,
+    oriented_box: OrientedBox,
+    views: usize,
+    rig: &CameraRig,
+) -> Person {
+    let geometry = rig.geometry();
     let foot = oriented_box.foot();
     let floor = floor_position(foot, &geometry.lens, &geometry.mount);
-    Some(Person {
+    Person {
         bbox,
         score,
         oriented_box,
-        bearing: bearing(center, &geometry.lens),
+        bearing: bearing(nalgebra::Point2::from(bbox.center()), &geometry.lens),
         floor,
-        views: views.len(),
+        views,
         height: PersonHeight::of(&oriented_box, &geometry.lens, &geometry.mount),
         zones: Person::zones_of(&geometry.areas.zones, foot, floor),
-    })
+    }
 }
 
 #[cfg(test)]

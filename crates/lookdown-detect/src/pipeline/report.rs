@@ -51,6 +51,8 @@ pub struct DetectionReport {
     pub margin: Option<Vec<Person>>,
     /// The number of persons in each zone, in the order of the calibration.
     pub zones: Vec<ZoneCount>,
+    /// The origin of the persons.
+    pub search: Search,
     /// The numbers of views by outcome.
     pub views: ViewCounts,
     /// The number of inference batches.
@@ -61,6 +63,26 @@ pub struct DetectionReport {
     pub timings: StageTimings,
     /// Circumstances that the caller should consider.
     pub warnings: Vec<Warning>,
+}
+
+/// The origin of the persons of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, strum::IntoStaticStr)]
+#[strum(serialize_all = "snake_case")]
+pub enum Search {
+    /// The views of the profile, and crops around possible persons.
+    Full,
+    /// Crops where the persons of the last frame were expected.
+    Followed,
+    /// The frames before: nothing had moved.
+    Unchanged,
+}
+
+impl Search {
+    /// Returns the name, as in reports and metrics.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        self.into()
+    }
 }
 
 /// The numbers of views of one frame by outcome.

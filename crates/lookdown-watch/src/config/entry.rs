@@ -19,11 +19,12 @@ const MIN_STALL: Duration = Duration::from_secs(1);
 /// of the interval between two frames.
 const DEFAULT_STALL: (Duration, u32) = (Duration::from_secs(10), 3);
 /// Parameters that have keys of their own, or that the watcher sets.
-const OWN_PARAMETERS: [&str; 6] = [
+const OWN_PARAMETERS: [&str; 7] = [
     "camera",
     "calibration",
     "profile",
     "motion",
+    "follow",
     "captured_at",
     "format",
 ];
@@ -51,6 +52,8 @@ pub struct CameraEntry {
     pub profile: Option<String>,
     /// Skips views without motion.
     pub motion: Option<bool>,
+    /// Follows persons between searches of the whole frame.
+    pub follow: Option<bool>,
     /// Further parameters of `/detect`.
     #[serde(default)]
     pub parameters: BTreeMap<String, Scalar>,
@@ -107,6 +110,7 @@ impl CameraEntry {
             calibration: self.calibration.or_else(|| defaults.calibration.clone()),
             profile: self.profile.or_else(|| defaults.profile.clone()),
             motion: self.motion.or(defaults.motion),
+            follow: self.follow.or(defaults.follow),
             parameters,
             hwaccel: self.hwaccel.or_else(|| defaults.hwaccel.clone()),
             transport: self.transport.or(defaults.transport),
@@ -188,8 +192,11 @@ impl CameraEntry {
         ] {
             parameters.extend(value.clone().map(|value| (key.to_owned(), value)));
         }
-        if let Some(motion) = self.motion {
-            parameters.push(("motion".to_owned(), motion.to_string()));
+        // An empty room then costs its decoding and a comparison.
+        let motion = self.motion.unwrap_or(true);
+        parameters.push(("motion".to_owned(), motion.to_string()));
+        if let Some(follow) = self.follow {
+            parameters.push(("follow".to_owned(), follow.to_string()));
         }
         for (key, value) in &self.parameters {
             if OWN_PARAMETERS.contains(&key.as_str()) {

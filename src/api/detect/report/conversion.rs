@@ -43,6 +43,7 @@ impl From<&DetectionReport> for Report {
                 max_detections: refinement.max_detections,
             },
             defaults: report.defaults.iter().map(ReportDefault::from).collect(),
+            search: report.search.name(),
             views: ReportViews {
                 inferred: report.views.inferred,
                 unchanged: report.views.unchanged,

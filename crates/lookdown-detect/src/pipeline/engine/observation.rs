@@ -10,7 +10,8 @@ use crate::{
     inference::Model,
     parameters::Profile,
     pipeline::{
-        PipelineError, Stage, StageTimings, Timeline, ViewCounts, network::PassTask, pass::Pass,
+        PipelineError, Search, Stage, StageTimings, Timeline, ViewCounts, follow::FollowedFrame,
+        network::PassTask, pass::Pass,
     },
 };
 
@@ -23,6 +24,10 @@ pub struct Observation {
     pub(super) model: Arc<Model>,
     pub(super) profile: Profile,
     pub(super) passes: Vec<Pass>,
+    /// False if persons were followed and the views of the plan were left out.
+    pub(super) is_searched: bool,
+    /// The persons of the frames before, if the camera's persons are followed.
+    pub(super) follow: Option<FollowedFrame>,
     pub(super) unchanged_views: usize,
     pub(super) batch_count: usize,
     pub(super) non_finite: usize,
@@ -34,7 +39,9 @@ impl Observation {
     /// Returns the number of views with detections, from this frame's inference or from a cache.
     #[must_use]
     pub fn view_count(&self) -> usize {
-        self.passes.iter().map(|pass| pass.rig.view_count()).sum()
+        let left_out = usize::from(!self.is_searched);
+        let passes = self.passes.iter().skip(left_out);
+        passes.map(|pass| pass.rig.view_count()).sum()
     }
 
     /// Returns the counts of views by outcome.
@@ -46,6 +53,17 @@ impl Observation {
             outside: left_out.outside,
             masked: left_out.masked,
             outside_areas: left_out.outside_areas,
+        }
+    }
+
+    /// Returns how the persons of the frame were found.
+    pub(super) fn search(&self) -> Search {
+        let count = self.view_count();
+        match (self.is_searched, count > self.unchanged_views) {
+            (true, false) if count > 0 => Search::Unchanged,
+            (true, _) => Search::Full,
+            (false, true) => Search::Followed,
+            (false, false) => Search::Unchanged,
         }
     }
 

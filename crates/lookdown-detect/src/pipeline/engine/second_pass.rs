@@ -65,13 +65,8 @@ impl Engine {
         observation: &Observation,
         targets: &[CropTarget],
     ) -> Option<(CameraRig, Arc<Model>)> {
-        let profile = observation.profile;
-        let pass = profile.crop_pass()?;
-        let models = &self.options.default_models;
-        let unnamed = job.parameters.model.is_none();
-        let own = unnamed.then(|| models.crop_model(profile)).flatten();
-        let model = own.and_then(|name| self.models.get(name));
-        let model = model.unwrap_or_else(|| Arc::clone(&observation.model));
+        let pass = observation.profile.crop_pass()?;
+        let model = self.crop_model(job, observation);
         let side = model.input().width.min(model.input().height);
         let crops = place_crops(targets, pass.max_crops, pass.fill, side);
         let (width, height) = (observation.frame.width(), observation.frame.height());
@@ -80,5 +75,14 @@ impl Engine {
             .remappers
             .install(|| rig.with_crops(&crops, width, height));
         (rig.view_count() > 0).then_some((rig, model))
+    }
+
+    /// Returns the profile's model of crops, or the model that the request names.
+    pub(super) fn crop_model(&self, job: &DetectJob, observation: &Observation) -> Arc<Model> {
+        let models = &self.options.default_models;
+        let unnamed = job.parameters.model.is_none();
+        let own = unnamed.then(|| models.crop_model(observation.profile));
+        let model = own.flatten().and_then(|name| self.models.get(name));
+        model.unwrap_or_else(|| Arc::clone(&observation.model))
     }
 }

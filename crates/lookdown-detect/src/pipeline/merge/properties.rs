@@ -10,6 +10,7 @@ use proptest::prelude::*;
 use strum::VariantArray;
 
 use super::*;
+use crate::detection::ViewPixels;
 use crate::{
     inference::{Model, ViewDetection},
     parameters::Profile,

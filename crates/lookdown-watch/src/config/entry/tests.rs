@@ -50,7 +50,8 @@ fn defaults_apply_to_every_camera() {
         name = "gate"
         url = "rtsp://viewer:secret@10.0.0.9/s1"
         every = "2s"
-        motion = true
+        motion = false
+        follow = true
         "#,
     )
     .unwrap();
@@ -66,11 +67,11 @@ fn defaults_apply_to_every_camera() {
     };
     assert_eq!(
         query(hall),
-        "camera=hall&calibration=ceiling&profile=fast&score_threshold=0.4"
+        "camera=hall&calibration=ceiling&profile=fast&motion=true&score_threshold=0.4"
     );
     assert_eq!(
         query(gate),
-        "camera=gate&profile=fast&motion=true&score_threshold=0.4"
+        "camera=gate&profile=fast&motion=false&follow=true&score_threshold=0.4"
     );
     assert_eq!(gate.every.as_secs(), 2);
     assert!(matches!(&gate.location, Location::Rtsp(url) if url.username().is_empty()));

@@ -1,0 +1,65 @@
+//! The only pass over a frame in which persons are followed: crops where they are expected.
+
+use std::{sync::Arc, time::Instant};
+
+use lookdown_lens::geometry::crop_placement::place_crops;
+
+use super::{Engine, Observation};
+use crate::pipeline::{
+    DetectJob, Stage, follow::FollowOrigin, mosaic::TILES_PER_SIDE, network::PassTask, pass::Pass,
+};
+
+impl Engine {
+    /// Queues crops around followed persons instead of a search. `None` if the frame is searched.
+    pub(super) fn follow_pass(
+        &self,
+        job: &DetectJob,
+        observation: &mut Observation,
+    ) -> Option<Option<Arc<PassTask>>> {
+        let parameters = &job.parameters;
+        let is_followed = parameters.follow && !parameters.cache;
+        let camera = parameters.camera_name().filter(|_| is_followed)?;
+        let pass = observation.profile.crop_pass()?;
+        job.ticket.timeline.enter(Stage::Remap, Instant::now());
+        let rig = Arc::clone(&observation.camera.rig);
+        let origin = FollowOrigin::new(&rig, &observation.model, parameters.refinement);
+        let at = parameters.captured_at.unwrap_or(job.received_at);
+        let frame = Arc::clone(&observation.frame);
+        let follow = self.follow_cache.compare(camera, origin, &frame, at);
+        let targets = follow.targets(&rig);
+        observation.follow = Some(follow);
+        let targets = targets?;
+        observation.is_searched = false;
+        observation.passes.push(Pass {
+            per_view: vec![Vec::new(); rig.view_count()],
+            rig: Arc::clone(&rig),
+            model: Arc::clone(&observation.model),
+        });
+        if targets.is_empty() {
+            return Some(None);
+        }
+        let model = self.crop_model(job, observation);
+        let side = model.input().width.min(model.input().height);
+        let (width, height) = (frame.width(), frame.height());
+        let crops = self.remappers.install(|| match targets.as_slice() {
+            [_] => {
+                let crops = place_crops(&targets, 1, pass.fill, side);
+                rig.with_crops(&crops, width, height)
+            }
+            targets => {
+                let fill = pass.fill * f64::from(TILES_PER_SIDE);
+                let crops = place_crops(targets, targets.len(), fill, side / TILES_PER_SIDE);
+                rig.with_mosaics(&crops, width, height)
+            }
+        });
+        if crops.view_count() == 0 {
+            return Some(None);
+        }
+        job.ticket.timeline.enter(Stage::Queue, Instant::now());
+        let ticket = job.ticket.clone();
+        let task = self
+            .network
+            .queue_pass(Arc::new(crops), model, frame, ticket, None);
+        Some(Some(task))
+    }
+}

@@ -1,0 +1,125 @@
+use std::time::Duration;
+
+use jiff::Timestamp;
+
+use super::*;
+use crate::pipeline::{
+    Search,
+    test_support::{BlobDetector, calibration, engine, frame_with_disc, job},
+};
+
+/// An engine and the reports of frames of one camera.
+struct FollowedCamera(Engine);
+
+impl FollowedCamera {
+    fn new() -> Self {
+        Self(engine(BlobDetector::default(), Some(calibration(""))))
+    }
+
+    /// Returns the report of a frame captured at `millis` with a disc of this center and radius.
+    fn report(&self, millis: u64, disc: [f64; 2], radius: f64) -> DetectionReport {
+        let at = Timestamp::UNIX_EPOCH + Duration::from_millis(millis);
+        let at = at.to_string();
+        let parameters = [
+            ("calibration", "lobby"),
+            ("profile", "fast"),
+            ("follow", "true"),
+            ("captured_at", &*at),
+        ];
+        let image = frame_with_disc(600, disc, radius);
+        self.0.detect(&job(image, &parameters)).unwrap().report
+    }
+}
+
+#[test]
+fn a_walker_is_followed_with_one_crop_a_frame() {
+    let camera = FollowedCamera::new();
+    assert_eq!(camera.report(0, [420.0, 300.0], 20.0).search, Search::Full);
+    for (millis, x) in [(200, 412.0), (400, 404.0), (600, 396.0), (800, 388.0)] {
+        let report = camera.report(millis, [x, 300.0], 20.0);
+        assert_eq!(
+            (report.search, report.views.inferred),
+            (Search::Followed, 1)
+        );
+        let [person] = report.persons.as_slice() else {
+            panic!("{:?}", report.persons)
+        };
+        let [found, y] = person.bbox.center();
+        assert!(
+            (found - x).abs() < 4.0 && (y - 300.0).abs() < 4.0,
+            "{found}, {y}"
+        );
+        assert!(person.floor.is_some() && person.score > 0.5);
+    }
+}
+
+#[test]
+fn the_whole_frame_is_searched_every_second() {
+    let camera = FollowedCamera::new();
+    let searches = [0, 200, 400, 600, 800, 1000, 1200]
+        .map(|millis| camera.report(millis, [420.0, 300.0], 20.0).search);
+    assert_eq!(searches[0], Search::Full);
+    assert!(
+        searches[1..5]
+            .iter()
+            .all(|search| *search == Search::Unchanged)
+    );
+    assert_eq!(
+        (searches[5], searches[6]),
+        (Search::Full, Search::Unchanged)
+    );
+    let metric = &camera.0.metrics().frame_searches;
+    assert_eq!(metric.with_label_values(&["full"]).get(), 2);
+    assert_eq!(metric.with_label_values(&["unchanged"]).get(), 5);
+}
+
+#[test]
+fn a_person_without_motion_stays_without_inference() {
+    let camera = FollowedCamera::new();
+    let first = camera.report(0, [420.0, 300.0], 20.0);
+    let second = camera.report(200, [420.0, 300.0], 20.0);
+    assert_eq!((second.views.inferred, second.batch_count), (0, 0));
+    assert_eq!(second.persons[0].bbox, first.persons[0].bbox);
+    assert_eq!(second.persons[0].score, first.persons[0].score);
+}
+
+#[test]
+fn motion_where_no_person_was_starts_a_search() {
+    let camera = FollowedCamera::new();
+    assert!(camera.report(0, [420.0, 300.0], 0.0).persons.is_empty());
+    let entered = camera.report(200, [420.0, 300.0], 20.0);
+    assert_eq!((entered.search, entered.persons.len()), (Search::Full, 1));
+    // A leap is no walk: the crop would not show the person.
+    let leapt = camera.report(400, [150.0, 300.0], 20.0);
+    assert_eq!((leapt.search, leapt.persons.len()), (Search::Full, 1));
+}
+
+#[test]
+fn a_person_whom_no_crop_confirms_disappears() {
+    let camera = FollowedCamera::new();
+    camera.report(0, [420.0, 300.0], 20.0);
+    let gone = camera.report(200, [420.0, 300.0], 0.0);
+    assert_eq!((gone.search, gone.persons.len()), (Search::Followed, 0));
+    let back = camera.report(400, [420.0, 300.0], 20.0);
+    assert_eq!((back.search, back.persons.len()), (Search::Followed, 1));
+}
+
+#[test]
+fn an_earlier_or_changed_frame_is_searched() {
+    let camera = FollowedCamera::new();
+    camera.report(500, [420.0, 300.0], 20.0);
+    assert_eq!(
+        camera.report(100, [420.0, 300.0], 20.0).search,
+        Search::Full
+    );
+    // The light changes everywhere.
+    let white = frame_with_disc(600, [300.0, 300.0], 299.0);
+    let parameters = [
+        ("calibration", "lobby"),
+        ("profile", "fast"),
+        ("follow", "true"),
+        ("captured_at", "1970-01-01T00:00:00.2Z"),
+    ];
+    let report = camera.0.detect(&job(white, &parameters)).unwrap().report;
+    assert_eq!(report.search, Search::Full);
+}

@@ -1,0 +1,431 @@
+//! Follows the persons of a camera between searches of the whole frame.
+//!
+//! After a search, the cells of the next frames are compared with those of the searched frame. Motion
+//! where no person was starts another search. Motion at a person has a crop placed where that person
+//! is expected; persons without motion stay as they were. A crop has one vote instead of those of all
+//! views, so that each person keeps the odds that the search gave it relative to its first crop.
+
+use std::sync::{Arc, Weak};
+
+use jiff::{SignedDuration, Timestamp};
+use lookdown_lens::geometry::{
+    OrientedBox, crop_placement::CropTarget, oriented_box::vertical_in_frame,
+};
+use moka::{policy::EvictionPolicy, sync::Cache};
+use nalgebra::{Point2, Vector2};
+use parking_lot::Mutex;
+
+use super::{Person, camera_rig::CameraRig, merge};
+use crate::{
+    detection::{BBox, FramePixels, RefinementParameters},
+    imaging::{Frame, FrameSignature, MovedCell},
+    inference::Model,
+};
+
+/// Maximum number of followed cameras. The least recently used camera is dropped first.
+const MAX_CAMERAS: u64 = 256;
+/// Time from a search to the next one, a little less than a second: frames jitter.
+const SEARCH_EVERY: SignedDuration = SignedDuration::from_millis(900);
+/// Most persons in motion that are followed. With more, every frame is searched.
+const MAX_MOVING: usize = 32;
+/// The margin around a person's box that belongs to the person, as a share of its larger side. It
+/// holds shadows and the next step.
+const MARGIN: f64 = 0.5;
+/// Cells with motion belong to the same motion if at most this many cells less one lie between them.
+const JOINED_CELLS: f64 = 2.0;
+/// Least change of a cell's mean by a person who was not there. Clothes differ from the floor by tens,
+/// parted ends of shadows by less than this.
+const NEW_LEVELS: u8 = 10;
+/// If more than one of this many cells has moved, the light has changed: the frame is searched.
+const MOST_MOVED: usize = 4;
+/// Least IoU of an expected box and a found one of the same person.
+const SAME_IOU: f64 = 0.3;
+/// Least score of boxes of crops, before they get the odds of their persons.
+const LEAST_SCORE: f64 = 1e-4;
+/// Highest logit by which a person's score may exceed that of the last search.
+const MAX_GAIN: f64 = 1.0;
+
+/// The followed persons of each camera.
+pub(super) struct FollowCache(Cache<String, Arc<Mutex<Option<Followed>>>>);
+
+impl Default for FollowCache {
+    fn default() -> Self {
+        let cameras = Cache::builder().max_capacity(MAX_CAMERAS);
+        Self(cameras.eviction_policy(EvictionPolicy::lru()).build())
+    }
+}
+
+impl FollowCache {
+    /// Compares a frame of a camera, captured at `at`, with those before. While one frame is
+    /// processed, another one of the same camera is searched.
+    pub(super) fn compare(
+        &self,
+        camera: &str,
+        origin: FollowOrigin,
+        frame: &Frame,
+        at: Timestamp,
+    ) -> FollowedFrame {
+        let kept = self.0.get_with_by_ref(camera, Arc::default);
+        let before = kept.lock().take();
+        let before = before.filter(|before| before.origin.is_same(&origin));
+        let signature = FrameSignature::of(frame);
+        let moving = before.as_ref();
+        let moving = moving.and_then(|before| before.moving(&signature, at));
+        FollowedFrame {
+            kept,
+            origin,
+            signature,
+            at,
+            before,
+            moving,
+        }
+    }
+}
+
+/// The circumstances under which persons may be followed from one frame to the next.
+pub(super) struct FollowOrigin {
+    // Weak: an inactive camera must not keep tables or weights in memory.
+    rig: Weak<CameraRig>,
+    model: Weak<Model>,
+    refinement: RefinementParameters,
+}
+
+impl FollowOrigin {
+    pub(super) fn new(
+        rig: &Arc<CameraRig>,
+        model: &Arc<Model>,
+        refinement: RefinementParameters,
+    ) -> Self {
+        Self {
+            rig: Arc::downgrade(rig),
+            model: Arc::downgrade(model),
+            refinement,
+        }
+    }
+
+    fn is_same(&self, other: &Self) -> bool {
+        self.rig.ptr_eq(&other.rig)
+            && self.model.ptr_eq(&other.model)
+            && self.refinement == other.refinement
+    }
+}
+
+/// The persons of a camera since the last search.
+struct Followed {
+    origin: FollowOrigin,
+    searched_at: Timestamp,
+    at: Timestamp,
+    /// The signature of the searched frame.
+    searched: FrameSignature,
+    /// The cells of a frame that can show a person.
+    visible: Arc<[bool]>,
+    targets: Vec<Target>,
+}
+
+/// A followed person.
+struct Target {
+    /// The person at its last place.
+    person: Person,
+    /// False while no crop confirms the person.
+    is_seen: bool,
+    /// Its motion, pixels per second.
+    velocity: Vector2<f64>,
+    at: Timestamp,
+    /// The box around all its places since the last search.
+    trail: [f64; 4],
+    /// Its box and its score in the last search.
+    searched: (OrientedBox, f64),
+    /// The logit of its score in the last search, less that of its first crop.
+    gain: Option<f64>,
+}
+
+impl Target {
+    fn new(person: Person, at: Timestamp, before: Option<&Self>) -> Self {
+        let mut target = Self {
+            is_seen: true,
+            velocity: Vector2::zeros(),
+            at,
+            trail: person.bbox.corners(),
+            searched: (person.oriented_box, person.score),
+            gain: None,
+            person,
+        };
+        if let Some(before) = before {
+            target.velocity = before.velocity_to(&target.person.bbox, at);
+        }
+        target
+    }
+
+    /// Returns the expected box at a time.
+    fn expected(&self, at: Timestamp) -> [f64; 4] {
+        let moved = self.velocity * at.duration_since(self.at).as_secs_f64();
+        let [x_min, y_min, x_max, y_max] = self.person.bbox.corners();
+        [
+            x_min + moved.x,
+            y_min + moved.y,
+            x_max + moved.x,
+            y_max + moved.y,
+        ]
+    }
+
+    /// Returns the pixels whose motion belongs to the person at a time.
+    fn surroundings(&self, at: Timestamp) -> [f64; 4] {
+        let [x_min, y_min, x_max, y_max] = hull(self.trail, self.expected(at));
+        let bbox = &self.person.bbox;
+        let margin = MARGIN * bbox.width().max(bbox.height());
+        widened([x_min, y_min, x_max, y_max], margin)
+    }
+
+    /// Returns the mean of the motion so far and that to a box.
+    fn velocity_to(&self, bbox: &BBox<FramePixels>, at: Timestamp) -> Vector2<f64> {
+        let seconds = at.duration_since(self.at).as_secs_f64();
+        if seconds <= 0.0 {
+            return self.velocity;
+        }
+        let moved = Point2::from(bbox.center()) - Point2::from(self.person.bbox.center());
+        (self.velocity + moved / seconds) / 2.0
+    }
+
+    /// Moves to a person found in a crop, with the odds and the proportions of the last search.
+    fn confirm(&mut self, found: &Person, at: Timestamp, rig: &CameraRig) {
+        let (searched, score) = self.searched;
+        let gain = *self
+            .gain
+            .get_or_insert_with(|| logit(score) - logit(found.score));
+        let most = logit(score) + MAX_GAIN;
+        let score = from_logit((logit(found.score) + gain).min(most));
+        let oriented_box = OrientedBox {
+            width: searched.width,
+            height: searched.height,
+            ..found.oriented_box
+        };
+        let oriented_box = oriented_box.fitted_to(found.bbox.corners());
+        self.velocity = self.velocity_to(&found.bbox, at);
+        self.trail = hull(self.trail, found.bbox.corners());
+        self.at = at;
+        self.is_seen = true;
+        self.person = merge::placed(found.bbox, score, oriented_box, found.views, rig);
+    }
+}
+
+impl Followed {
+    /// Returns which persons have motion around them. `None` if the whole frame must be searched.
+    fn moving(&self, signature: &FrameSignature, at: Timestamp) -> Option<Vec<bool>> {
+        if at < self.at || at.duration_since(self.searched_at) >= SEARCH_EVERY {
+            return None;
+        }
+        let moved = signature.moved_since(&self.searched, &self.visible)?;
+        if moved.len() > self.visible.len() / MOST_MOVED || !self.explains(&moved, at) {
+            return None;
+        }
+        let moving = self.targets.iter().map(|target| {
+            let places = hull(target.trail, target.expected(at));
+            !target.is_seen || moved.iter().any(|cell| overlap(&places, &cell.bounds))
+        });
+        let moving: Vec<bool> = moving.collect();
+        let count = moving.iter().filter(|is_moving| **is_moving).count();
+        (count <= MAX_MOVING).then_some(moving)
+    }
+
+    /// Returns true if all strong motion is joined to a person, as a shadow is.
+    fn explains(&self, moved: &[MovedCell], at: Timestamp) -> bool {
+        let surroundings = self.targets.iter().map(|target| target.surroundings(at));
+        let surroundings: Vec<_> = surroundings.collect();
+        let is_near = |cell: &&MovedCell| surroundings.iter().any(|all| overlap(all, &cell.bounds));
+        let (mut joined, mut others): (Vec<&MovedCell>, Vec<_>) = moved.iter().partition(is_near);
+        while let Some(MovedCell { bounds, .. }) = joined.pop() {
+            let reach = widened(*bounds, JOINED_CELLS * (bounds[2] - bounds[0]));
+            let is_joined = |other: &&MovedCell| overlap(&reach, &other.bounds);
+            let (near, far): (Vec<_>, _) = others.into_iter().partition(is_joined);
+            joined.extend(near);
+            others = far;
+        }
+        others.iter().all(|other| other.levels < NEW_LEVELS)
+    }
+}
+
+/// A frame of a camera whose persons are followed.
+pub(super) struct FollowedFrame {
+    kept: Arc<Mutex<Option<Followed>>>,
+    origin: FollowOrigin,
+    signature: FrameSignature,
+    at: Timestamp,
+    before: Option<Followed>,
+    /// The persons of `before` with motion; `None` if the whole frame is searched.
+    moving: Option<Vec<bool>>,
+}
+
+impl FollowedFrame {
+    /// Returns the places of the crops, best persons first; `None` if the whole frame is searched.
+    pub(super) fn targets(&self, rig: &CameraRig) -> Option<Vec<CropTarget>> {
+        let (before, moving) = (self.before.as_ref()?, self.moving.as_ref()?);
+        let moving = before.targets.iter().zip(moving);
+        let moving = moving.filter(|(_, is_moving)| **is_moving);
+        let geometry = rig.geometry();
+        let mut targets: Vec<_> = moving
+            .map(|(target, _)| {
+                let bbox = target.expected(self.at);
+                let center = Point2::new(
+                    f64::midpoint(bbox[0], bbox[2]),
+                    f64::midpoint(bbox[1], bbox[3]),
+                );
+                CropTarget {
+                    bbox,
+                    score: target.person.score,
+                    up: vertical_in_frame(center, &geometry.lens, &geometry.mount),
+                }
+            })
+            .collect();
+        targets.sort_by(|a, b| b.score.total_cmp(&a.score));
+        Some(targets)
+    }
+
+    /// Returns the persons of the frame, highest score first, and keeps them for the next frame.
+    /// `found_by` returns the persons in the views of the frame.
+    pub(super) fn persons(
+        self,
+        rig: &CameraRig,
+        found_by: impl Fn(&RefinementParameters) -> Vec<Person>,
+    ) -> Vec<Person> {
+        let refinement = self.origin.refinement;
+        let (persons, state) = match (self.before, self.moving) {
+            (Some(mut state), Some(moving)) => {
+                let found = found_by(&RefinementParameters {
+                    score_threshold: refinement.score_threshold.min(LEAST_SCORE),
+                    ..refinement
+                });
+                state.confirm(&moving, found, self.at, rig);
+                (state.persons(&refinement), state)
+            }
+            (before, _) => {
+                let persons = found_by(&refinement);
+                let visible = before.as_ref().map(|before| Arc::clone(&before.visible));
+                let visible = visible.unwrap_or_else(|| visible_cells(&self.signature, rig));
+                let before = before.map_or_else(Vec::new, |before| before.targets);
+                let state = Followed {
+                    origin: self.origin,
+                    searched_at: self.at,
+                    at: self.at,
+                    searched: self.signature,
+                    visible,
+                    targets: targets_of(&persons, self.at, &before),
+                };
+                (persons, state)
+            }
+        };
+        *self.kept.lock() = Some(state);
+        persons
+    }
+}
+
+impl Followed {
+    /// Confirms persons in motion by those found in crops. Others that were found become persons of
+    /// their own if their score suffices.
+    fn confirm(&mut self, moving: &[bool], found: Vec<Person>, at: Timestamp, rig: &CameraRig) {
+        self.at = at;
+        let expected: Vec<_> = self
+            .targets
+            .iter()
+            .map(|target| target.expected(at))
+            .collect();
+        let expected = expected.iter().map(|corners| BBox::new(*corners).ok());
+        let expected: Vec<Option<BBox<FramePixels>>> = expected.collect();
+        let mut pairs = Vec::new();
+        for (number, person) in found.iter().enumerate() {
+            for (index, expected) in expected.iter().enumerate() {
+                let iou = expected.as_ref().map_or(0.0, |bbox| bbox.iou(&person.bbox));
+                if iou >= SAME_IOU {
+                    pairs.push((iou, index, number));
+                }
+            }
+        }
+        pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut is_used = vec![false; found.len()];
+        let mut is_confirmed: Vec<bool> = moving.iter().map(|is_moving| !is_moving).collect();
+        for (_, index, number) in &pairs {
+            if !is_confirmed[*index] && !is_used[*number] {
+                is_confirmed[*index] = true;
+                is_used[*number] = true;
+                self.targets[*index].confirm(&found[*number], at, rig);
+            }
+        }
+        for (target, is_confirmed) in self.targets.iter_mut().zip(is_confirmed) {
+            target.is_seen = is_confirmed;
+        }
+        for (_, _, number) in pairs {
+            is_used[number] = true;
+        }
+        let threshold = self.origin.refinement.score_threshold;
+        let others = found.into_iter().zip(is_used);
+        let others = others.filter(|(other, is_used)| !is_used && other.score >= threshold);
+        let others: Vec<_> = others
+            .map(|(other, _)| Target::new(other, at, None))
+            .collect();
+        self.targets.extend(others);
+    }
+
+    /// Returns the persons that are seen, highest score first.
+    fn persons(&self, refinement: &RefinementParameters) -> Vec<Person> {
+        let seen = self.targets.iter().filter(|target| target.is_seen);
+        let persons = seen.map(|target| target.person.clone());
+        let mut persons: Vec<_> = persons
+            .filter(|person| person.score >= refinement.score_threshold)
+            .collect();
+        persons.sort_by(|a, b| b.score.total_cmp(&a.score));
+        persons.truncate(refinement.max_detections);
+        persons
+    }
+}
+
+/// Returns the persons of a search as targets, with the motion of those that were there before.
+fn targets_of(persons: &[Person], at: Timestamp, before: &[Target]) -> Vec<Target> {
+    let targets = persons.iter().map(|person| {
+        let overlaps = before.iter().filter_map(|target| {
+            let expected = BBox::new(target.expected(at)).ok()?;
+            Some((expected.iou(&person.bbox), target))
+        });
+        let nearest = overlaps.max_by(|a, b| a.0.total_cmp(&b.0));
+        let nearest = nearest.filter(|(iou, _)| *iou >= SAME_IOU);
+        Target::new(person.clone(), at, nearest.map(|(_, target)| target))
+    });
+    targets.collect()
+}
+
+/// Returns the cells of a frame whose middle can show a person.
+fn visible_cells(signature: &FrameSignature, rig: &CameraRig) -> Arc<[bool]> {
+    let middles = signature.cells().map(|[x_min, y_min, x_max, y_max]| {
+        Point2::new(f64::midpoint(x_min, x_max), f64::midpoint(y_min, y_max))
+    });
+    middles.map(|middle| rig.shows(middle)).collect()
+}
+
+fn hull(one: [f64; 4], other: [f64; 4]) -> [f64; 4] {
+    [
+        one[0].min(other[0]),
+        one[1].min(other[1]),
+        one[2].max(other[2]),
+        one[3].max(other[3]),
+    ]
+}
+
+fn widened([x_min, y_min, x_max, y_max]: [f64; 4], margin: f64) -> [f64; 4] {
+    [
+        x_min - margin,
+        y_min - margin,
+        x_max + margin,
+        y_max + margin,
+    ]
+}
+
+fn overlap(one: &[f64; 4], other: &[f64; 4]) -> bool {
+    one[0] < other[2] && other[0] < one[2] && one[1] < other[3] && other[1] < one[3]
+}
+
+fn logit(score: f64) -> f64 {
+    let score = score.clamp(1e-6, 1.0 - 1e-6);
+    (score / (1.0 - score)).ln()
+}
+
+fn from_logit(logit: f64) -> f64 {
+    1.0 / (1.0 + (-logit).exp())
+}
