@@ -76,7 +76,7 @@ async fn snapshots_reach_the_server_with_their_parameters() {
     assert!(
         request
             .head
-            .starts_with("POST /detect?camera=hall&profile=fast&captured_at=20")
+            .starts_with("POST /detect?camera=hall&profile=fast&motion=true&captured_at=20")
     );
     assert!(
         request.head.contains("content-type: image/jpeg"),

@@ -169,7 +169,7 @@ impl CameraRig {
     ) -> Self {
         let mut rig = self.with_crops(crops, frame_width, frame_height);
         if let Views::Crops(crops) = rig.views {
-            rig.views = Views::Mosaics(Mosaic::of(crops));
+            rig.views = Views::Mosaics(Mosaic::of(&crops));
         }
         rig
     }

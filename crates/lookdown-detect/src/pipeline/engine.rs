@@ -2,6 +2,7 @@
 //! and merges detections; the network threads render views and run inference.
 
 mod camera;
+mod first_pass;
 mod follow_pass;
 mod given_views;
 mod observation;
@@ -18,7 +19,7 @@ use lookdown_lens::warning::{Warning, WarningCode};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 pub use self::observation::Observation;
-use self::placed::Placed;
+use self::{first_pass::FirstPass, placed::Placed};
 use super::{
     BatchOptions, CalibrationLookup, DefaultModels, DetectJob, DetectedFrame, DetectionReport,
     JobImage, Person, PipelineError, Stage, StageTimings,
@@ -288,12 +289,15 @@ impl Engine {
             timeline.leave(Instant::now());
             return Ok(observation);
         }
-        if let Some(followed) = self.follow_pass(job, &mut observation) {
-            if let Some(task) = followed {
-                observation.wait_for(&task)?;
+        match self.follow_pass(job, &mut observation) {
+            FirstPass::Search => {}
+            pass => {
+                if let FirstPass::Crops(task) = pass {
+                    observation.wait_for(&task)?;
+                }
+                timeline.leave(Instant::now());
+                return Ok(observation);
             }
-            timeline.leave(Instant::now());
-            return Ok(observation);
         }
         timeline.enter(Stage::Queue, Instant::now());
         let first = self.network.queue_pass(

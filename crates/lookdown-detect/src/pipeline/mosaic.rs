@@ -18,7 +18,7 @@ pub(super) struct Mosaic(Vec<(FrameCrop, RemapTable)>);
 
 impl Mosaic {
     /// Distributes crops, whose sides are half of the input's, to as few inputs as possible.
-    pub(super) fn of(crops: Vec<(FrameCrop, RemapTable)>) -> Vec<Self> {
+    pub(super) fn of(crops: &[(FrameCrop, RemapTable)]) -> Vec<Self> {
         let mosaics = crops.chunks(TILES).map(|tiles| Self(tiles.to_vec()));
         mosaics.collect()
     }
@@ -121,12 +121,13 @@ mod tests {
         ];
         let crops = crops.map(|[x, y]| crop(x, y));
         let tables = crops.map(|crop| RemapTable::of_crop(&crop, 200, 200));
-        let mosaics = Mosaic::of(crops.into_iter().zip(tables).collect());
+        let crops: Vec<_> = crops.into_iter().zip(tables).collect();
+        let mosaics = Mosaic::of(&crops);
         assert_eq!(mosaics.len(), 2);
         let input = NetworkInput::plain(80, 80);
         let mut slot = vec![0.0; input.view_len()];
         mosaics[0].render(&frame, &input, &mut slot);
-        for (left, top) in [(5, 5), (45, 5), (5, 45), (45, 45)] {
+        for (left, top) in [(5_u32, 5_u32), (45, 5), (5, 45), (45, 45)] {
             let corners = [left, top, left + 20, top + 20].map(f64::from);
             let bbox = BBox::new(corners).unwrap();
             let (crop, local) = mosaics[0].tile_of(&bbox).unwrap();

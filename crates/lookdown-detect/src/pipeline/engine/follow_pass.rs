@@ -4,22 +4,18 @@ use std::{sync::Arc, time::Instant};
 
 use lookdown_lens::geometry::crop_placement::place_crops;
 
-use super::{Engine, Observation};
-use crate::pipeline::{
-    DetectJob, Stage, follow::FollowOrigin, mosaic::TILES_PER_SIDE, network::PassTask, pass::Pass,
-};
+use super::{Engine, Observation, first_pass::FirstPass};
+use crate::pipeline::{DetectJob, Stage, follow::FollowOrigin, mosaic::TILES_PER_SIDE, pass::Pass};
 
 impl Engine {
-    /// Queues crops around followed persons instead of a search. `None` if the frame is searched.
-    pub(super) fn follow_pass(
-        &self,
-        job: &DetectJob,
-        observation: &mut Observation,
-    ) -> Option<Option<Arc<PassTask>>> {
+    /// Queues crops around followed persons, unless the frame must be searched.
+    pub(super) fn follow_pass(&self, job: &DetectJob, observation: &mut Observation) -> FirstPass {
         let parameters = &job.parameters;
         let is_followed = parameters.follow && !parameters.cache;
-        let camera = parameters.camera_name().filter(|_| is_followed)?;
-        let pass = observation.profile.crop_pass()?;
+        let camera = parameters.camera_name().filter(|_| is_followed);
+        let (Some(camera), Some(pass)) = (camera, observation.profile.crop_pass()) else {
+            return FirstPass::Search;
+        };
         job.ticket.timeline.enter(Stage::Remap, Instant::now());
         let rig = Arc::clone(&observation.camera.rig);
         let origin = FollowOrigin::new(&rig, &observation.model, parameters.refinement);
@@ -28,7 +24,9 @@ impl Engine {
         let follow = self.follow_cache.compare(camera, origin, &frame, at);
         let targets = follow.targets(&rig);
         observation.follow = Some(follow);
-        let targets = targets?;
+        let Some(targets) = targets else {
+            return FirstPass::Search;
+        };
         observation.is_searched = false;
         observation.passes.push(Pass {
             per_view: vec![Vec::new(); rig.view_count()],
@@ -36,7 +34,7 @@ impl Engine {
             model: Arc::clone(&observation.model),
         });
         if targets.is_empty() {
-            return Some(None);
+            return FirstPass::Nothing;
         }
         let model = self.crop_model(job, observation);
         let side = model.input().width.min(model.input().height);
@@ -53,13 +51,13 @@ impl Engine {
             }
         });
         if crops.view_count() == 0 {
-            return Some(None);
+            return FirstPass::Nothing;
         }
         job.ticket.timeline.enter(Stage::Queue, Instant::now());
         let ticket = job.ticket.clone();
         let task = self
             .network
             .queue_pass(Arc::new(crops), model, frame, ticket, None);
-        Some(Some(task))
+        FirstPass::Crops(task)
     }
 }
