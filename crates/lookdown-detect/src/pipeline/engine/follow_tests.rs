@@ -89,7 +89,7 @@ fn motion_where_no_person_was_starts_a_search() {
     assert!(camera.report(0, [420.0, 300.0], 0.0).persons.is_empty());
     let entered = camera.report(200, [420.0, 300.0], 20.0);
     assert_eq!((entered.search, entered.persons.len()), (Search::Full, 1));
-    // A leap is no walk: the crop would not show the person.
+    // The crop would not show a person who leaps.
     let leapt = camera.report(400, [150.0, 300.0], 20.0);
     assert_eq!((leapt.search, leapt.persons.len()), (Search::Full, 1));
 }
