@@ -5,14 +5,11 @@ The reports are those of `against_line_zone.py`. The trackers of ultralytics fol
 them, both without a network. It needs `pip install ultralytics shapely lap`, 6 GB with torch.
 """
 
-import argparse
-import json
 from collections import defaultdict
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
-from against_line_zone import CLIP, SCORES, pixel_of
+from against_line_zone import SCORES, inputs
 from shapely.geometry import LineString, Point
 from ultralytics.engine.results import Boxes
 from ultralytics.solutions.object_counter import ObjectCounter
@@ -58,13 +55,7 @@ def run(name, reports, counters, score):
 
 def main() -> None:
     """Prints a row for each tracker and score. The two directions are named as is best for the counter."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("reports", type=Path, help="one report per line")
-    options = parser.parse_args()
-    reports = [json.loads(line) for line in options.reports.read_text(encoding="utf-8").splitlines()]
-    calibration = json.loads((CLIP / "calibration.json").read_text(encoding="utf-8"))
-    truth = json.loads((CLIP / "truth.json").read_text(encoding="utf-8"))["crossings"]
-    ends = {line["name"]: [pixel_of(calibration, place) for place in line["floor_m"]] for line in calibration["lines"]}
+    reports, ends, truth = inputs(__doc__)
     print("| tracker | from score | counted | wrong |\n|---|---:|---:|---:|")
     for name in TRACKERS:
         for score in SCORES:
