@@ -1,6 +1,7 @@
 /** The section Calibrate: edits a circle over the frame or imports a file, previews its views, and saves it. */
 
 import { drawCircle } from "./circle_handles.js";
+import { showViews, startDivider } from "./comparison.js";
 import { afterPause, element, find } from "./dom.js";
 import { assumedCircle, calibrationOf, circleOf, withFound } from "./lens.js";
 import { isServing, loadCalibrations } from "./parameters.js";
@@ -125,19 +126,23 @@ async function preview() {
   previewSoon.cancel();
   trying?.abort();
   trying = new AbortController();
-  const options = { method: "POST", body: content(), signal: trying.signal };
-  const attempt = () => {
-    const query = new URLSearchParams([["profile", "fast"], ["grid", GRID_CELLS], ...reading()]);
-    return askJson(`calibrations/${id()}/views?${query}`, options);
-  };
-  const plan = await withProgress(find("#previews-progress"), "Straightening", () => attempt().catch(sizeOr(attempt)));
-  const views = plan.views.map((view, index) => {
-    const canvas = viewCanvas(view, GRID_CELLS, frame, plan.image[0], PREVIEW_PIXELS);
-    canvas.setAttribute("role", "img");
-    canvas.setAttribute("aria-label", `Straightened view ${index + 1}`);
-    return canvas;
-  });
-  find("#previews").replaceChildren(...views);
+  const { signal } = trying;
+  const both = () => Promise.all([straightened(frame, content(), reading(), signal), imported?.isFound ? straightened(frame, before(), "", signal) : []]);
+  const attempt = () => both().catch(sizeOr(both));
+  showViews(...(await withProgress(find("#previews-progress"), "Straightening", attempt)));
+}
+
+/** The canvases of the frame's views with a calibration. */
+async function straightened(frame, body, query, signal) {
+  const asked = new URLSearchParams([["profile", "fast"], ["grid", GRID_CELLS], ...new URLSearchParams(query)]);
+  const plan = await askJson(`calibrations/${id()}/views?${asked}`, { method: "POST", body, signal });
+  return plan.views.map((view) => viewCanvas(view, GRID_CELLS, frame, plan.image[0], PREVIEW_PIXELS));
+}
+
+/** The calibration that a found one is compared with: the opened one, or the circle. */
+function before() {
+  const isOpened = opened && !circleOf(opened.file);
+  return JSON.stringify(isOpened ? opened.file : calibrationOf({ id: id(), ...circle }, opened?.file));
 }
 
 /** Repeats a request that lacks the frame size with the size of the current frame. */
@@ -254,6 +259,7 @@ export function visible(is) {
 }
 
 export function start() {
+  startDivider();
   whenChanged(["frame", "report"], begin);
   whenChanged(["calibrations"], () => {
     const choice = find("#open-calibration");

@@ -7,6 +7,7 @@ mod frame_file;
 mod height;
 mod native_output;
 mod people;
+mod place;
 mod source;
 mod suggest_area;
 mod walked_area;
@@ -28,6 +29,8 @@ pub(super) enum Command {
     Fit(fit::Arguments),
     /// Find the height of a camera from the people in its frames
     Height(height::Arguments),
+    /// Find the place of a camera on the floor of another, from people who walk through both views
+    Place(place::Arguments),
     /// Suggest an area from the places where people walked
     SuggestArea(suggest_area::Arguments),
 }
@@ -39,6 +42,7 @@ pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
         Command::Convert(arguments) => convert::run(arguments),
         Command::Fit(arguments) => fit::run(arguments),
         Command::Height(arguments) => height::run(arguments),
+        Command::Place(arguments) => place::run(arguments),
         Command::SuggestArea(arguments) => suggest_area::run(arguments),
     }
 }

@@ -17,8 +17,12 @@ use std::{
 use anyhow::{Context, bail};
 use lookdown_eval::DetectedRow;
 
-pub(super) use self::arguments::{Arguments, DEFAULT_SCORE_THRESHOLD};
-use self::{detect_group::detect_group, output::Output};
+use self::output::Output;
+pub(super) use self::{
+    arguments::{Arguments, DEFAULT_SCORE_THRESHOLD},
+    detect_group::detect_group,
+    truth::TruthFlags,
+};
 use crate::app::engine_for;
 
 /// Scores every profile with every refinement.

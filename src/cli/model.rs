@@ -5,6 +5,7 @@ mod description;
 mod fetch;
 mod manifest;
 mod sample;
+mod tune;
 
 use std::process::ExitCode;
 
@@ -21,6 +22,8 @@ pub(super) enum Command {
     List(SettingsFile),
     /// Fetch, verify and install the weights of a model of the repository
     Fetch(fetch::Arguments),
+    /// Measure the constants of the profiles that fit a model, and write them into its model.toml
+    Tune(tune::Arguments),
 }
 
 /// Runs the subcommand.
@@ -29,5 +32,6 @@ pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
         Command::Check(arguments) => check::run(arguments),
         Command::List(settings_file) => fetch::list(settings_file),
         Command::Fetch(arguments) => fetch::run(arguments),
+        Command::Tune(arguments) => tune::run(arguments),
     }
 }

@@ -15,6 +15,7 @@ mod serve;
 mod shell;
 mod systemd;
 mod telemetry;
+mod tuning;
 
 use std::{
     io::{BufRead, BufReader},

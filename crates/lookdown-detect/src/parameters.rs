@@ -11,6 +11,8 @@ mod given_parameters;
 mod parameter_error;
 mod priority;
 mod profile;
+mod score_calibration;
+mod tuning;
 
 pub use defaults::{DefaultSource, DefaultUsed, DetectDefaults};
 pub use detect_parameters::{DetectParameters, parse_profile};
@@ -19,3 +21,5 @@ pub use parameter_error::{ParameterError, ParameterFault, whole_number};
 pub use parameter_spec::{Interface, JsonType, ParameterDefault, ParameterKind, ParameterSpec};
 pub use priority::Priority;
 pub use profile::Profile;
+pub(crate) use score_calibration::ScoreCalibration;
+pub use tuning::{Tuning, Tunings};

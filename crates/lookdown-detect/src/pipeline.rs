@@ -21,7 +21,6 @@ mod planned_views;
 mod plausibility;
 mod report;
 mod rig_cache;
-mod score_calibration;
 mod service_rate;
 #[cfg(test)]
 mod test_support;

@@ -17,6 +17,7 @@ mod motion;
 mod observation;
 mod place;
 mod plane;
+mod relative_pose;
 mod settings;
 mod site;
 #[cfg(test)]
@@ -30,6 +31,7 @@ pub use candidates::MAX_PERSONS;
 pub use evidence::EvidenceSettings;
 pub use observation::Observation;
 pub use plane::Plane;
+pub use relative_pose::{NoPose, RelativePose, Walk, relative_pose};
 pub use settings::{MeasurementNoise, PlaneSettings, TrackerSettings};
 pub use site::CameraPose;
 pub use track::{MAX_TAIL_POINTS, PersonOfReport, TailPoint, Track};

@@ -87,6 +87,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "floor.js" from "web",
         "lens.js" from "web",
         "calibrate.js" from "web",
+        "comparison.js" from "web",
         "circle_handles.js" from "web",
         "zones.js" from "web",
         "zone_surfaces.js" from "web",

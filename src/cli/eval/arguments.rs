@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use lookdown_detect::{detection::Refinement, parameters::Profile};
+use lookdown_eval::Stratification;
 
 use super::{plot_file::PlotFile, truth::TruthFlags};
 use crate::cli::{parameters::one_of, settings_file::SettingsFile};
@@ -16,6 +17,10 @@ pub(in crate::cli) const DEFAULT_SCORE_THRESHOLD: &str = "0.001";
 pub(in crate::cli) struct Arguments {
     #[command(flatten)]
     pub(super) truth: TruthFlags,
+    /// Also score the persons of each stratum: by distance from the optical axis, size or
+    /// visibility; may be repeated
+    #[arg(long, value_name = "NAME", conflicts_with = "sweep", value_parser = one_of::<Stratification>())]
+    pub(super) by: Vec<Stratification>,
     /// Trade-off between accuracy and cost; may be repeated [default: balanced; with --sweep: paper]
     #[arg(long, value_name = "NAME", value_parser = one_of::<Profile>())]
     pub(super) profile: Vec<Profile>,

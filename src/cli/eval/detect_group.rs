@@ -6,7 +6,7 @@ use lookdown_eval::{DataSet, DetectedRow, EvaluationError, detect};
 use crate::{cli::progress::Progress, settings::Settings};
 
 /// Detects the persons of a data set once for all rows of a group.
-pub(super) fn detect_group(
+pub(in crate::cli) fn detect_group(
     engine: &Engine,
     data_set: &DataSet,
     group: &[DetectParameters],

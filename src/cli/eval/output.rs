@@ -36,7 +36,7 @@ impl<'a> Output<'a> {
         // A data set of empty rooms has counts, but neither precision nor recall.
         let evaluated = detected.evaluate(data_set).ok();
         let mut row = Row::new(detected, evaluated.as_ref(), &detected.counts(data_set));
-        for by in &self.arguments.truth.by {
+        for by in &self.arguments.by {
             row.add_strata(*by, &detected.strata(data_set, *by).context("--by")?);
         }
         let line = if self.arguments.json {

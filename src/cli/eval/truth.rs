@@ -8,17 +8,14 @@ use std::{
 use anyhow::Context;
 use clap::Args;
 use lookdown_detect::pipeline::CalibrationLookup;
-use lookdown_eval::{DataSet, Scoring, Stratification};
+use lookdown_eval::{DataSet, Scoring};
 use lookdown_lens::calibration::{Calibration, CalibrationId};
 
-use crate::{
-    app::open_calibrations,
-    cli::{SettingsFile, parameters::one_of},
-};
+use crate::{app::open_calibrations, cli::SettingsFile};
 
 /// The flags that select a data set.
 #[derive(Debug, Args)]
-pub(super) struct TruthFlags {
+pub(in crate::cli) struct TruthFlags {
     /// Images with annotated persons: a folder with annotations.json (COCO with a `calibration` per
     /// image), images/ and calibrations/; a COCO or CEPDOF file or a folder of them; a folder with
     /// Pascal VOC XML files; a PIROPO folder with head points
@@ -31,15 +28,11 @@ pub(super) struct TruthFlags {
     /// detections
     #[arg(long)]
     axis_parallel: bool,
-    /// Also score the persons of each stratum: by distance from the optical axis, size or
-    /// visibility; may be repeated
-    #[arg(long, value_name = "NAME", conflicts_with = "sweep", value_parser = one_of::<Stratification>())]
-    pub(super) by: Vec<Stratification>,
 }
 
 impl TruthFlags {
     /// Opens the data set.
-    pub(super) fn open(&self, settings_file: &SettingsFile) -> anyhow::Result<DataSet> {
+    pub(in crate::cli) fn open(&self, settings_file: &SettingsFile) -> anyhow::Result<DataSet> {
         let mut data_set = DataSet::open(&self.data_set)?;
         if let Some(named) = &self.calibration {
             data_set = data_set.with_calibration(&calibration(named, settings_file)?);

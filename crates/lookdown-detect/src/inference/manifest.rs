@@ -12,6 +12,7 @@ use lookdown_common::files;
 use serde::Deserialize;
 
 use super::{InferenceError, heads::Head};
+use crate::parameters::Tunings;
 
 pub use input::{Layout, ManifestInput};
 pub use upstream::Upstream;
@@ -50,6 +51,9 @@ pub struct ModelManifest {
     /// The published file from which the ONNX file is installed.
     #[serde(default)]
     pub upstream: Option<Upstream>,
+    /// Constants of profiles that fit this model, as `lookdown model tune` writes them.
+    #[serde(default)]
+    pub tuning: Tunings,
 }
 
 impl ModelManifest {
@@ -87,6 +91,7 @@ impl ModelManifest {
             input: ManifestInput::default(),
             output: Head::default(),
             upstream: None,
+            tuning: Tunings::default(),
         })
     }
 
@@ -156,6 +161,7 @@ impl ModelManifest {
                 ));
             }
         }
+        self.tuning.check()?;
         self.input.normalisation().map(drop)
     }
 }

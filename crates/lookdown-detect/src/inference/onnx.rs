@@ -19,7 +19,10 @@ use super::{
     signature::Signature,
     staging::{Staged, Staging},
 };
-use crate::imaging::{NetworkInput, ViewBatch};
+use crate::{
+    imaging::{NetworkInput, ViewBatch},
+    parameters::Tunings,
+};
 
 pub(super) use description::{FLOAT, Metadata, float_shapes};
 pub use description::{ModelDescription, OnnxTensor};
@@ -104,8 +107,14 @@ impl OnnxDetector {
             scale,
             offset,
         };
-        // The revision covers the input and output settings in addition to the weights.
-        let used = format!("{sha256} {:?} {:?}", manifest.input, manifest.output);
+        // The revision covers the settings of the manifest in addition to the weights.
+        let ModelManifest {
+            input: from,
+            output,
+            tuning,
+            ..
+        } = &manifest;
+        let used = format!("{sha256} {from:?} {output:?} {tuning:?}");
         let description = ModelDescription {
             revision: revision_of(used.as_bytes()),
             bytes: bytes.len(),
@@ -185,6 +194,10 @@ impl Detector for OnnxDetector {
 
     fn views_per_run(&self) -> Option<NonZeroUsize> {
         self.description.views_per_run
+    }
+
+    fn tunings(&self) -> Tunings {
+        self.description.manifest.tuning.clone()
     }
 
     fn detect(&mut self, batch: &ViewBatch) -> Result<HeadOutput, InferenceError> {

@@ -22,7 +22,10 @@ use super::{
     heads::TensorView,
     staging::{Staged, Staging},
 };
-use crate::imaging::{NetworkInput, ViewBatch};
+use crate::{
+    imaging::{NetworkInput, ViewBatch},
+    parameters::Tunings,
+};
 
 pub use options::RemoteOptions;
 pub use server::RemoteServer;
@@ -77,6 +80,10 @@ impl Detector for RemoteDetector {
 
     fn views_per_run(&self) -> Option<NonZeroUsize> {
         self.understood.signature.views_per_run
+    }
+
+    fn tunings(&self) -> Tunings {
+        self.understood.manifest.tuning.clone()
     }
 
     fn detect(&mut self, batch: &ViewBatch) -> Result<HeadOutput, InferenceError> {

@@ -3,6 +3,7 @@
 use lookdown_lens::geometry::{BackProjection, FieldOfViewReading, ViewPlan};
 use strum::{Display, EnumString, IntoStaticStr, VariantArray};
 
+use super::Tuning;
 use crate::detection::Refinement;
 
 /// A profile: the views, models and refinement used for a frame.
@@ -12,6 +13,8 @@ use crate::detection::Refinement;
     Copy,
     PartialEq,
     Eq,
+    PartialOrd,
+    Ord,
     Hash,
     Default,
     serde::Serialize,
@@ -59,24 +62,21 @@ impl Profile {
         }
     }
 
-    /// Returns the pass through upright crops that follows the views of the plan, if any.
-    pub(crate) fn crop_pass(self) -> Option<CropPass> {
-        let (max_crops, vote) = match self {
-            Self::Fast => (5, 1.0),
-            Self::Balanced => (12, 0.7),
-            Self::Quality => (16, 0.7),
-            Self::Paper | Self::Direct => return None,
-        };
-        Some(CropPass {
-            max_crops,
-            fill: 0.3,
-            vote,
-        })
+    /// Returns true if a pass through upright crops follows the views of the plan.
+    #[must_use]
+    pub fn has_crops(self) -> bool {
+        self.max_crops() > 0
     }
 
-    /// Returns the maximum number of network inputs of the passes after the views of the plan.
-    pub(crate) fn max_second_pass_views(self) -> usize {
-        self.crop_pass().map_or(0, |crops| crops.max_crops)
+    /// Returns the maximum number of upright crops in the pass that follows the views of the plan, 0
+    /// without such a pass.
+    pub(crate) fn max_crops(self) -> usize {
+        match self {
+            Self::Fast => 5,
+            Self::Balanced => 12,
+            Self::Quality => 16,
+            Self::Paper | Self::Direct => 0,
+        }
     }
 
     /// Returns the method that projects boxes back to the frame.
@@ -88,12 +88,20 @@ impl Profile {
         }
     }
 
-    /// Returns the score at which a person merged by fusion is as likely as not. `docs/lab/results.md`
-    /// has the error of the number of persons and of the probabilities with these values.
-    pub(crate) fn even_odds_score(self) -> f64 {
-        match self {
-            Self::Fast | Self::Quality => 0.26,
-            Self::Balanced | Self::Paper | Self::Direct => 0.25,
+    /// Returns the constants for the default models. A manifest may have others.
+    #[must_use]
+    pub fn tuning(self) -> Tuning {
+        let (even_odds, crop_vote) = match self {
+            Self::Fast => (0.26, 1.0),
+            Self::Balanced => (0.25, 0.7),
+            Self::Quality => (0.26, 0.7),
+            Self::Paper | Self::Direct => (0.25, 1.0),
+        };
+        Tuning {
+            even_odds,
+            odds_power: 3.0,
+            crop_fill: 0.3,
+            crop_vote,
         }
     }
 
@@ -106,15 +114,4 @@ impl Profile {
             Self::Fast | Self::Balanced | Self::Quality => Refinement::Fusion,
         }
     }
-}
-
-/// A second pass through upright crops of the frame around possible persons.
-pub(crate) struct CropPass {
-    /// The maximum number of crops.
-    pub(crate) max_crops: usize,
-    /// The share of a crop's side that the larger side of a person's box fills.
-    pub(crate) fill: f64,
-    /// The factor for scores from crops, in which persons lean by up to 45° and more. Where many
-    /// upright views see a person, they give better scores, and crops give better extents.
-    pub(crate) vote: f64,
 }

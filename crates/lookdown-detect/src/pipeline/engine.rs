@@ -268,6 +268,7 @@ impl Engine {
         });
         let mut observation = Observation {
             profile: job.parameters.profile,
+            tuning: self.tuning(&job.parameters, &model),
             passes: Vec::with_capacity(2),
             is_searched: true,
             follow: None,
@@ -324,7 +325,13 @@ impl Engine {
         observation: &Observation,
         refinement: &RefinementParameters,
     ) -> Vec<Person> {
-        merge::persons(&observation.passes, observation.profile, refinement)
+        let Observation {
+            passes,
+            profile,
+            tuning,
+            ..
+        } = observation;
+        merge::persons(passes, *profile, tuning, refinement)
     }
 
     /// Returns the camera's views in the motion cache, if the request enables motion detection.

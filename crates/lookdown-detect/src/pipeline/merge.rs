@@ -12,13 +12,12 @@ use super::{
     camera_rig::CameraRig,
     pass::{Pass, PassDetection, detections, views_holding},
     plausibility::score_weight,
-    score_calibration::ScoreCalibration,
 };
 use crate::{
     detection::{
         BBox, Candidate, FramePixels, MergedDetection, Refinement, RefinementParameters, refine,
     },
-    parameters::Profile,
+    parameters::{Profile, ScoreCalibration, Tuning},
 };
 
 /// The weight of the coordinates of a cut-off box when boxes are averaged.
@@ -66,17 +65,18 @@ impl Mapped {
 pub(super) fn persons(
     passes: &[Pass],
     profile: Profile,
+    tuning: &Tuning,
     parameters: &RefinementParameters,
 ) -> Vec<Person> {
     let Some(Pass { rig, .. }) = passes.first() else {
         return Vec::new();
     };
-    let calibration = ScoreCalibration::of(profile, parameters.refinement);
+    let calibration = ScoreCalibration::of(tuning, parameters.refinement);
     let parameters = RefinementParameters {
         score_threshold: calibration.merged(parameters.score_threshold),
         ..*parameters
     };
-    let (mapped, merged) = merged(passes, rig, profile, &parameters);
+    let (mapped, merged) = merged(passes, rig, profile, tuning, &parameters);
     merged
         .into_iter()
         .filter_map(|merged| {
@@ -113,8 +113,9 @@ pub(super) fn second_pass_targets(
     passes: &[Pass],
     rig: &CameraRig,
     profile: Profile,
+    tuning: &Tuning,
 ) -> Vec<CropTarget> {
-    let (mapped, mut merged) = merged(passes, rig, profile, &TARGET_REFINEMENT);
+    let (mapped, mut merged) = merged(passes, rig, profile, tuning, &TARGET_REFINEMENT);
     if !rig.geometry().areas.foot_filter.areas.is_empty() {
         merged.retain(|merged| may_count(merged, &mapped, rig));
     }
@@ -149,6 +150,7 @@ fn merged(
     passes: &[Pass],
     rig: &CameraRig,
     profile: Profile,
+    tuning: &Tuning,
     parameters: &RefinementParameters,
 ) -> (Vec<Mapped>, Vec<MergedDetection>) {
     let is_fusion = parameters.refinement == Refinement::Fusion;
@@ -160,10 +162,9 @@ fn merged(
         .collect();
     // Suppression compares the detector's scores; fusion weights them.
     let candidates: Vec<Candidate> = if is_fusion {
-        let crop_vote = profile.crop_pass().map_or(1.0, |pass| pass.vote);
         let weighted = mapped
             .iter()
-            .map(|one| one.weighted(passes, rig, crop_vote));
+            .map(|one| one.weighted(passes, rig, tuning.crop_vote));
         weighted.collect()
     } else {
         mapped.iter().map(|one| one.candidate).collect()

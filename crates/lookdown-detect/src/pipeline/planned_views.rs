@@ -114,7 +114,7 @@ impl Engine {
             seen_share: coverage.map_or(1.0, |coverage| coverage.seen_share),
             mean_views: coverage.map_or(1.0, |coverage| coverage.mean_views),
             pictures,
-            crops_at_most: profile.crop_pass().map_or(0, |crops| crops.max_crops),
+            crops_at_most: profile.max_crops(),
             batches: pictures.div_ceil(options.batches.max_views.get()),
             pixels: pictures as u64 * u64::from(input.width) * u64::from(input.height),
             views: views

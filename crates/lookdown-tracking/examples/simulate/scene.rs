@@ -1,8 +1,9 @@
 //! The scene: a hall with its cameras, the trackers that follow it, and a line in its middle.
 
 use lookdown_tracking::{
-    CameraPose, Observation, Plane, Track, Tracker, TrackerSettings,
+    CameraPose, Observation, Plane, Track, TrackId, Tracker, TrackerSettings, Walk,
     lines::{Crossing, DEFAULT_BAND_M, Direction, Line, LineCounter},
+    relative_pose,
 };
 use nalgebra::Vector2;
 use serde_json::{Value, json};
@@ -79,6 +80,8 @@ struct Follower {
     tracker: Tracker,
     line: LineCounter,
     crossings: Vec<Crossing>,
+    /// The places of each track.
+    walks: BTreeMap<TrackId, Walk>,
 }
 
 impl Follower {
@@ -87,6 +90,7 @@ impl Follower {
             tracker: Tracker::new(poses, *settings).expect("valid cameras"),
             line: LineCounter::new(vec![line]).expect("a valid line"),
             crossings: Vec::new(),
+            walks: BTreeMap::new(),
         }
     }
 
@@ -96,6 +100,21 @@ impl Follower {
             .expect("reports in order");
         self.crossings
             .extend(self.line.update(self.tracker.tracks()));
+        for track in self.tracker.tracks().filter(|track| track.seen_s() == at_s) {
+            if let Some(place) = track.place(Plane::FloorM) {
+                self.walks
+                    .entry(track.id())
+                    .or_default()
+                    .push((at_s, place));
+            }
+        }
+    }
+
+    /// The walks on the floor of the camera at this pose.
+    fn walks_of(&self, pose: &CameraPose) -> Vec<Walk> {
+        let own = |&(at_s, place): &(f64, [f64; 2])| (at_s, pose.of_site(place));
+        let walks = self.walks.values();
+        walks.map(|walk| walk.iter().map(own).collect()).collect()
     }
 
     /// The tracks that this report continued, with the index of their persons.
@@ -287,9 +306,33 @@ impl Scene {
         }
     }
 
+    /// The pose of the second camera from the tracks of both, each on its own floor, and its errors.
+    fn second_camera(&self) -> Option<Value> {
+        let [first, second] = self.separate.as_slice() else {
+            return None;
+        };
+        let [one, other] = [0, 1].map(|camera: usize| self.cameras[camera].pose);
+        let found = relative_pose(&first.walks_of(&one), &second.walks_of(&other));
+        let Ok(found) = found else {
+            return Some(json!({"refused": found.err().map(|reason| reason.to_string())}));
+        };
+        let [x, y] = one.of_site(other.position_m);
+        let turn = found.yaw_deg - (other.yaw_deg - one.yaw_deg);
+        Some(json!({
+            "position_error_m": (found.position_m[0] - x).hypot(found.position_m[1] - y),
+            "yaw_error_deg": (turn + 180.0).rem_euclid(360.0) - 180.0,
+            "position_sd_m": found.position_sd_m,
+            "yaw_sd_deg": found.yaw_sd_deg,
+            "walks": found.walks,
+            "residual_m": found.residual_m,
+            "scale": found.scale,
+        }))
+    }
+
     pub fn crossings(&self) -> Value {
         let separate: Vec<_> = self.separate.iter().flat_map(Follower::crossings).collect();
         json!({
+            "second_camera": self.second_camera(),
             "line_x_m": LINE_X_M,
             "band_m": DEFAULT_BAND_M,
             "truth": self.true_crossings,

@@ -66,8 +66,15 @@ impl RemoteModel {
         manifest.output.check(&shapes, size).map_err(unusable)?;
         let (scale, offset) = manifest.input.normalisation().map_err(unusable)?;
         let versions = &model.versions;
-        let (input, output) = (&manifest.input, &manifest.output);
-        let used = format!("{name_there} {versions:?} {inputs:?} {outputs:?} {input:?} {output:?}");
+        let ModelManifest {
+            input,
+            output,
+            tuning,
+            ..
+        } = &manifest;
+        let used = format!(
+            "{name_there} {versions:?} {inputs:?} {outputs:?} {input:?} {output:?} {tuning:?}"
+        );
         Ok(Self {
             revision: revision_of(used.as_bytes()),
             input: NetworkInput {

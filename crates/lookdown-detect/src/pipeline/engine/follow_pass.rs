@@ -13,7 +13,7 @@ impl Engine {
         let parameters = &job.parameters;
         let is_followed = parameters.follow && !parameters.cache;
         let camera = parameters.camera_name().filter(|_| is_followed);
-        let (Some(camera), Some(pass)) = (camera, observation.profile.crop_pass()) else {
+        let Some(camera) = camera.filter(|_| observation.profile.has_crops()) else {
             return FirstPass::Search;
         };
         job.ticket.timeline.enter(Stage::Remap, Instant::now());
@@ -36,16 +36,17 @@ impl Engine {
         if targets.is_empty() {
             return FirstPass::Nothing;
         }
-        let model = self.crop_model(job, observation);
+        let model = self.crop_model(parameters, &observation.model);
         let side = model.input().width.min(model.input().height);
         let (width, height) = (frame.width(), frame.height());
+        let fill = observation.tuning.crop_fill;
         let crops = self.remappers.install(|| match targets.as_slice() {
             [_] => {
-                let crops = place_crops(&targets, 1, pass.fill, side);
+                let crops = place_crops(&targets, 1, fill, side);
                 rig.with_crops(&crops, width, height)
             }
             targets => {
-                let fill = pass.fill * f64::from(TILES_PER_SIDE);
+                let fill = fill * f64::from(TILES_PER_SIDE);
                 let crops = place_crops(targets, targets.len(), fill, side / TILES_PER_SIDE);
                 rig.with_mosaics(&crops, width, height)
             }

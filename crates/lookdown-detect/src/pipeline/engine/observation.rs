@@ -8,7 +8,7 @@ use super::camera::FrameCamera;
 use crate::{
     imaging::Frame,
     inference::Model,
-    parameters::Profile,
+    parameters::{Profile, Tuning},
     pipeline::{
         PipelineError, Search, Stage, StageTimings, Timeline, ViewCounts, follow::FollowedFrame,
         network::PassTask, pass::Pass,
@@ -23,6 +23,7 @@ pub struct Observation {
     pub(super) camera: FrameCamera,
     pub(super) model: Arc<Model>,
     pub(super) profile: Profile,
+    pub(super) tuning: Tuning,
     pub(super) passes: Vec<Pass>,
     /// False if persons were followed and the views of the plan were left out.
     pub(super) is_searched: bool,

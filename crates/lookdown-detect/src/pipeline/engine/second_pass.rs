@@ -7,6 +7,7 @@ use lookdown_lens::geometry::crop_placement::{CropTarget, place_crops};
 use super::{Engine, Observation};
 use crate::{
     inference::Model,
+    parameters::{DetectParameters, Tuning},
     pipeline::{
         DetectJob, Stage, camera_rig::CameraRig, merge, motion_cache::CameraViews,
         network::PassTask,
@@ -21,13 +22,17 @@ impl Engine {
         observation: &Observation,
     ) -> Option<Arc<PassTask>> {
         let profile = observation.profile;
-        if profile.max_second_pass_views() == 0 {
+        if !profile.has_crops() {
             return None;
         }
         let timeline = &job.ticket.timeline;
         timeline.enter(Stage::Refine, Instant::now());
-        let targets =
-            merge::second_pass_targets(&observation.passes, &observation.camera.rig, profile);
+        let targets = merge::second_pass_targets(
+            &observation.passes,
+            &observation.camera.rig,
+            profile,
+            &observation.tuning,
+        );
         timeline.enter(Stage::Remap, Instant::now());
         let Some((rig, model)) = self.crops(job, observation, &targets) else {
             timeline.leave(Instant::now());
@@ -65,10 +70,10 @@ impl Engine {
         observation: &Observation,
         targets: &[CropTarget],
     ) -> Option<(CameraRig, Arc<Model>)> {
-        let pass = observation.profile.crop_pass()?;
-        let model = self.crop_model(job, observation);
+        let model = self.crop_model(&job.parameters, &observation.model);
         let side = model.input().width.min(model.input().height);
-        let crops = place_crops(targets, pass.max_crops, pass.fill, side);
+        let max_crops = observation.profile.max_crops();
+        let crops = place_crops(targets, max_crops, observation.tuning.crop_fill, side);
         let (width, height) = (observation.frame.width(), observation.frame.height());
         let rig = &observation.camera.rig;
         let rig = self
@@ -77,12 +82,28 @@ impl Engine {
         (rig.view_count() > 0).then_some((rig, model))
     }
 
-    /// Returns the profile's model of crops, or the model that the request names.
-    pub(super) fn crop_model(&self, job: &DetectJob, observation: &Observation) -> Arc<Model> {
+    /// Returns the model of the upright crops of a request whose views `model` processes: the
+    /// profile's, or `model` if the request names it or the profile has none.
+    pub(super) fn crop_model(
+        &self,
+        parameters: &DetectParameters,
+        model: &Arc<Model>,
+    ) -> Arc<Model> {
         let models = &self.options.default_models;
-        let unnamed = job.parameters.model.is_none();
-        let own = unnamed.then(|| models.crop_model(observation.profile));
-        let model = own.flatten().and_then(|name| self.models.get(name));
-        model.unwrap_or_else(|| Arc::clone(&observation.model))
+        let unnamed = parameters.model.is_none();
+        let own = unnamed.then(|| models.crop_model(parameters.profile));
+        let own = own.flatten().and_then(|name| self.models.get(name));
+        own.unwrap_or_else(|| Arc::clone(model))
+    }
+
+    /// Returns the tuning of a request whose views `model` processes: that of the model if it
+    /// processes the crops, too.
+    pub(super) fn tuning(&self, parameters: &DetectParameters, model: &Arc<Model>) -> Tuning {
+        let profile = parameters.profile;
+        if Arc::ptr_eq(&self.crop_model(parameters, model), model) {
+            model.tunings().of(profile)
+        } else {
+            profile.tuning()
+        }
     }
 }

@@ -110,7 +110,7 @@ proptest! {
         parameters in parameters(),
     ) {
         let (rig, profile) = &CAMERAS[camera];
-        for person in persons(&[pass(rig, &detections)], *profile, &parameters) {
+        for person in persons(&[pass(rig, &detections)], *profile, &profile.tuning(), &parameters) {
             let [x_min, y_min, x_max, y_max] = person.bbox.corners();
             prop_assert!(0.0 <= x_min && x_min < x_max && x_max <= f64::from(WIDTH), "{person:?}");
             prop_assert!(0.0 <= y_min && y_min < y_max && y_max <= f64::from(HEIGHT), "{person:?}");
@@ -139,7 +139,7 @@ proptest! {
     ) {
         let (rig, profile) = &CAMERAS[camera];
         let [one, other] = [detections, shuffled]
-            .map(|detections| persons(&[pass(rig, &detections)], *profile, &parameters));
+            .map(|detections| persons(&[pass(rig, &detections)], *profile, &profile.tuning(), &parameters));
         prop_assert_eq!(one.len(), other.len());
         for (one, other) in one.iter().zip(&other) {
             let pairs = one.bbox.corners().into_iter().zip(other.bbox.corners());

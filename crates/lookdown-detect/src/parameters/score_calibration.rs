@@ -5,50 +5,53 @@
 //! power of the odds of the merged score (Platt scaling on the logit of the score). `docs/lab/results.md`
 //! has the reliability of the results. The order of persons does not change.
 
-use crate::{detection::Refinement, parameters::Profile};
-
-/// The power of the odds. It holds for all profiles, on photographs and on rendered frames.
-const SLOPE: f64 = 3.0;
+use super::Tuning;
+use crate::detection::Refinement;
 
 /// Converts between merged scores and reported scores, both 0 to 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum ScoreCalibration {
+pub(crate) enum ScoreCalibration {
     /// Reports merged scores unchanged.
     Identity,
-    /// Raises the odds, relative to those of a person as likely as not, to [`SLOPE`].
+    /// Raises the odds, relative to those of a person as likely as not, to a power.
     Odds {
         /// The merged score of a box that is a person with probability 0.5.
         center: f64,
+        /// The power.
+        power: f64,
     },
 }
 
 impl ScoreCalibration {
-    /// Returns the calibration for persons of a profile.
-    pub(super) fn of(profile: Profile, refinement: Refinement) -> Self {
+    /// Returns the calibration for persons of a profile with this tuning.
+    pub(crate) fn of(tuning: &Tuning, refinement: Refinement) -> Self {
         match refinement {
             // Suppression keeps the detector's scores.
             Refinement::Nms | Refinement::SoftNmsLinear | Refinement::SoftNmsGaussian => {
                 Self::Identity
             }
             Refinement::Fusion => Self::Odds {
-                center: profile.even_odds_score(),
+                center: tuning.even_odds,
+                power: tuning.odds_power,
             },
         }
     }
 
     /// Returns the reported score of a merged score.
-    pub(super) fn reported(self, merged: f64) -> f64 {
+    pub(crate) fn reported(self, merged: f64) -> f64 {
         match self {
             Self::Identity => merged,
-            Self::Odds { center } => from_odds((odds(merged) / odds(center)).powf(SLOPE)),
+            Self::Odds { center, power } => from_odds((odds(merged) / odds(center)).powf(power)),
         }
     }
 
     /// Returns the merged score of a reported score.
-    pub(super) fn merged(self, reported: f64) -> f64 {
+    pub(crate) fn merged(self, reported: f64) -> f64 {
         match self {
             Self::Identity => reported,
-            Self::Odds { center } => from_odds(odds(reported).powf(SLOPE.recip()) * odds(center)),
+            Self::Odds { center, power } => {
+                from_odds(odds(reported).powf(power.recip()) * odds(center))
+            }
         }
     }
 }
@@ -69,8 +72,12 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::parameters::Profile;
 
-    const QUALITY: ScoreCalibration = ScoreCalibration::Odds { center: 0.31 };
+    const QUALITY: ScoreCalibration = ScoreCalibration::Odds {
+        center: 0.31,
+        power: 3.0,
+    };
 
     #[test]
     fn the_center_is_as_likely_as_not() {
@@ -87,7 +94,8 @@ mod tests {
 
     #[test]
     fn suppression_keeps_the_scores_of_the_detector() {
-        let calibration = ScoreCalibration::of(Profile::Fast, Refinement::SoftNmsGaussian);
+        let calibration =
+            ScoreCalibration::of(&Profile::Fast.tuning(), Refinement::SoftNmsGaussian);
         assert_eq!(calibration.reported(0.42), 0.42);
     }
 
