@@ -7,6 +7,11 @@ pub(crate) fn cameras(folder: &Path) -> Cameras {
     Cameras::new(folder.join("state"), Arc::new(Metrics::new().unwrap()))
 }
 
+/// Changes of the cameras wait until this is dropped, as for a folder that hangs.
+pub(crate) fn hold(cameras: &Cameras) -> impl Drop + '_ {
+    cameras.changing.lock()
+}
+
 /// A stored camera with this URL.
 pub(crate) fn camera(url: &str) -> StoredCamera {
     StoredCamera {

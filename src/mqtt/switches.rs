@@ -9,7 +9,10 @@ use std::{
 
 use lookdown_common::LogOnce;
 use rumqttc::Publish;
-use tokio::{task::spawn_blocking, time::Instant};
+use tokio::{
+    task::{JoinHandle, spawn_blocking},
+    time::{Instant, timeout},
+};
 
 use super::{
     discovery::Discovery,
@@ -18,10 +21,20 @@ use super::{
     retained::RetainedTopics,
     topics::{SwitchTopic, Topics, level},
 };
-use crate::cameras::Cameras;
+use crate::cameras::{CameraError, Cameras};
 
 /// Most commands that wait for cameras that are not known yet.
 const MAX_COMMANDS: usize = 256;
+
+/// Longest wait for the files of the cameras, which may hang: the reports wait as long.
+const FILES_TIMEOUT: Duration = Duration::from_secs(1);
+
+/// The execution of commands, which uses the files of the cameras.
+struct Execution {
+    commands: BTreeMap<String, bool>,
+    /// Returns the states of all cameras.
+    task: JoinHandle<Result<BTreeMap<String, bool>, CameraError>>,
+}
 
 /// The switches of all cameras of this process.
 pub(super) struct Switches {
@@ -32,6 +45,8 @@ pub(super) struct Switches {
     published: BTreeMap<String, bool>,
     /// The latest command for each camera, by the level of its topic.
     commands: BTreeMap<String, bool>,
+    /// The execution that waits for files that hang.
+    waiting: Option<Execution>,
     retained: RetainedTopics,
     /// The time at which the switches of `retained` are withdrawn.
     withdraw_at: Option<Instant>,
@@ -46,6 +61,7 @@ impl Switches {
             cameras,
             published: BTreeMap::new(),
             commands: BTreeMap::new(),
+            waiting: None,
             retained: RetainedTopics::default(),
             withdraw_at: None,
             log: LogOnce::default(),
@@ -99,21 +115,20 @@ impl Switches {
     /// Executes the commands and returns the messages for everything that has changed. It is called
     /// at intervals, so that commands cost no more than one write per camera and interval.
     pub(super) async fn update(&mut self, now: Instant) -> Vec<Message> {
-        let commands = self.commands.clone();
-        let cameras = Arc::clone(&self.cameras);
-        let done = spawn_blocking(move || {
-            let mut states = cameras.detection()?;
-            for (name, is_on) in &mut states {
-                let wanted = commands.get(&level(name)).copied();
-                if let Some(wanted) = wanted.filter(|wanted| wanted != is_on) {
-                    cameras.set_detection(name, wanted)?;
-                    tracing::info!(camera = name, "detection is {}", payload(wanted));
-                    *is_on = wanted;
-                }
+        let mut execution = match self.waiting.take() {
+            Some(waiting) if !waiting.task.is_finished() => {
+                self.waiting = Some(waiting);
+                return Vec::new();
             }
-            Ok::<_, crate::cameras::CameraError>(states)
-        });
-        let states = match done.await {
+            Some(done) => done,
+            None => self.execute(),
+        };
+        let Ok(done) = timeout(FILES_TIMEOUT, &mut execution.task).await else {
+            tracing::warn!("the switches of cameras wait for the files in state.path");
+            self.waiting = Some(execution);
+            return Vec::new();
+        };
+        let states = match done {
             Ok(Ok(states)) => {
                 self.log.clear();
                 states
@@ -131,8 +146,10 @@ impl Switches {
         self.published = states;
         let levels: BTreeSet<_> = self.published.keys().map(|name| level(name)).collect();
         let is_waiting = self.withdraw_at.is_some();
-        self.commands
-            .retain(|camera, _| is_waiting && !levels.contains(camera));
+        // A command that arrived meanwhile stays.
+        self.commands.retain(|camera, wanted| {
+            execution.commands.get(camera) != Some(wanted) || is_waiting && !levels.contains(camera)
+        });
         if self.withdraw_at.is_some_and(|at| at <= now) {
             self.withdraw_at = None;
             for (unknown, _) in self.retained.take() {
@@ -142,6 +159,28 @@ impl Switches {
             }
         }
         messages
+    }
+
+    /// Begins the execution of the commands.
+    fn execute(&self) -> Execution {
+        let commands = self.commands.clone();
+        let cameras = Arc::clone(&self.cameras);
+        let task = spawn_blocking({
+            let commands = commands.clone();
+            move || {
+                let mut states = cameras.detection()?;
+                for (name, is_on) in &mut states {
+                    let wanted = commands.get(&level(name)).copied();
+                    if let Some(wanted) = wanted.filter(|wanted| wanted != is_on) {
+                        cameras.set_detection(name, wanted)?;
+                        tracing::info!(camera = name, "detection is {}", payload(wanted));
+                        *is_on = wanted;
+                    }
+                }
+                Ok(states)
+            }
+        });
+        Execution { commands, task }
     }
 
     fn changes(&self, states: &BTreeMap<String, bool>) -> Vec<Message> {

@@ -3,7 +3,7 @@
 
 use std::{
     fs,
-    io::{Read, Write},
+    io::{ErrorKind, Read, Write},
     net::{SocketAddr, TcpListener, TcpStream},
     path::{Path, PathBuf},
     sync::Arc,
@@ -17,7 +17,7 @@ use tempfile::TempDir;
 use tokio::{
     sync::watch,
     task::{JoinHandle, spawn_blocking},
-    time::sleep,
+    time::{sleep, timeout},
 };
 
 use crate::server::Server;
@@ -35,16 +35,20 @@ pub(crate) const KEY: &str = "0123456789abcdef";
 /// More connections than a companion serves at a time, and than those that wait beyond the limit.
 const SILENT: usize = 330;
 
+/// Longest wait for a connection, and for the end of an answer: longer than the timeouts of heads.
+const PATIENCE: Duration = Duration::from_secs(20);
+
 /// Sends bytes and reads until the listener closes the connection.
 pub(crate) fn answer(address: SocketAddr, request: &str) -> String {
-    let mut connection = TcpStream::connect(address).unwrap();
-    connection
-        .set_read_timeout(Some(Duration::from_secs(20)))
-        .unwrap();
+    let mut connection = TcpStream::connect_timeout(&address, PATIENCE).unwrap();
+    connection.set_read_timeout(Some(PATIENCE)).unwrap();
     connection.write_all(request.as_bytes()).unwrap();
     let mut bytes = Vec::new();
     // Bytes received before a reset count.
-    let _ = connection.read_to_end(&mut bytes);
+    if let Err(error) = connection.read_to_end(&mut bytes) {
+        let is_open = error.kind() == ErrorKind::WouldBlock;
+        assert!(!is_open, "{address} leaves this open: {request:?}");
+    }
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
@@ -213,9 +217,12 @@ fn nowhere() -> ServerEntry {
 }
 
 pub(crate) async fn accepts(address: SocketAddr) {
-    while TcpStream::connect(address).is_err() {
-        sleep(Duration::from_millis(20)).await;
-    }
+    let connected = async {
+        while TcpStream::connect(address).is_err() {
+            sleep(Duration::from_millis(20)).await;
+        }
+    };
+    timeout(PATIENCE, connected).await.unwrap();
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 4)]

@@ -5,6 +5,7 @@ mod access;
 mod areas;
 mod calibration_changes;
 mod calibrations;
+mod cameras;
 mod code_project_ai;
 mod complexity;
 mod connections;

@@ -16,7 +16,7 @@ use axum::{
 };
 use http_body_util::BodyExt;
 use lookdown::{
-    api::{self, Access, ApiOptions, ApiState, Readiness, RequestRate},
+    api::{self, Access, ApiOptions, ApiState, Companions, Readiness, RequestRate},
     app::Assembly,
     calibration_store::{Calibrations, FolderStore},
     metrics::Metrics,
@@ -89,6 +89,7 @@ pub(crate) struct Bounds {
     pub(crate) access: Access,
     pub(crate) cors_origins: Vec<String>,
     pub(crate) hosts: Vec<String>,
+    pub(crate) companions: Companions,
     pub(crate) tracer: Tracer,
 }
 
@@ -112,6 +113,7 @@ impl Default for Bounds {
             },
             cors_origins: Vec::new(),
             hosts: Vec::new(),
+            companions: Companions::default(),
             tracer: Tracer::default(),
         }
     }
@@ -257,6 +259,7 @@ impl Service {
                 access: bounds.access.clone(),
                 cors_origins: bounds.cors_origins.clone(),
                 hosts: bounds.hosts.clone(),
+                companions: bounds.companions.clone(),
                 tracer: bounds.tracer.clone(),
                 ..ApiOptions::for_testing()
             },

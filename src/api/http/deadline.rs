@@ -14,10 +14,31 @@ use super::problem::{Problem, ProblemKind};
 /// The setting of the limit.
 const REQUEST_TIMEOUT: &str = "server.request_timeout_millis";
 
-/// Most changes that run at a time. A change of a store that hangs keeps a thread, of which the
-/// runtime has 512 for blocking work.
-const MAX_CHANGES: usize = 32;
-static CHANGES: Semaphore = Semaphore::const_new(MAX_CHANGES);
+/// Most requests that use a store at a time. A request to a store that hangs keeps a thread, of
+/// which the runtime has 512 for blocking work.
+const MAX_WAITING: usize = 32;
+
+/// A store of files that may hang, as on a network file system.
+pub(in crate::api) struct SlowStore {
+    free: Semaphore,
+    /// The requests that use it, in the error sentence.
+    requests: &'static str,
+}
+
+/// The stored calibrations and the models, whose changes use their files.
+pub(in crate::api) static CALIBRATIONS_AND_MODELS: SlowStore =
+    SlowStore::new("changes of calibrations and models");
+/// The folder of the cameras, which every request about cameras uses.
+pub(in crate::api) static CAMERAS: SlowStore = SlowStore::new("requests about cameras");
+
+impl SlowStore {
+    const fn new(requests: &'static str) -> Self {
+        Self {
+            free: Semaphore::const_new(MAX_WAITING),
+            requests,
+        }
+    }
+}
 
 /// The time at which a response must be complete.
 #[derive(Debug, Clone, Copy)]
@@ -81,21 +102,20 @@ impl Deadline {
         Ok(done?)
     }
 
-    /// Runs blocking work that changes stored calibrations or models, unless many such changes wait
-    /// already, as for a store that hangs.
-    pub(in crate::api) async fn changing<T, E>(
+    /// Runs blocking work on the files of a store, unless many requests wait for it already.
+    pub(in crate::api) async fn using<T, E>(
         self,
+        store: &'static SlowStore,
         work: impl FnOnce() -> Result<T, E> + Send + 'static,
     ) -> Result<T, Problem>
     where
         T: Send + 'static,
         E: Into<Problem> + Send + 'static,
     {
-        let permit = CHANGES.try_acquire().map_err(|_| {
-            let detail = format!(
-                "{MAX_CHANGES} changes of calibrations and models wait for their store: retry when \
-                 it responds"
-            );
+        let permit = store.free.try_acquire().map_err(|_| {
+            let requests = store.requests;
+            let detail =
+                format!("{MAX_WAITING} {requests} wait for their files: retry when they respond");
             Problem::new(ProblemKind::Overloaded, detail)
         })?;
         self.blocking(move || {
@@ -140,27 +160,32 @@ mod tests {
 
     use super::*;
 
+    static HANGING: SlowStore = SlowStore::new("changes");
+
     #[tokio::test]
-    async fn changes_of_a_store_that_hangs_are_refused_beyond_a_limit() {
+    async fn requests_to_a_store_that_hangs_are_refused_beyond_a_limit() {
         let (release, hang) = sync_channel::<()>(0);
         let hang = Arc::new(Mutex::new(hang));
         let deadline = || Deadline::begin(Duration::from_mins(1));
-        let waiting: Vec<_> = (0..MAX_CHANGES)
+        let waiting: Vec<_> = (0..MAX_WAITING)
             .map(|_| {
                 let hang = Arc::clone(&hang);
-                spawn(deadline().changing(move || {
+                spawn(deadline().using(&HANGING, move || {
                     let _ = hang.lock().recv();
                     Ok::<_, Problem>(())
                 }))
             })
             .collect();
-        while CHANGES.available_permits() > 0 {
+        while HANGING.free.available_permits() > 0 {
             tokio::task::yield_now().await;
         }
-        let refused = deadline().changing(|| Ok::<_, Problem>(())).await;
-        assert_eq!(refused.unwrap_err().kind(), ProblemKind::Overloaded);
-        let other = deadline().blocking(|| Ok::<_, Problem>(1)).await;
-        assert_eq!(other.ok(), Some(1));
+        let refused = deadline().using(&HANGING, || Ok::<_, Problem>(())).await;
+        let refused = refused.unwrap_err();
+        assert_eq!(refused.kind(), ProblemKind::Overloaded);
+        for store in [&CALIBRATIONS_AND_MODELS, &CAMERAS] {
+            let other = deadline().using(store, || Ok::<_, Problem>(1)).await;
+            assert_eq!(other.ok(), Some(1));
+        }
         drop(release);
         for change in waiting {
             assert!(change.await.unwrap().is_ok());

@@ -27,7 +27,7 @@ use crate::{
     api::{
         ApiState,
         http::{
-            deadline::Deadline,
+            deadline::{CALIBRATIONS_AND_MODELS, Deadline},
             entity_tags::{entity_tag, is_unmodified},
             problem::{Problem, ProblemKind},
         },
@@ -128,7 +128,7 @@ pub(in crate::api) async fn put(
 ) -> Result<Response, Problem> {
     let condition = write_condition(&headers)?;
     let location = format!("/calibrations/{id}");
-    let put = deadline.changing(move || {
+    let put = deadline.using(&CALIBRATIONS_AND_MODELS, move || {
         let CalibrationUpload { content, reading } = upload;
         state.calibrations.put(&id, &content, &reading, &condition)
     });
@@ -163,7 +163,9 @@ pub(in crate::api) async fn delete(
     headers: HeaderMap,
 ) -> Result<StatusCode, Problem> {
     let condition = write_condition(&headers)?;
-    let delete = deadline.changing(move || state.calibrations.delete(&id, &condition));
+    let delete = deadline.using(&CALIBRATIONS_AND_MODELS, move || {
+        state.calibrations.delete(&id, &condition)
+    });
     delete.await?;
     Ok(StatusCode::NO_CONTENT)
 }

@@ -15,7 +15,6 @@ use axum::{
 };
 use lookdown_common::{ConfigError, Secret};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
-use tokio::task::spawn_blocking;
 use utoipa::ToSchema;
 
 use crate::{
@@ -23,6 +22,7 @@ use crate::{
         ApiState,
         http::{
             context::RequestContext,
+            deadline::{CAMERAS, Deadline},
             problem::{Problem, ProblemKind},
         },
         openapi::RawBytes,
@@ -148,8 +148,9 @@ impl NewCamera {
 pub(in crate::api) async fn list(
     State(state): State<ApiState>,
     _reader: RequireRead,
+    deadline: Deadline,
 ) -> Result<impl IntoResponse, Problem> {
-    let rows = rows(&state).await?;
+    let rows = rows(&state, deadline).await?;
     Ok(([(CACHE_CONTROL, "no-store")], Json(rows)))
 }
 
@@ -165,9 +166,10 @@ pub(in crate::api) async fn list(
 pub(in crate::api) async fn get(
     State(state): State<ApiState>,
     _reader: RequireRead,
+    deadline: Deadline,
     Path(name): Path<String>,
 ) -> Result<impl IntoResponse, Problem> {
-    let rows = rows(&state).await?;
+    let rows = rows(&state, deadline).await?;
     let row = rows.into_iter().find(|row| row.name == name);
     let row = row.ok_or_else(unknown)?;
     Ok(([(CACHE_CONTROL, "no-store")], Json(row)))
@@ -190,12 +192,13 @@ pub(in crate::api) async fn get(
 pub(in crate::api) async fn put(
     State(state): State<ApiState>,
     _admin: RequireAdmin,
+    deadline: Deadline,
     Path(name): Path<String>,
     CameraBody(camera): CameraBody<NewCamera>,
 ) -> Result<StatusCode, Problem> {
     let (camera, password) = camera.separate();
     let stored_name = name.clone();
-    let is_new = change(&state, move |cameras| {
+    let is_new = using_files(&state, deadline, move |cameras| {
         cameras.put(&stored_name, camera, password.as_ref())
     });
     let is_new = is_new.await?;
@@ -221,11 +224,12 @@ pub(in crate::api) async fn put(
 pub(in crate::api) async fn patch(
     State(state): State<ApiState>,
     _admin: RequireAdmin,
+    deadline: Deadline,
     Path(name): Path<String>,
     CameraBody(CameraChange { paused }): CameraBody<CameraChange>,
 ) -> Result<StatusCode, Problem> {
     let changed_name = name.clone();
-    let is_known = change(&state, move |cameras| {
+    let is_known = using_files(&state, deadline, move |cameras| {
         cameras.set_detection(&changed_name, !paused)
     });
     if !is_known.await? {
@@ -247,10 +251,15 @@ pub(in crate::api) async fn patch(
 pub(in crate::api) async fn delete(
     State(state): State<ApiState>,
     _admin: RequireAdmin,
+    deadline: Deadline,
     Path(name): Path<String>,
 ) -> Result<StatusCode, Problem> {
     let deleted_name = name.clone();
-    if !change(&state, move |cameras| cameras.delete(&deleted_name)).await? {
+    if !using_files(&state, deadline, move |cameras| {
+        cameras.delete(&deleted_name)
+    })
+    .await?
+    {
         return Err(unknown());
     }
     tracing::info!(camera = name, "the camera was deleted");
@@ -289,9 +298,10 @@ pub(in crate::api) async fn test(
 pub(in crate::api) async fn get_frame(
     State(state): State<ApiState>,
     _admin: RequireAdmin,
+    deadline: Deadline,
     Path(name): Path<String>,
 ) -> Result<Response, Problem> {
-    let camera = change(&state, move |cameras| Ok(cameras.get(&name)?)).await?;
+    let camera = using_files(&state, deadline, move |cameras| Ok(cameras.get(&name)?)).await?;
     let camera = camera.ok_or_else(unknown)?;
     let frame = Cameras::frame(&camera).await.map_err(refused)?;
     Ok(answer(frame.format.media_type(), frame.image))
@@ -310,24 +320,29 @@ fn cameras(state: &ApiState) -> Result<Arc<Cameras>, Problem> {
     })
 }
 
-/// Uses the stored cameras without blocking the runtime.
-async fn change<T: Send + 'static>(
+/// Uses the files of the cameras without blocking the runtime.
+async fn using_files<T: Send + 'static>(
     state: &ApiState,
-    change: impl FnOnce(&Cameras) -> Result<T, CameraError> + Send + 'static,
+    deadline: Deadline,
+    work: impl FnOnce(&Cameras) -> Result<T, CameraError> + Send + 'static,
 ) -> Result<T, Problem> {
     let cameras = cameras(state)?;
-    let changed = spawn_blocking(move || change(&cameras)).await;
-    changed.map_err(Problem::internal)?.map_err(refused)
+    let done = deadline.using(&CAMERAS, move || work(&cameras).map_err(refused));
+    done.await
 }
 
-async fn rows(state: &ApiState) -> Result<Vec<CameraInfo>, Problem> {
+async fn rows(state: &ApiState, deadline: Deadline) -> Result<Vec<CameraInfo>, Problem> {
     let cameras = cameras(state)?;
-    let read = Arc::clone(&cameras);
-    let stored = spawn_blocking(move || Ok((read.stored()?, read.paused_of_settings()?))).await;
-    let stored: Result<_, ConfigError> = stored.map_err(Problem::internal)?;
-    let (stored, paused) = stored.map_err(Problem::internal)?;
-    let mut rows: Vec<_> = cameras
-        .states(&stored)
+    let read = move || {
+        let stored = cameras.stored()?;
+        let paused = cameras.paused_of_settings()?;
+        Ok((cameras.states(&stored), stored, paused))
+    };
+    let read = deadline.using(&CAMERAS, move || {
+        read().map_err(|error: ConfigError| Problem::internal(error))
+    });
+    let (states, stored, paused) = read.await?;
+    let mut rows: Vec<_> = states
         .into_iter()
         .map(|state| CameraInfo {
             warning: state.warning,

@@ -2,7 +2,7 @@ use bytes::Bytes;
 use rumqttc::QoS;
 
 use super::*;
-use crate::cameras::tests::{camera, cameras};
+use crate::cameras::tests::{camera, cameras, hold};
 
 const HALL: &str = "lookdown/cameras/hall/detection";
 const UNKNOWN_FOR: Duration = Duration::from_mins(10);
@@ -89,4 +89,33 @@ async fn a_switch_that_no_server_publishes_is_withdrawn() {
     ];
     assert_eq!(topics, expected);
     assert!(withdrawn.iter().all(|message| message.payload.is_empty()));
+}
+
+#[tokio::test]
+async fn files_that_hang_delay_no_reports() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut switches = switches(folder.path());
+    let now = Instant::now();
+    switches.begin_connection(now, UNKNOWN_FOR);
+    switches.update(now).await;
+    let cameras = Arc::clone(&switches.cameras);
+    let hanging = hold(&cameras);
+    let command = format!("{HALL}/set");
+    switches.note(&message(&command, "OFF", false));
+    for limit in [Duration::from_secs(20), FILES_TIMEOUT / 2] {
+        let changes = timeout(limit, switches.update(now)).await;
+        assert!(changes.unwrap().is_empty());
+    }
+    // The latest command counts, also one that arrives while the files hang.
+    switches.note(&message(&command, "ON", false));
+    drop(hanging);
+    let mut published = Vec::new();
+    let all = async {
+        while published.len() < 2 {
+            published.extend(switches.update(now).await);
+            tokio::task::yield_now().await;
+        }
+    };
+    timeout(Duration::from_secs(20), all).await.unwrap();
+    assert_eq!(published, [state("OFF"), state("ON")]);
 }

@@ -14,7 +14,7 @@ use utoipa::ToSchema;
 use crate::api::{
     ApiState,
     http::{
-        deadline::Deadline,
+        deadline::{CALIBRATIONS_AND_MODELS, Deadline},
         problem::{Problem, ProblemKind},
     },
     require_scope::{RequireAdmin, RequireModelRead},
@@ -108,7 +108,9 @@ pub(in crate::api) async fn load(
     Path(name): Path<String>,
     _: SmallBody<LoadRequest>,
 ) -> Result<Json<RepositoryEntry>, Problem> {
-    let model = deadline.changing(move || state.models.load(&name)).await?;
+    let model = deadline
+        .using(&CALIBRATIONS_AND_MODELS, move || state.models.load(&name))
+        .await?;
     Ok(Json(RepositoryEntry::from(&*model)))
 }
 
@@ -133,7 +135,9 @@ pub(in crate::api) async fn unload(
     _: SmallBody<UnloadRequest>,
 ) -> Result<Json<RepositoryEntry>, Problem> {
     let unloaded = name.clone();
-    let unload = deadline.changing(move || state.models.unload(&unloaded));
+    let unload = deadline.using(&CALIBRATIONS_AND_MODELS, move || {
+        state.models.unload(&unloaded)
+    });
     unload.await?;
     Ok(Json(RepositoryEntry::from(RepositoryRow {
         name,

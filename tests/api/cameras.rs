@@ -1,0 +1,87 @@
+//! The cameras of `lookdown run`, in a folder that hangs.
+
+use std::{
+    fs::{self, OpenOptions},
+    path::PathBuf,
+    process::Command,
+    sync::Arc,
+    time::Duration,
+};
+
+use axum::http::StatusCode;
+use lookdown::{api::Companions, cameras::Cameras};
+use lookdown_watch::Metrics;
+use tokio::{
+    task::JoinSet,
+    time::{sleep, timeout},
+};
+
+use crate::service::{Bounds, Service};
+
+const CAMERA: &str = r#"{ "url": "rtsp://127.0.0.1:9/" }"#;
+const PATIENCE: Duration = Duration::from_secs(60);
+/// Most requests that wait for the folder.
+const MAX_WAITING: usize = 32;
+
+/// A pipe in the place of a file that the server writes. Writers wait until this is dropped.
+struct HangingFile(PathBuf);
+
+impl HangingFile {
+    fn plant(path: PathBuf) -> Self {
+        let made = Command::new("mkfifo").arg(&path).status().unwrap();
+        assert!(made.success());
+        Self(path)
+    }
+}
+
+impl Drop for HangingFile {
+    fn drop(&mut self) {
+        let both_ends = OpenOptions::new().read(true).write(true).open(&self.0);
+        // Later writers create a file. The test is over if one of these fails.
+        let _ = fs::remove_file(&self.0);
+        drop(both_ends);
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_folder_of_cameras_that_hangs_keeps_few_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let hanging = HangingFile::plant(folder.path().join("cameras.part"));
+    let companions = Companions::default();
+    let metrics = Arc::new(Metrics::new().unwrap());
+    companions.set_cameras(Arc::new(Cameras::new(folder.path().into(), metrics)));
+    let service = Arc::new(Service::within(&Bounds {
+        request_timeout: Duration::from_secs(3),
+        companions,
+        ..Bounds::default()
+    }));
+    let mut requests = JoinSet::new();
+    for number in 0..MAX_WAITING + 8 {
+        let service = Arc::clone(&service);
+        requests.spawn(async move {
+            let path = format!("/cameras/hall{number}");
+            service.put(&path, CAMERA).await.status
+        });
+    }
+    let statuses = timeout(PATIENCE, requests.join_all()).await.unwrap();
+    let with = |status| statuses.iter().filter(|other| **other == status).count();
+    let timeouts = with(StatusCode::GATEWAY_TIMEOUT);
+    let refusals = with(StatusCode::TOO_MANY_REQUESTS);
+    assert_eq!((timeouts, refusals), (MAX_WAITING, 8), "{statuses:?}");
+    for path in ["/cameras", "/cameras/hall0", "/cameras/hall0/frame.jpg"] {
+        let refused = service.get(path).await;
+        assert_eq!(refused.problem()["type"], "/problems/overloaded", "{path}");
+    }
+    // Other files do not wait for these.
+    let deleted = service.ask("DELETE", "/calibrations/lobby", &[]).await;
+    assert_eq!(deleted.status, StatusCode::NO_CONTENT);
+    drop(hanging);
+    let again = async {
+        while service.get("/cameras").await.status != StatusCode::OK {
+            sleep(Duration::from_millis(20)).await;
+        }
+        service.put("/cameras/gate", CAMERA).await.status
+    };
+    let stored = timeout(PATIENCE, again).await.unwrap();
+    assert_eq!(stored, StatusCode::CREATED);
+}
