@@ -62,6 +62,19 @@ def assign(logits, found, points, strides, truth):
     return chosen.any(0), chosen.float().argmax(0)
 
 
+def hold_loss(logits, sides, first_logits, first_sides, points, persons):
+    """Divergence from the answers of the first network at the cells within persons; 0 for equal answers.
+
+    Of the scores, and of the distributions of box sides with the score of the first network as weight.
+    """
+    held = ((points[None] > persons[:, None, :2]) & (points[None] < persons[:, None, 2:])).all(2).any(0)
+    target = first_logits[held].sigmoid()
+    entropy = lambda x: F.binary_cross_entropy_with_logits(x[held], target, reduction="sum")
+    log, first_log = sides[held].log_softmax(-1), first_sides[held].log_softmax(-1)
+    side = ((first_log.exp() * (first_log - log)).sum(-1).mean(1) * target).sum()
+    return entropy(logits) - entropy(first_logits) + 0.25 * side
+
+
 def sample_losses(logits, sides, found, points, strides, truth, ignored):
     """Sums of the three losses of one image, and the weight to divide them by. Cells inside ignored boxes do not count."""
     target, weight = torch.zeros_like(logits), torch.ones_like(logits)

@@ -192,6 +192,51 @@ class Frames:
         return cut(image, boxes, ignore, x, y, scale, size)
 
 
+class EmptyFrames(Frames):
+    """Frames without people, all of whose cells are negatives. Crops lie around what is taken for a person.
+
+    `false_alarms`: COCO results of detections in these frames, for more places of crops than the annotated distractors.
+    """
+
+    def __init__(self, folder, false_alarms=None):
+        super().__init__(folder)
+        if any(self.annotations.values()):
+            raise SystemExit(f"{folder} has people; --empty takes frames of `make.py empty`")
+        data = json.loads((self.folder / "annotations.json").read_text())
+        found = json.loads(Path(false_alarms).read_text()) if false_alarms else []
+        self.places = {image["id"]: [] for image in self.images}
+        for place in data["distractors"] + found:
+            self.places[place["image_id"]].append(place["bbox"])
+
+    def load(self, k):
+        """As of frames with people, with the places of crops instead of persons."""
+        image, _, _, _, (cx, cy, radius) = super().load(k)
+        places = self.places[self.images[k]["id"]]
+        boxes = np.array([(x, y, x + w, y + h) for x, y, w, h in places], float).reshape(-1, 4)
+        return image, boxes, outward_angles(boxes, cx, cy), np.zeros(len(boxes), bool), (cx, cy, radius)
+
+    def sample(self, rng, size, tile_share=0.5, view_share=0.0):
+        image, boxes, ignore = super().sample(rng, size, tile_share, view_share)
+        return image, boxes[:0], ignore[:0]
+
+
+def outward_angles(boxes, cx, cy):
+    """Directions from the center of the lens circle to the middles of boxes, degrees clockwise from the image's up."""
+    middle = (boxes[:, :2] + boxes[:, 2:]) / 2
+    return np.degrees(np.arctan2(middle[:, 0] - cx, cy - middle[:, 1]))
+
+
+class Mixed:
+    """Samples of frames without people in `share` of the draws, and of frames with people in the others."""
+
+    def __init__(self, people, empty, share):
+        self.people, self.empty, self.share = people, empty, share
+
+    def sample(self, rng, size, tile_share=0.5, view_share=0.0):
+        source = self.empty if rng.random() < self.share else self.people
+        return source.sample(rng, size, tile_share, view_share)
+
+
 class Pack:
     """Samples packed into files of JPEG bytes: small enough to be sent to another machine."""
 

@@ -2,6 +2,11 @@
 
     python lab/training/train.py --source WORK/frames/train --model models/nanodet_g_416/model.onnx --out WORK/runs/first --minutes 60
 
+With `--hold`, the network keeps its first answers within persons and learns from all other cells that they are negatives:
+
+    python lab/training/train.py --source WORK/frames/train --empty WORK/frames/train-empty --hold 2 --frozen 18 \\
+        --model models/nanodet_g_fisheye_416/model.onnx --out WORK/runs/hold --minutes 30
+
 `--source` is a folder of frames or of packed samples (samples.py). Stopped runs go on from `OUT/last.pt`. Results: the tuned
 weights (`tuned.onnx`, an exponential moving average) and their average with the given model (`averaged.onnx`).
 """
@@ -16,10 +21,10 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from losses import sample_losses
+from losses import hold_loss, sample_losses
 from network import Network, averaged, boxes_of, export
 
-from samples import Frames, Pack
+from samples import EmptyFrames, Frames, Mixed, Pack
 
 
 def options_of():
@@ -37,6 +42,15 @@ def options_of():
         "--tiles", type=float, default=0.5, help="share of whole quarter-turn tiles; the rest are crops"
     )
     parser.add_argument("--views", type=float, default=0.0, help="share of upright perspective views among all samples")
+    parser.add_argument("--empty", type=Path, help="a folder of frames without people: hard negatives")
+    parser.add_argument("--empty-share", type=float, default=0.5, help="share of samples without people")
+    parser.add_argument("--false-alarms", type=Path, help="COCO results in the empty frames: places of crops")
+    parser.add_argument(
+        "--hold",
+        type=float,
+        default=0.0,
+        help="weight of the first answers within persons, which replace the true boxes",
+    )
     parser.add_argument("--share", type=float, default=0.5, help="share of the tuned weights in the average")
     parser.add_argument("--seed", type=int, default=1_000_000)
     parser.add_argument("--threads", type=int, default=1)
@@ -72,6 +86,30 @@ def optimiser_of(network, o):
     ), trained
 
 
+def source_of(o):
+    """The samples of frames with people, mixed with those of frames without."""
+    source = Frames(o.source) if (o.source / "annotations.json").exists() else Pack(o.source)
+    return Mixed(source, EmptyFrames(o.empty, o.false_alarms), o.empty_share) if o.empty else source
+
+
+def held_loss(network, first, batch, o):
+    """Loss of a batch that keeps the answers of the network `first` within persons, and its parts (score, hold, 0)."""
+    images, boxes, _ = batch
+    x = torch.from_numpy(np.ascontiguousarray(images)).to(o.device).permute(0, 3, 1, 2).float()
+    logits, sides, points, strides = network(x)
+    with_people = [n for n in range(len(images)) if len(boxes[n])]
+    with torch.no_grad():
+        kept = dict(zip(with_people, zip(*first(x[with_people])[:2]))) if with_people else {}
+    score = hold = logits.sum() * 0
+    for n in range(len(images)):
+        persons = torch.as_tensor(boxes[n], dtype=torch.float32, device=o.device)
+        score = score + sample_losses(logits[n], sides[n], None, points, strides, persons[:0], persons)[0][0]
+        if n in kept:
+            hold = hold + hold_loss(logits[n], sides[n], *kept[n], points, persons)
+    score, hold = score / len(images), hold / len(images)
+    return score + o.hold * hold, torch.stack([score, hold, hold * 0]).detach()
+
+
 def step_loss(network, batch, device):
     """Loss of a batch and its parts (score, box, sides) as floats."""
     images, boxes, ignore = batch
@@ -94,9 +132,9 @@ def train(o):
     o.out.mkdir(parents=True, exist_ok=True)
     torch.set_num_threads(o.threads)
     torch.manual_seed(o.seed)
-    source = Frames(o.source) if (o.source / "annotations.json").exists() else Pack(o.source)
+    source = source_of(o)
     network = Network(o.model).to(o.device)
-    first = {k: v.clone() for k, v in network.state_dict().items()}
+    first = copy.deepcopy(network)
     optimiser, trained = optimiser_of(network, o)
     mean, step, spent, last = copy.deepcopy(network), 0, 0.0, o.out / "last.pt"
     if last.exists():
@@ -122,7 +160,10 @@ def train(o):
         rate = o.rate * min(1, step / 40) * (0.05 + 0.475 * (1 + math.cos(math.pi * min(1, progress()))))
         for group in optimiser.param_groups:
             group["lr"] = rate
-        loss, parts = step_loss(network, batches.get(), o.device)
+        if o.hold:
+            loss, parts = held_loss(network, first, batches.get(), o)
+        else:
+            loss, parts = step_loss(network, batches.get(), o.device)
         optimiser.zero_grad()
         loss.backward()
         torch.nn.utils.clip_grad_norm_(trained, 10.0)
@@ -144,7 +185,7 @@ def train(o):
             save()
     save()
     export(mean, o.model, o.out / "tuned.onnx")
-    mean.load_state_dict(averaged(mean.state_dict(), first, o.share))
+    mean.load_state_dict(averaged(mean.state_dict(), first.state_dict(), o.share))
     export(mean, o.model, o.out / "averaged.onnx")
     print(f"{step} steps, {step * o.batch} samples: {o.out / 'tuned.onnx'}, {o.out / 'averaged.onnx'}")
 

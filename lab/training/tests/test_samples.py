@@ -1,12 +1,43 @@
 """Tests of the training samples: quarter turns and cuts keep boxes exact."""
 
+import json
 import math
+import tempfile
 import unittest
+from pathlib import Path
 
+import cv2
 import numpy as np
 from generator.boxes import axis_box
 
-from samples import cut, frame_maps, kept, turned, view_rays
+from samples import EmptyFrames, Mixed, cut, frame_maps, kept, outward_angles, turned, view_rays
+
+LENS = {"model": "equidistant", "focal": 60.0, "cx": 99.5, "cy": 99.5, "max_theta": 1.5}
+
+
+def write_empty_frame(folder, people=()):
+    """A black frame with four white distractors of 10 × 10 pixels: above, below, left and right of the middle."""
+    image, corners = np.zeros((200, 200, 3), np.uint8), ((95, 30), (95, 160), (30, 95), (160, 95))
+    for x, y in corners:
+        image[y : y + 10, x : x + 10] = 255
+    for part in ("images", "calibrations"):
+        (folder / part).mkdir()
+    cv2.imwrite(str(folder / "images" / "7.png"), image)
+    (folder / "calibrations" / "7.json").write_text(json.dumps({"lens": LENS}))
+    about = {"id": 7, "file_name": "7.png", "calibration": "7", "width": 200, "height": 200}
+    distractors = [{"image_id": 7, "kind": "coats", "bbox": [x, y, 10, 10]} for x, y in corners]
+    data = {"images": [about], "annotations": list(people), "distractors": distractors}
+    (folder / "annotations.json").write_text(json.dumps(data))
+
+
+class Fixed:
+    """A source whose samples are its name."""
+
+    def __init__(self, name):
+        self.name = name
+
+    def sample(self, rng, size, tile_share, view_share):
+        return self.name
 
 
 class Samples(unittest.TestCase):
@@ -70,6 +101,39 @@ class Samples(unittest.TestCase):
         clipped, ignore = kept(boxes, np.zeros(3, bool), 100)
         np.testing.assert_array_equal(clipped, [[10, 10, 30, 30], [0, 10, 5, 30]])
         self.assertEqual(list(ignore), [False, True])
+
+    def test_crops_of_empty_frames_lie_around_distractors(self):
+        with tempfile.TemporaryDirectory() as folder:
+            write_empty_frame(Path(folder))
+            frames, rng = EmptyFrames(folder), np.random.default_rng(1)
+            for _ in range(10):
+                image, boxes, ignore = frames.sample(rng, 64, tile_share=0.0)
+                self.assertGreater(image.max(), 100)
+                self.assertEqual((len(boxes), len(ignore)), (0, 0))
+
+    def test_crops_of_empty_frames_lie_around_false_alarms(self):
+        with tempfile.TemporaryDirectory() as folder:
+            write_empty_frame(Path(folder))
+            found = Path(folder) / "found.json"
+            found.write_text(json.dumps([{"image_id": 7, "bbox": [20, 90, 10, 20], "score": 0.4}]))
+            boxes = EmptyFrames(folder, found).load(0)[1]
+            self.assertEqual(len(boxes), 5)
+            np.testing.assert_array_equal(boxes[-1], [20, 90, 30, 110])
+
+    def test_frames_with_people_are_not_empty(self):
+        with tempfile.TemporaryDirectory() as folder:
+            write_empty_frame(Path(folder), people=[{"image_id": 7, "bbox": [0, 0, 9, 9]}])
+            with self.assertRaisesRegex(SystemExit, "has people"):
+                EmptyFrames(folder)
+
+    def test_outward_angles_turn_clockwise_from_up(self):
+        boxes = np.array([[40.0, 0, 60, 20], [80, 40, 100, 60], [0, 40, 20, 60]])
+        np.testing.assert_allclose(outward_angles(boxes, 50, 50), [0, 90, -90])
+
+    def test_mixed_samples_have_the_share_without_people(self):
+        mixed, rng = Mixed(Fixed("people"), Fixed("empty"), 0.25), np.random.default_rng(1)
+        drawn = [mixed.sample(rng, 64) for _ in range(400)]
+        self.assertAlmostEqual(drawn.count("empty") / 400, 0.25, delta=0.07)
 
 
 if __name__ == "__main__":
