@@ -8,6 +8,6 @@ pub use calibrations::{
     WriteCondition, defaults,
 };
 pub use store::{
-    BucketStore, CalibrationStore, FolderStore, MAX_FILES, READ_AT_ONCE, Replaces, StoreError,
-    StoredFile,
+    BucketStore, CalibrationStore, FolderStore, ListedFile, MAX_FILES, READ_AT_ONCE, Replaces,
+    StoreError,
 };

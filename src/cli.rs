@@ -1,6 +1,7 @@
 //! The command line.
 
 mod annotate;
+mod async_runtime;
 mod calibration;
 mod camera_flags;
 mod complete;

@@ -20,6 +20,7 @@ pub mod probe;
 pub mod results;
 pub mod room_calibration;
 mod rounding;
+mod samples;
 pub mod settings;
 mod suggestions;
 pub mod telemetry;

@@ -19,7 +19,7 @@ use lookdown_lens::{
     self_calibration::{CameraHeight, KnownLens, RoomFit},
 };
 
-use crate::rounding::{metres as thousandths, pixels as hundredths};
+use crate::rounding::{meters as thousandths, pixels as hundredths};
 
 /// The source of a value of the user.
 pub(crate) const GIVEN: NativeSource = NativeSource {

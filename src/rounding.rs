@@ -2,6 +2,9 @@
 
 use std::time::Duration;
 
+use lookdown_common::report::{ReportFloor, ReportOrientedBox};
+use lookdown_lens::geometry::{OrientedBox, floor::FloorPosition};
+
 /// Rounds to two decimals, far below the precision of a detector.
 pub(crate) fn pixels(value: f64) -> f64 {
     rounded(value, 100.0)
@@ -13,7 +16,7 @@ pub(crate) fn share(value: f64) -> f64 {
 }
 
 /// Rounds to three decimals: millimeters.
-pub(crate) fn metres(value: f64) -> f64 {
+pub(crate) fn meters(value: f64) -> f64 {
     rounded(value, 1_000.0)
 }
 
@@ -33,6 +36,25 @@ pub(crate) fn milliseconds(span: Duration) -> f64 {
     rounded(span.as_secs_f64() * 1_000.0, 1_000.0)
 }
 
+/// Rounds an oriented box.
+pub(crate) fn oriented_box(oriented: &OrientedBox) -> ReportOrientedBox {
+    ReportOrientedBox {
+        cx: pixels(oriented.center.x),
+        cy: pixels(oriented.center.y),
+        width: pixels(oriented.width),
+        height: pixels(oriented.height),
+        angle_deg: degrees(oriented.angle),
+    }
+}
+
+/// Rounds a position on the floor.
+pub(crate) fn floor(position: FloorPosition) -> ReportFloor {
+    ReportFloor {
+        x_m: meters(position.x_m),
+        y_m: meters(position.y_m),
+    }
+}
+
 fn rounded(value: f64, per_unit: f64) -> f64 {
     // Adding zero turns −0 into 0.
     (value * per_unit).round() / per_unit + 0.0
@@ -47,7 +69,7 @@ mod tests {
     fn values_keep_the_significant_decimals() {
         assert_eq!(pixels(12.345_678), 12.35);
         assert_eq!(share(0.876_543), 0.8765);
-        assert_eq!(metres(-1.234_56), -1.235);
+        assert_eq!(meters(-1.234_56), -1.235);
         assert_eq!(degrees(std::f64::consts::FRAC_PI_2), 90.0);
         assert_eq!(milliseconds(Duration::from_nanos(1_234_567)), 1.235);
     }

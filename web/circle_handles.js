@@ -17,7 +17,7 @@ export function drawCircle(drawing, { width, height, cx, cy, radius }, moved) {
     shape("circle", { class: "casing", cx, cy, r: radius, "stroke-width": 4.5 * unit }),
     shape("circle", { class: "rim", cx, cy, r: radius, "stroke-width": 2 * unit }),
     shape("path", { class: "rim", d: `M${cx - 12 * unit} ${cy}h${24 * unit}M${cx} ${cy - 12 * unit}v${24 * unit}`, "stroke-width": 1.5 * unit }),
-    handle("centre", cx, cy, ([x, y]) => moved({ cx: x, cy: y })),
+    handle("center", cx, cy, ([x, y]) => moved({ cx: x, cy: y })),
     handle("rim", cx + side, cy + side, ([x, y], now) => moved({ radius: Math.hypot(x - now.cx, y - now.cy) })),
   );
   drawing.circle = { cx, cy };

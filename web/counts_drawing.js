@@ -4,7 +4,7 @@ import { element, plural, shape } from "./dom.js";
 import { points } from "./geometry.js";
 
 /** The number of colors of tracks (counts.css). */
-const COLOURS = 6;
+const COLORS = 6;
 /** The share of the frame's width that 1 unit of a drawing has. */
 const UNIT = 1 / 320;
 /** Arrows in steps of 45°, clockwise from the right. */
@@ -46,7 +46,7 @@ const turnOf = ([[x1, y1], ...rest]) => (Math.atan2(rest.at(-1)[0] - x1, y1 - re
 function drawnTrack({ id, frame_px: [x, y], tail_px: tail }, unit) {
   return shape(
     "g",
-    { class: `track colour-${id % COLOURS}`, "data-track": id },
+    { class: `track color-${id % COLORS}`, "data-track": id },
     shape("polyline", { points: points(tail), "stroke-width": 2.5 * unit }),
     shape("circle", { cx: x, cy: y, r: 4.5 * unit, "stroke-width": unit }),
   );

@@ -30,7 +30,7 @@ export function floorGrid(reach) {
     shape("path", { d: `M${-HALF} 0H${HALF}M0 ${-HALF}V${HALF}`, class: "axis" }),
     ...rings.flatMap((ring) => [
       shape("circle", { r: ring * scale, class: "ring" }),
-      shape("text", { x: 4, y: -ring * scale - 4, class: "metres" }, label(ring)),
+      shape("text", { x: 4, y: -ring * scale - 4, class: "meters" }, label(ring)),
     ]),
     shape("path", { d: "M-7 0L0 -7L7 0L0 7Z", class: "camera" }, shape("title", {}, "The camera")),
   ];

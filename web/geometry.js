@@ -23,7 +23,7 @@ export function holds(outline, [x, y]) {
 export const points = (places) => places.map(([x, y]) => `${x.toFixed(1)},${y.toFixed(1)}`).join(" ");
 
 /** The center of a person's box. */
-export const centre = ({ oriented_box: box }) => [box.cx, box.cy];
+export const center = ({ oriented_box: box }) => [box.cx, box.cy];
 
 /** Cameras that look down to within 30° of it see feet nearer to the point below them than heads. */
 const LOOKS_DOWN = -Math.cos(Math.PI / 6);

@@ -1,7 +1,7 @@
 /** Persons drawn over their frame. */
 
 import { plural, shape } from "./dom.js";
-import { centre, corners, points } from "./geometry.js";
+import { center, corners, points } from "./geometry.js";
 import { change, shared } from "./shared.js";
 
 /** The default side of an image with an unknown size on the screen, CSS pixels. */
@@ -18,7 +18,7 @@ export function drawMarks(drawing, report) {
 /** A mark with line widths in multiples of `pixel`, frame pixels. */
 function mark(person, index, pixel) {
   const outline = points(corners(person.oriented_box));
-  const [x, y] = centre(person);
+  const [x, y] = center(person);
   return shape(
     "g",
     { class: "mark", "data-person": index, onmouseenter: () => change("person", index), onmouseleave: () => change("person", null) },

@@ -1,7 +1,7 @@
 /** The section Views: the views of a frame and the persons in each. */
 
 import { element, find, percent, plural, shape } from "./dom.js";
-import { centre, holds, points } from "./geometry.js";
+import { center, holds, points } from "./geometry.js";
 import { assumedCircle, calibrationOf } from "./lens.js";
 import { drawMarks, pointOut } from "./marks.js";
 import { shown, withProgress } from "./progress.js";
@@ -76,7 +76,7 @@ function chip(_person, index) {
 const small = (person) => element("i", {}, `${person + 1} `);
 
 /** The center of a person's box in pixels of the frame size of the plan. */
-const placeOf = (person, report) => centre(person).map((value) => (value * plan.image[0]) / report.image.width);
+const placeOf = (person, report) => center(person).map((value) => (value * plan.image[0]) / report.image.width);
 
 function tile(view, index, frame, report) {
   const inSight = report.persons.flatMap((person, at) => (holds(view.outline, placeOf(person, report)) ? [at] : []));

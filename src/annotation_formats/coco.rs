@@ -1,10 +1,14 @@
 //! COCO detection: one JSON document. Besides COCO's keys it has `score` and `oriented_box` for
 //! each annotation and `calibration` for each image, which `lookdown eval` reads.
 
+use lookdown_common::report::ReportOrientedBox;
 use serde::Serialize;
 
-use super::{AnnotatedBox, AnnotatedImage, BoxKind, FormatSpec, LABEL, Layout, SupportedBoxes};
-use crate::rounding::{degrees, pixels, share};
+use super::{
+    AnnotatedBox, AnnotatedImage, BoxKind, FormatSpec, LABEL, Layout, SupportedBoxes,
+    content::ImageMembers,
+};
+use crate::rounding::{oriented_box, pixels, share};
 
 /// The format.
 pub(super) const FORMAT: FormatSpec = FormatSpec {
@@ -29,11 +33,8 @@ struct Document<'a, Shape> {
 #[derive(Serialize)]
 struct Image<'a> {
     id: u64,
-    file_name: &'a str,
-    width: u32,
-    height: u32,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    calibration: Option<&'a str>,
+    #[serde(flatten)]
+    members: ImageMembers<'a>,
 }
 
 #[derive(Serialize)]
@@ -54,16 +55,7 @@ struct Annotation<Shape> {
 struct Shape {
     bbox: [f64; 4],
     area: f64,
-    oriented_box: Oriented,
-}
-
-#[derive(Serialize)]
-struct Oriented {
-    cx: f64,
-    cy: f64,
-    width: f64,
-    height: f64,
-    angle_deg: f64,
+    oriented_box: ReportOrientedBox,
 }
 
 #[derive(Serialize)]
@@ -94,10 +86,7 @@ pub(super) fn document_of<Shape: Serialize>(
     for (image_id, image) in (1..).zip(images) {
         document.images.push(Image {
             id: image_id,
-            file_name: &image.file_name,
-            width: image.width,
-            height: image.height,
-            calibration: image.calibration.as_deref(),
+            members: image.members(),
         });
         for (corners, person) in image.boxes() {
             let id = document.annotations.len() as u64 + 1;
@@ -118,16 +107,9 @@ pub(super) fn document_of<Shape: Serialize>(
 
 fn shape([left, top, right, bottom]: [f64; 4], person: &AnnotatedBox) -> Shape {
     let (width, height) = (pixels(right - left), pixels(bottom - top));
-    let oriented = &person.oriented_box;
     Shape {
         bbox: [left, top, width, height],
         area: pixels(width * height),
-        oriented_box: Oriented {
-            cx: pixels(oriented.center.x),
-            cy: pixels(oriented.center.y),
-            width: pixels(oriented.width),
-            height: pixels(oriented.height),
-            angle_deg: degrees(oriented.angle),
-        },
+        oriented_box: oriented_box(&person.oriented_box),
     }
 }

@@ -2,6 +2,7 @@
 
 use lookdown_detect::detection::{BBox, FramePixels};
 use lookdown_lens::geometry::{OrientedBox, floor::FloorPosition};
+use serde::Serialize;
 
 use crate::rounding::pixels;
 
@@ -23,7 +24,27 @@ pub struct AnnotatedImage {
     pub persons: Vec<AnnotatedBox>,
 }
 
+/// The members of an image in JSON documents.
+#[derive(Serialize)]
+pub(super) struct ImageMembers<'a> {
+    file_name: &'a str,
+    width: u32,
+    height: u32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    calibration: Option<&'a str>,
+}
+
 impl AnnotatedImage {
+    /// Returns the members of the image in JSON documents.
+    pub(super) fn members(&self) -> ImageMembers<'_> {
+        ImageMembers {
+            file_name: &self.file_name,
+            width: self.width,
+            height: self.height,
+            calibration: self.calibration.as_deref(),
+        }
+    }
+
     /// The axis-parallel boxes, `[left, top, right, bottom]`, clipped to the image. Those outside
     /// it are left out.
     pub(super) fn boxes(&self) -> impl Iterator<Item = ([f64; 4], &AnnotatedBox)> {

@@ -3,28 +3,21 @@
 //! them, not longitude and latitude. RFC 7946 permits this by prior agreement (section 4). The
 //! person's position on the floor, in meters, is a property.
 
+use lookdown_common::report::ReportFloor;
 use serde::Serialize;
 
 use super::{
-    AnnotatedBox, AnnotatedImage, BoxKind, FormatSpec, LABEL, Layout, SupportedBoxes, stem,
+    AnnotatedBox, AnnotatedImage, BoxKind, FormatSpec, LABEL, Layout, SupportedBoxes,
+    content::ImageMembers, stem,
 };
-use crate::rounding::{degrees, metres, pixels, share};
+use crate::rounding::{degrees, floor, pixels, share};
 
 #[derive(Serialize)]
 struct FeatureCollection<'a> {
     r#type: &'static str,
     /// An addition to the members of GeoJSON: the image to which positions refer.
-    image: Image<'a>,
+    image: ImageMembers<'a>,
     features: Vec<Feature>,
-}
-
-#[derive(Serialize)]
-struct Image<'a> {
-    file_name: &'a str,
-    width: u32,
-    height: u32,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    calibration: Option<&'a str>,
 }
 
 #[derive(Serialize)]
@@ -49,13 +42,7 @@ struct Properties {
     r#box: [f64; 4],
     angle_deg: f64,
     foot: [f64; 2],
-    floor: Option<Floor>,
-}
-
-#[derive(Serialize)]
-struct Floor {
-    x_m: f64,
-    y_m: f64,
+    floor: Option<ReportFloor>,
 }
 
 /// The format.
@@ -78,12 +65,7 @@ fn document(image: &AnnotatedImage, _boxes: BoxKind) -> String {
     let features = image.boxes().zip(1..);
     let document = FeatureCollection {
         r#type: "FeatureCollection",
-        image: Image {
-            file_name: &image.file_name,
-            width: image.width,
-            height: image.height,
-            calibration: image.calibration.as_deref(),
-        },
+        image: image.members(),
         features: features
             .map(|((corners, person), id)| feature(id, corners, person))
             .collect(),
@@ -108,10 +90,7 @@ fn feature(id: usize, corners: [f64; 4], person: &AnnotatedBox) -> Feature {
             r#box: corners,
             angle_deg: degrees(oriented.angle),
             foot: [pixels(foot.x), pixels(foot.y)],
-            floor: person.floor.map(|floor| Floor {
-                x_m: metres(floor.x_m),
-                y_m: metres(floor.y_m),
-            }),
+            floor: person.floor.map(floor),
         },
     }
 }

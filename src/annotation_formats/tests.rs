@@ -72,7 +72,7 @@ fn cvat_has_a_box_element_per_person_and_escaped_names() {
 }
 
 #[test]
-fn cvat_rotates_boxes_clockwise_about_their_centre() {
+fn cvat_rotates_boxes_clockwise_about_their_center() {
     let files = AnnotationFormat::Cvat.files(&[image("a.jpg")], BoxKind::Oriented);
     let expected =
         r#"xtl="50.00" ytl="30.00" xbr="70.00" ybr="70.00" z_order="0" rotation="330.00""#;

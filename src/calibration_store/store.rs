@@ -17,7 +17,7 @@ pub trait CalibrationStore: fmt::Debug + Send + Sync {
     ///
     /// # Errors
     /// [`StoreError`] when the store cannot be read, or has more than [`MAX_FILES`].
-    fn list(&self) -> Result<Vec<StoredFile>, StoreError>;
+    fn list(&self) -> Result<Vec<ListedFile>, StoreError>;
 
     /// The contents of files, each cut after `at_most` bytes, in the order of `names`: several at
     /// once, since a store that is far away reads them side by side. At most [`READ_AT_ONCE`].
@@ -58,9 +58,9 @@ pub enum Replaces<'a> {
     Stamp(&'a str),
 }
 
-/// A file in a store.
+/// A file in the list of a store.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct StoredFile {
+pub struct ListedFile {
     /// Its name, without the place.
     pub name: String,
     /// Changes whenever the content does.

@@ -9,12 +9,12 @@ use clap::Args;
 use lookdown_common::{ConfigError, Reload, ServerClient, ServerEntry, ServerOptions};
 use lookdown_count::{CountEntry, CountOptions, Snapshot, Started, count};
 use lookdown_http::Shutdown;
-use tokio::{runtime, sync::watch};
+use tokio::sync::watch;
 
 use super::{
     SettingsFile,
+    async_runtime::{THREADS, run_async},
     detect::stream::is_video,
-    serve,
     server_flags::{ServerFlags, given},
     settings_file::SettingsSource,
 };
@@ -22,9 +22,6 @@ use crate::{
     mqtt::{CountsOptions, CountsPublisher},
     settings::Settings,
 };
-
-/// Threads for all cameras.
-const RUNTIME_THREADS: usize = 2;
 
 /// Arguments of `lookdown count`.
 #[derive(Debug, Args)]
@@ -83,19 +80,12 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let flags = [arguments.server.settings(), own].concat();
     let settings = arguments.settings_file.source(file.as_deref(), &flags)?;
     settings.load()?;
-    let runtime = runtime::Builder::new_multi_thread()
-        .worker_threads(RUNTIME_THREADS)
-        .enable_all()
-        .build()
-        .context("the operating system creates no thread")?;
-    let outcome = runtime.block_on(async {
+    run_async(THREADS, async {
         let shutdown = Shutdown::on_signals().context("signals cannot be handled")?;
         let counting = counting(&settings, None);
         let counts = run_counts(&counting, |_| {}, async || shutdown.requested().await);
         Box::pin(counts).await
-    });
-    serve::end(runtime);
-    outcome.map(|()| ExitCode::SUCCESS)
+    })
 }
 
 /// Returns the settings of the counts. Counts of `server`, which is in this process, have no address

@@ -7,10 +7,8 @@ use std::{
 
 use anyhow::Context;
 use clap::Args;
-use tokio::runtime;
 
-use super::SettingsFile;
-use crate::cli::output::UNWRITABLE;
+use super::{SettingsFile, async_runtime::of_this_thread, output::UNWRITABLE};
 use crate::probe::{self, Probe};
 
 /// Arguments of `lookdown health`.
@@ -31,10 +29,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     } else {
         Probe::Readiness
     };
-    let runtime = runtime::Builder::new_current_thread()
-        .enable_all()
-        .build()
-        .context("the operating system gives no runtime")?;
+    let runtime = of_this_thread()?;
     let url = runtime.block_on(probe::ask(&settings, probe))?;
     writeln!(io::stdout(), "{url} answered yes").context(UNWRITABLE)?;
     Ok(ExitCode::SUCCESS)

@@ -8,10 +8,11 @@ use lookdown_common::{Secret, ServerOptions};
 use lookdown_count::Started;
 use lookdown_http::Shutdown;
 use lookdown_watch::{CameraEntry, Metrics, Origin, watch as watch_cameras};
-use tokio::{runtime, sync::watch};
+use tokio::sync::watch;
 
 use super::{
     SettingsFile,
+    async_runtime::{THREADS, run_async},
     camera_flags::CameraFlags,
     count::{counting, run_counts},
     serve,
@@ -31,8 +32,6 @@ use crate::{
 const OWN_KEY: &str = "lookdown-run";
 /// The name of a camera of the command line without a name.
 const CAMERA: &str = "camera";
-/// Threads for sockets, cameras, counts and JSON. Frames have separate threads.
-const RUNTIME_THREADS: usize = 2;
 
 /// Arguments of `lookdown run`.
 #[derive(Debug, Args)]
@@ -83,12 +82,7 @@ pub(super) fn run(arguments: &Arguments, commit: Option<&str>) -> anyhow::Result
     check(&settings)?;
     create_calibrations(&settings);
     let key = own_key(&mut settings)?;
-    let runtime = runtime::Builder::new_multi_thread()
-        .worker_threads(RUNTIME_THREADS)
-        .enable_all()
-        .build()
-        .context("the operating system creates no thread")?;
-    let outcome = runtime.block_on(async {
+    run_async(THREADS, async {
         let shutdown = Shutdown::on_signals().context("signals cannot be handled")?;
         let parts = Parts {
             settings: source_of_settings,
@@ -97,9 +91,7 @@ pub(super) fn run(arguments: &Arguments, commit: Option<&str>) -> anyhow::Result
             shutdown,
         };
         Box::pin(parts.run(settings, commit)).await
-    });
-    serve::end(runtime);
-    outcome.map(|()| ExitCode::SUCCESS)
+    })
 }
 
 /// Refuses settings of several processes.

@@ -12,15 +12,13 @@ use anyhow::Context;
 use clap::Args;
 use lookdown_http::Shutdown;
 use tokio::{
-    runtime::{self, Runtime},
     signal::unix::{Signal, SignalKind, signal},
     spawn,
     task::spawn_blocking,
     time::timeout,
 };
 
-use super::SettingsFile;
-use crate::cli::output::UNWRITABLE;
+use super::{SettingsFile, async_runtime::run_async, output::UNWRITABLE};
 use crate::{
     app::{App, Reloader, Sockets, assemble},
     settings::Settings,
@@ -28,9 +26,6 @@ use crate::{
 
 /// Most threads for sockets and JSON. Frames have separate threads.
 const MAX_RUNTIME_THREADS: usize = 2;
-/// Longest time that the end of the process waits for tasks that block. They may take as long as
-/// workers that are stuck.
-const LAST_TASKS: Duration = Duration::from_secs(1);
 /// Longest time that the end of the process waits for the last spans. They are not sent while all
 /// threads for blocking work wait, as for a file system that hangs.
 const LAST_SPANS: Duration = Duration::from_secs(4);
@@ -62,26 +57,13 @@ pub(super) fn run(arguments: &Arguments, commit: Option<&str>) -> anyhow::Result
     if let Some(port) = arguments.port {
         settings.server.listen.set_port(port);
     }
-    let runtime = runtime::Builder::new_multi_thread()
-        .worker_threads(runtime_threads())
-        .enable_all()
-        .build()
-        .context("the operating system creates no thread")?;
-    let outcome = if arguments.check {
-        runtime.block_on(check(settings))
-    } else {
-        runtime.block_on(async {
-            let shutdown = Shutdown::on_signals().context("signals cannot be handled")?;
-            serve(settings, commit, shutdown).await
-        })
-    };
-    end(runtime);
-    outcome.map(|()| ExitCode::SUCCESS)
-}
-
-/// Ends the tasks that remain.
-pub(super) fn end(runtime: Runtime) {
-    runtime.shutdown_timeout(LAST_TASKS);
+    run_async(runtime_threads(), async {
+        if arguments.check {
+            return check(settings).await;
+        }
+        let shutdown = Shutdown::on_signals().context("signals cannot be handled")?;
+        serve(settings, commit, shutdown).await
+    })
 }
 
 /// One thread per two cores: an idle second thread is woken for each request, in case more arrive.
@@ -158,18 +140,9 @@ async fn start(settings: Settings) -> anyhow::Result<App> {
 mod tests {
     use std::{sync::mpsc::sync_channel, time::Instant};
 
-    use super::*;
+    use tokio::runtime;
 
-    #[test]
-    fn a_stuck_task_delays_the_end_by_at_most_3_s() {
-        let runtime = runtime::Builder::new_multi_thread().build().unwrap();
-        let (done, stuck) = sync_channel::<()>(0);
-        runtime.spawn_blocking(move || stuck.recv());
-        let began = Instant::now();
-        end(runtime);
-        assert!(began.elapsed() < Duration::from_secs(3));
-        drop(done);
-    }
+    use super::{super::async_runtime::end, *};
 
     #[test]
     fn stuck_tasks_on_all_threads_do_not_stop_the_end() {

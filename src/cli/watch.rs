@@ -9,19 +9,15 @@ use lookdown_http::{Shutdown, server::bind};
 use lookdown_watch::{
     CameraEntry, Metrics, Origin, WatchEntry, WatchOptions, serve_metrics, watch,
 };
-use tokio::runtime;
 
 use super::{
     SettingsFile,
+    async_runtime::{THREADS, run_async},
     camera_flags::CameraFlags,
-    serve,
     server_flags::ServerFlags,
     settings_file::{SettingsSource, is_settings_file},
 };
 use crate::{cameras::Cameras, settings::Settings};
-
-/// Threads for all cameras. Frames are not decoded here.
-const RUNTIME_THREADS: usize = 2;
 
 /// Arguments of `lookdown watch`.
 #[derive(Debug, Args)]
@@ -70,12 +66,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         ),
         None => Origin::Reload(cameras(&settings, None, None)),
     };
-    let runtime = runtime::Builder::new_multi_thread()
-        .worker_threads(RUNTIME_THREADS)
-        .enable_all()
-        .build()
-        .context("the operating system creates no thread")?;
-    let outcome = runtime.block_on(async {
+    run_async(THREADS, async {
         let shutdown = Shutdown::on_signals().context("signals cannot be handled")?;
         let metrics = Arc::new(Metrics::new()?);
         let _serving = match arguments.metrics_listen {
@@ -83,10 +74,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
             None => None,
         };
         Ok(watch(origin, metrics, shutdown.requested()).await?)
-    });
-    // A read of standard input may never end.
-    serve::end(runtime);
-    outcome.map(|()| ExitCode::SUCCESS)
+    })
 }
 
 /// Separates a settings file from a source.

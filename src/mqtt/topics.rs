@@ -5,7 +5,7 @@ use sha2::{Digest, Sha256};
 /// Longest name that is used unchanged in a topic.
 const MAX_CHARS: usize = 64;
 /// Characters that are kept of a name that is changed, to recognize it by.
-const RECOGNISABLE_CHARS: usize = 32;
+const RECOGNIZABLE_CHARS: usize = 32;
 
 /// The names of topics.
 #[derive(Debug, Clone)]
@@ -203,11 +203,11 @@ pub(super) fn level(name: &str) -> String {
     if !name.is_empty() && name.len() <= MAX_CHARS && name.chars().all(fits) {
         return name.to_owned();
     }
-    let characters = name.chars().take(RECOGNISABLE_CHARS);
-    let recognisable: String = characters.map(|c| if fits(c) { c } else { '_' }).collect();
+    let characters = name.chars().take(RECOGNIZABLE_CHARS);
+    let recognizable: String = characters.map(|c| if fits(c) { c } else { '_' }).collect();
     let digest = Sha256::digest(name);
     let [a, b, c, d] = [digest[0], digest[1], digest[2], digest[3]];
-    format!("{recognisable}-{a:02x}{b:02x}{c:02x}{d:02x}")
+    format!("{recognizable}-{a:02x}{b:02x}{c:02x}{d:02x}")
 }
 
 #[cfg(test)]
@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn topics_of_cameras_are_recognised() {
+    fn topics_of_cameras_are_recognized() {
         let topics = Topics::new("home/lookdown", None);
         let (camera, zone) = ("lobby", "till");
         for (topic, expected) in [
@@ -268,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn topics_of_switches_are_recognised() {
+    fn topics_of_switches_are_recognized() {
         let topics = Topics::new("home/lookdown", None);
         let camera = "lobby";
         for (topic, expected) in [

@@ -43,20 +43,12 @@ fn hall() -> CalibrationId {
 /// The box of a person of 1.75 m, `out_m` away from the point below a camera at 3 m.
 fn standing(out_m: f64, azimuth: f64) -> OrientedBox {
     let lens = Lens::equidistant_circle(799.5, 799.5, 800.0, 1.57).unwrap();
-    let pixel = |up_m: f64| -> Pixel {
-        let (sin, cos) = azimuth.sin_cos();
+    let (sin, cos) = azimuth.sin_cos();
+    let ends = [0.0, 1.75].map(|up_m| -> Pixel {
         let ray = Ray::new(out_m * cos, out_m * sin, 3.0 - up_m);
         cross_half_pixel(lens.project(&ray).unwrap(), PixelConvention::CornerOrigin)
-    };
-    let (foot, head) = (pixel(0.0), pixel(1.75));
-    let along = head - foot;
-    OrientedBox {
-        center: foot + along / 2.0,
-        width: 20.0,
-        height: along.norm(),
-        angle: 0.0,
-        up: along.normalize(),
-    }
+    });
+    OrientedBox::averaging((ends[1] - ends[0]).normalize(), [(1.0, &ends[..])]).unwrap()
 }
 
 fn fit() -> RoomFit {

@@ -17,8 +17,8 @@ use crate::settings::{LogFormat, LogSettings};
 /// # Errors
 /// If logging was already started in this process.
 pub fn start_logs(settings: &LogSettings) -> Result<(), TryInitError> {
-    let in_colour = std::io::stderr().is_terminal();
-    log_subscriber(settings, std::io::stderr, in_colour).try_init()?;
+    let in_color = std::io::stderr().is_terminal();
+    log_subscriber(settings, std::io::stderr, in_color).try_init()?;
     std::panic::set_hook(Box::new(|panic| {
         let thread = std::thread::current();
         tracing::error!(thread = thread.name().unwrap_or("unnamed"), "{panic}");
@@ -32,11 +32,11 @@ pub fn start_logs(settings: &LogSettings) -> Result<(), TryInitError> {
 pub fn log_subscriber(
     settings: &LogSettings,
     writer: impl for<'writer> MakeWriter<'writer> + Send + Sync + 'static,
-    in_colour: bool,
+    in_color: bool,
 ) -> Box<dyn Subscriber + Send + Sync> {
     let logs = fmt()
         .with_writer(writer)
-        .with_ansi(in_colour)
+        .with_ansi(in_color)
         .with_env_filter(EnvFilter::new(&settings.filter));
     match settings.format {
         LogFormat::Text => Box::new(logs.finish()),

@@ -42,13 +42,13 @@ fn picture(answer: &Answer) -> Frame {
 }
 
 /// Returns `true` if the pixel has the gray of the frame.
-fn is_grey(frame: &Frame, x: u32, y: u32) -> bool {
+fn is_gray(frame: &Frame, x: u32, y: u32) -> bool {
     let pixel = frame.pixel(x, y);
     pixel.iter().all(|value| value.abs_diff(128) < 12)
 }
 
 fn is_plain(frame: &Frame) -> bool {
-    (0..frame.height()).all(|y| (0..frame.width()).all(|x| is_grey(frame, x, y)))
+    (0..frame.height()).all(|y| (0..frame.width()).all(|x| is_gray(frame, x, y)))
 }
 
 #[tokio::test]
@@ -163,17 +163,17 @@ async fn zones_are_drawn_and_masked_areas_are_black() {
     let drawn = picture(&service.get(&format!("{PATH}?draw=zones")).await);
     // The left border of each zone: a meter beside the camera, 3 m below it.
     for (x, y) in [(100, 150), (79, 99)] {
-        assert!(is_grey(&plain, x, y) && !is_grey(&drawn, x, y), "{x}, {y}");
+        assert!(is_gray(&plain, x, y) && !is_gray(&drawn, x, y), "{x}, {y}");
     }
-    assert!(is_grey(&drawn, 120, 190));
+    assert!(is_gray(&drawn, 120, 190));
 }
 
 #[tokio::test]
 async fn a_jpeg_is_stored_unchanged_unless_it_is_masked() {
     let service = keeping();
     let side = FRAME_SIDE as usize;
-    let grey = Frame::new(FRAME_SIDE, FRAME_SIDE, vec![128; 3 * side * side]).unwrap();
-    let sent = encode_jpeg(&grey, 95).unwrap();
+    let gray = Frame::new(FRAME_SIDE, FRAME_SIDE, vec![128; 3 * side * side]).unwrap();
+    let sent = encode_jpeg(&gray, 95).unwrap();
     let query = "calibration=lobby&profile=fast&camera=hall";
     let kept = async || {
         service.post_raw(query, sent.clone()).await;

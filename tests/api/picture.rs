@@ -30,7 +30,7 @@ fn picture(answer: &Answer) -> Frame {
         .frame
 }
 
-fn grey(frame: &Frame, x: u32, y: u32) -> bool {
+fn gray(frame: &Frame, x: u32, y: u32) -> bool {
     frame
         .pixel(x, y)
         .iter()
@@ -38,7 +38,7 @@ fn grey(frame: &Frame, x: u32, y: u32) -> bool {
 }
 
 fn is_plain(frame: &Frame) -> bool {
-    (0..frame.height()).all(|y| (0..frame.width()).all(|x| grey(frame, x, y)))
+    (0..frame.height()).all(|y| (0..frame.width()).all(|x| gray(frame, x, y)))
 }
 
 #[tokio::test]
@@ -97,7 +97,7 @@ async fn boxes_are_drawn_at_the_positions_of_the_report() {
                 reason = "a position in the frame"
             )]
             let (x, y) = (inside as u32, middle as u32);
-            assert!(!grey(&drawn, x, y), "nothing is drawn at {x}, {y}");
+            assert!(!gray(&drawn, x, y), "nothing is drawn at {x}, {y}");
         }
     }
     for nothing in ["draw=none", "draw=none&format=image"] {

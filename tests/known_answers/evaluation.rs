@@ -50,7 +50,7 @@ fn rotated_boxes() -> RotatedBoxes {
 }
 
 #[test]
-fn rotated_boxes_overlap_by_shared_pixel_centres() {
+fn rotated_boxes_overlap_by_shared_pixel_centers() {
     let RotatedBoxes { frame, pairs } = rotated_boxes();
     assert_eq!(pairs.len(), 150);
     for pair in pairs {

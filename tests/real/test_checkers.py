@@ -1,4 +1,4 @@
-"""The checkers that need Node.js: Redocly for the OpenAPI documents, Biome for the JavaScript."""
+"""Checkers: Redocly for the OpenAPI documents, Biome for the JavaScript, schemas for the files of `.github`."""
 
 import subprocess
 import unittest
@@ -7,6 +7,14 @@ from pathlib import Path
 from harness.places import ROOT
 
 HERE = Path(__file__).resolve().parent / "checkers"
+CHECK = ROOT / ".setup" / "real" / "workflows" / "bin" / "check-jsonschema"
+# The files of `.github` that a forge reads, by the name of their schema.
+OF_SCHEMA = {
+    "github-workflows": "workflows/*.yml",
+    "dependabot": "dependabot.yml",
+    "github-issue-forms": "ISSUE_TEMPLATE/[!c]*.yml",
+    "github-issue-config": "ISSUE_TEMPLATE/config.yml",
+}
 
 
 class Checkers(unittest.TestCase):
@@ -24,6 +32,12 @@ class Checkers(unittest.TestCase):
         scripts = [*sorted(ROOT.glob("web/*.js")), *sorted(ROOT.glob("tests/real/page/*.js"))]
         (biome,) = HERE.glob("node_modules/@biomejs/cli-*/biome")
         self.run_checker(biome, "lint", "--error-on-warnings", *map(str, scripts))
+
+    def test_the_files_of_the_forge_follow_their_schemas(self) -> None:
+        for schema, pattern in OF_SCHEMA.items():
+            files = sorted((ROOT / ".github").glob(pattern))
+            self.assertTrue(files, pattern)
+            self.run_checker(CHECK, "--builtin-schema", f"vendor.{schema}", *map(str, files))
 
     def run_checker(self, program: Path, *arguments: str) -> None:
         done = subprocess.run([program, *arguments], cwd=ROOT, capture_output=True, text=True, check=False)

@@ -2,7 +2,8 @@
 //! that are logged once.
 //!
 //! With the feature `companion` also those of a client of the server: settings files, the server and
-//! its key, HTTP requests with limits, durations and backoff.
+//! its key, HTTP requests with limits, durations and backoff. With `report`, the parts of reports that
+//! several crates use.
 
 #[cfg(feature = "companion")]
 mod abort_on_drop;
@@ -23,6 +24,8 @@ mod log_once;
 pub mod plain_name;
 #[cfg(feature = "companion")]
 mod reload;
+#[cfg(feature = "report")]
+pub mod report;
 #[cfg(feature = "companion")]
 mod secret;
 #[cfg(feature = "companion")]

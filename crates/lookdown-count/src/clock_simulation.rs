@@ -13,10 +13,10 @@ use jiff::Timestamp;
 use lookdown_tracking::{CameraPose, Plane, lines::Line};
 
 use crate::{
+    counter::{Accepted, Counter, CountingOptions},
     definition::CameraDefinition,
-    engine::{Accepted, CountingOptions, Engine},
     now::Now,
-    report::Report,
+    report::ReceivedReport,
     store::Store,
 };
 
@@ -70,7 +70,7 @@ struct World {
     server: Server,
     sent: Vec<Sent>,
     store: Store,
-    engine: Engine,
+    counter: Counter,
     definition: Arc<CameraDefinition>,
     is_connected: bool,
     /// Reports that were counted since the last commit.
@@ -80,17 +80,17 @@ struct World {
     _folder: tempfile::TempDir,
 }
 
-fn engine(store: &Store, definition: &Arc<CameraDefinition>) -> Engine {
+fn counter(store: &Store, definition: &Arc<CameraDefinition>) -> Counter {
     let options = CountingOptions {
         longest_gap_ms: 10_000,
         max_cameras: 64,
     };
     let resumed = store.resumed().unwrap();
-    let mut engine = Engine::new(options, resumed.last_event, resumed.totals);
+    let mut counter = Counter::new(options, resumed.last_event, resumed.totals);
     for state in resumed.scenes {
-        engine.resume(state, |_| Arc::clone(definition));
+        counter.resume(state, |_| Arc::clone(definition));
     }
-    engine
+    counter
 }
 
 impl World {
@@ -115,7 +115,7 @@ impl World {
             own_ahead_ms: 0,
             server: Server::default(),
             sent: Vec::new(),
-            engine: engine(&store, &definition),
+            counter: counter(&store, &definition),
             store,
             definition,
             is_connected: false,
@@ -141,7 +141,7 @@ impl World {
                 for number in self.uncommitted.drain(..) {
                     self.sent[number].counted -= 1;
                 }
-                self.engine = engine(&self.store, &self.definition);
+                self.counter = counter(&self.store, &self.definition);
                 self.is_connected = false;
             }
             Step::HugeId => {
@@ -231,7 +231,7 @@ impl World {
             return;
         }
         self.is_connected = true;
-        let last = self.engine.last_event();
+        let last = self.counter.last_event();
         let kept = self.server.kept.clone();
         let missed: Vec<_> = if last > 0 && last <= self.server.last_id {
             kept.into_iter().filter(|(id, _)| *id > last).collect()
@@ -250,13 +250,13 @@ impl World {
     }
 
     fn deliver(&mut self, id: u64, number: usize) {
-        let report: Report = serde_json::from_str(&self.sent[number].json).unwrap();
+        let report: ReceivedReport = serde_json::from_str(&self.sent[number].json).unwrap();
         let elapsed = Duration::from_millis((self.true_ms - START_MS).unsigned_abs());
         let now = Now {
             unix_ms: self.true_ms + self.own_ahead_ms,
             instant: self.started + elapsed,
         };
-        let accepted = self.engine.accept(id, &report, &self.definition, now);
+        let accepted = self.counter.accept(id, &report, &self.definition, now);
         if matches!(accepted, Accepted::Counted(_)) {
             self.sent[number].counted += 1;
             self.uncommitted.push(number);
@@ -264,15 +264,15 @@ impl World {
     }
 
     fn commit(&mut self) {
-        if let Some(batch) = self.engine.take_batch() {
+        if let Some(batch) = self.counter.take_batch() {
             self.store.commit(&batch, &[], None).unwrap();
-            self.engine.stored(&batch);
+            self.counter.stored(&batch);
         }
         self.uncommitted.clear();
     }
 
     fn crossings(&self) -> u64 {
-        let crossings = self.engine.stored_totals().crossings.iter();
+        let crossings = self.counter.stored_totals().crossings.iter();
         let of_hall = crossings.filter(|(of, _)| of.camera == CAMERAS[1]);
         of_hall.map(|(_, count)| count).sum()
     }

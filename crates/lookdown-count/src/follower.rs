@@ -1,4 +1,4 @@
-//! Follows the reports of the server: passes them to the engine, and stores its sums in intervals.
+//! Follows the reports of the server: passes them to the counter, and stores its sums in intervals.
 
 use std::{sync::Arc, time::Duration};
 
@@ -14,13 +14,13 @@ use tokio::{
 use crate::{
     batch::Batch,
     calibrations::{CalibrationProblem, Calibrations},
-    engine::{Accepted, Engine},
+    counter::{Accepted, Counter},
     event_parser::Event,
     event_stream::{EventStream, StreamError},
     message::Message,
     metrics::Metrics,
     now::Now,
-    report::Report,
+    report::ReceivedReport,
     snapshot::Snapshot,
     store::Store,
     webhooks::{Conditions, Deliveries},
@@ -37,7 +37,7 @@ const EXPIRY: Duration = Duration::from_mins(30);
 /// Everything that the reports change.
 pub(crate) struct Follower {
     pub(crate) client: ServerClient,
-    pub(crate) engine: Arc<Mutex<Engine>>,
+    pub(crate) counter: Arc<Mutex<Counter>>,
     pub(crate) calibrations: Calibrations,
     pub(crate) store: Store,
     pub(crate) conditions: Conditions,
@@ -87,7 +87,7 @@ impl Follower {
     /// Follows one connection until it ends.
     async fn follow(&mut self, log: &mut LogOnce) -> StreamError {
         let client = self.client.clone();
-        let last_event = self.engine.lock().last_event();
+        let last_event = self.counter.lock().last_event();
         let mut stop = self.stop.clone();
         let opened = tokio::select! {
             opened = EventStream::open(&client, last_event) => opened,
@@ -115,7 +115,7 @@ impl Follower {
                     }
                 }
             }
-            let is_urgent = self.engine.lock().is_urgent() || !self.messages.is_empty();
+            let is_urgent = self.counter.lock().is_urgent() || !self.messages.is_empty();
             if is_urgent || Instant::now() >= self.next_commit {
                 self.commit().await;
             }
@@ -134,12 +134,12 @@ impl Follower {
             skipped("malformed");
             return Ok(());
         };
-        let report = serde_json::from_slice::<Report>(&event.data).ok();
-        let Some(report) = report.filter(Report::has_valid_names) else {
+        let report = serde_json::from_slice::<ReceivedReport>(&event.data).ok();
+        let Some(report) = report.filter(ReceivedReport::has_valid_names) else {
             skipped("malformed");
             return Ok(());
         };
-        let definition = self.engine.lock().definition(&report.camera);
+        let definition = self.counter.lock().definition(&report.camera);
         let key = report.definition_key();
         let known = definition.filter(|definition| definition.key == key);
         let definition = if let Some(definition) = known {
@@ -159,12 +159,12 @@ impl Follower {
             })?;
             self.calibrations.definition(key)
         };
-        let mut engine = self.engine.lock();
+        let mut counter = self.counter.lock();
         let now = Now::read();
-        match engine.accept(id, &report, &definition, now) {
+        match counter.accept(id, &report, &definition, now) {
             Accepted::Counted(crossings) => {
                 self.metrics.reports.inc();
-                if let Some(scene) = engine.scene_of(&report.camera) {
+                if let Some(scene) = counter.scene_of(&report.camera) {
                     let at_ms = report.at_ms(definition.site.is_some());
                     let times = (at_ms, now.unix_ms);
                     let messages =
@@ -182,7 +182,7 @@ impl Follower {
     async fn tick(&mut self) {
         let now_ms = Timestamp::now().as_millisecond();
         self.messages.extend(self.conditions.of_time(now_ms));
-        let snapshot = self.engine.lock().snapshot(now_ms);
+        let snapshot = self.counter.lock().snapshot(now_ms);
         self.snapshots.send_if_modified(|last| {
             let is_changed = *last != snapshot;
             *last = snapshot;
@@ -193,7 +193,7 @@ impl Follower {
         }
         if Instant::now() >= self.next_expiry {
             self.next_expiry = Instant::now() + EXPIRY;
-            self.engine.lock().forget_silent(now_ms);
+            self.counter.lock().forget_silent(now_ms);
             let age_ms = i64::try_from(self.retention.as_millis()).unwrap_or(i64::MAX);
             let store = self.store.clone();
             let expired = spawn_blocking(move || store.expire(now_ms.saturating_sub(age_ms))).await;
@@ -206,7 +206,7 @@ impl Follower {
     /// Stores all sums. Repeats a failed transaction until it succeeds: meanwhile no report is read,
     /// so that memory stays bounded. The server sends those reports again.
     pub(crate) async fn commit(&mut self) {
-        let batch = self.engine.lock().take_batch();
+        let batch = self.counter.lock().take_batch();
         let messages = std::mem::take(&mut self.messages);
         self.next_commit = Instant::now() + self.commit_every;
         let held = self.conditions.take_changed();
@@ -214,8 +214,8 @@ impl Follower {
             return;
         }
         let batch = batch.unwrap_or_else(|| {
-            let engine = self.engine.lock();
-            Batch::empty(engine.last_event(), engine.stored_totals().clone())
+            let counter = self.counter.lock();
+            Batch::empty(counter.last_event(), counter.stored_totals().clone())
         });
         let batch = Arc::new((batch, messages, held));
         let mut backoff = Backoff::new(FIRST_PAUSE, LONGEST_PAUSE);
@@ -248,7 +248,7 @@ impl Follower {
             }
             sleep(backoff.next_pause()).await;
         }
-        self.engine.lock().stored(&batch.0);
+        self.counter.lock().stored(&batch.0);
         if log.clear() {
             tracing::info!("the store is written again");
         }

@@ -26,7 +26,7 @@ use serde::Serialize;
 use utoipa::{ToSchema, openapi::OpenApi};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
-use crate::{engine::Engine, metrics::Metrics, now::time_of, sums::Owner};
+use crate::{counter::Counter, metrics::Metrics, now::time_of, sums::Owner};
 pub(crate) use counts::{MAX_VALUES, table};
 pub(crate) use operation::probes;
 pub(crate) use shared::Api;
@@ -59,8 +59,8 @@ fn routes() -> OpenApiRouter<Shared> {
 }
 
 /// Returns the routes of the listener itself for clients with access.
-pub(crate) fn operation_router(engine: &Arc<Mutex<Engine>>, metrics: &Arc<Metrics>) -> Router {
-    operation::router(engine, metrics, openapi_document)
+pub(crate) fn operation_router(counter: &Arc<Mutex<Counter>>, metrics: &Arc<Metrics>) -> Router {
+    operation::router(counter, metrics, openapi_document)
 }
 
 /// Returns the OpenAPI document of the counts.
@@ -107,8 +107,8 @@ struct Dropping {
 
 impl CameraRow {
     /// Returns the row of a camera without a counted report.
-    fn new(name: &str, engine: &Engine) -> Self {
-        let drops = engine.drops().of(name);
+    fn new(name: &str, counter: &Counter) -> Self {
+        let drops = counter.drops().of(name);
         let since_ms = drops.and_then(|drops| drops.since_ms);
         let dropping = drops.zip(since_ms).map(|(drops, since_ms)| Dropping {
             since: time_of(since_ms),
@@ -132,24 +132,24 @@ impl CameraRow {
     responses((status = OK, description = "By name.", body = Vec<CameraRow>))
 )]
 async fn cameras(State(api): State<Shared>) -> Json<Vec<CameraRow>> {
-    let engine = api.engine.lock();
-    let snapshot = engine.snapshot(now_ms());
+    let counter = api.counter.lock();
+    let snapshot = counter.snapshot(now_ms());
     let mut rows = BTreeMap::new();
     for camera in snapshot.cameras {
         let row = CameraRow {
             last_report: Some(time_of(camera.last_report_ms)),
             persons: camera.persons,
-            site: match engine.scene_of(&camera.name).map(|scene| &scene.owner) {
+            site: match counter.scene_of(&camera.name).map(|scene| &scene.owner) {
                 Some(Owner::Site(site)) => Some(site.clone()),
                 _ => None,
             },
-            ..CameraRow::new(&camera.name, &engine)
+            ..CameraRow::new(&camera.name, &counter)
         };
         rows.insert(camera.name, row);
     }
-    for (name, _) in engine.drops().iter() {
+    for (name, _) in counter.drops().iter() {
         let entry = rows.entry(name.to_owned());
-        entry.or_insert_with(|| CameraRow::new(name, &engine));
+        entry.or_insert_with(|| CameraRow::new(name, &counter));
     }
     Json(rows.into_values().collect())
 }

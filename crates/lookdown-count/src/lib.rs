@@ -5,17 +5,17 @@
 //! The pure core is [`lookdown_tracking`], whose state is serializable, so that it can be stored
 //! together with the counts.
 //!
-//! Around it: the follower reads `/events` and feeds the engine, the store keeps sums per minute with
+//! Around it: the follower reads `/events` and feeds the counter, the store keeps sums per minute with
 //! the state and the ID of the last report, and the HTTP API answers from both.
 
 mod batch;
 mod calibrations;
 #[cfg(test)]
 mod clock_simulation;
+mod counter;
 mod definition;
 mod definition_key;
 mod drops;
-mod engine;
 mod event_image;
 mod event_parser;
 mod event_stream;

@@ -4,7 +4,7 @@ use prometheus::{
     Encoder, IntCounter, IntCounterVec, IntGauge, IntGaugeVec, Opts, Registry, TextEncoder,
 };
 
-use crate::engine::Engine;
+use crate::counter::Counter;
 
 /// All metrics. Series of cameras follow the scenes, which are bounded.
 pub(crate) struct Metrics {
@@ -109,10 +109,10 @@ impl Metrics {
     }
 
     /// Returns all metrics in the text format of Prometheus.
-    pub(crate) fn text(&self, engine: &Engine, now_ms: i64) -> Vec<u8> {
-        let snapshot = engine.snapshot(now_ms);
+    pub(crate) fn text(&self, counter: &Counter, now_ms: i64) -> Vec<u8> {
+        let snapshot = counter.snapshot(now_ms);
         self.position_resets.reset();
-        self.position_resets.inc_by(engine.position_resets());
+        self.position_resets.inc_by(counter.position_resets());
         for counters in [
             &self.crossings,
             &self.zone_entries,

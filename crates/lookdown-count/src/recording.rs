@@ -12,11 +12,11 @@ use lookdown_tracking::MAX_CAMERAS;
 
 use crate::{
     calibrations::Calibrations,
+    counter::{Counter, CountingOptions},
     definition::CameraDefinition,
-    engine::{CountingOptions, Engine},
     http::{MAX_VALUES, table},
     now::Now,
-    report::Report,
+    report::ReceivedReport,
     snapshot::LineSnapshot,
     store::{Span, Store, StoreError},
     sums::{MINUTE_MS, Owner},
@@ -29,7 +29,7 @@ const COMMIT_EVERY: Duration = Duration::from_secs(2);
 pub struct Recording {
     camera: String,
     calibration: Option<Arc<Calibration>>,
-    engine: Engine,
+    counter: Counter,
     store: Store,
     next_commit: Instant,
     began: Instant,
@@ -65,10 +65,10 @@ impl Recording {
             longest_gap_ms: i64::try_from(longest_gap.as_millis()).unwrap_or(i64::MAX),
             max_cameras: MAX_CAMERAS,
         };
-        let mut engine = Engine::new(counting, resumed.last_event, resumed.totals);
+        let mut counter = Counter::new(counting, resumed.last_event, resumed.totals);
         let others = Calibrations::resumed(resumed.calibrations);
         for state in resumed.scenes {
-            engine.resume(state, |key| match &calibration {
+            counter.resume(state, |key| match &calibration {
                 Some(own) if key.calibration.as_deref() == Some(own.id().as_str()) => {
                     Arc::new(CameraDefinition::new(key, own))
                 }
@@ -78,7 +78,7 @@ impl Recording {
         Ok(Self {
             camera: camera.to_owned(),
             calibration,
-            engine,
+            counter,
             store,
             next_commit: Instant::now() + COMMIT_EVERY,
             began: Instant::now(),
@@ -89,7 +89,7 @@ impl Recording {
     /// Returns the time of the last report that the store contains.
     #[must_use]
     pub fn counted_until(&self) -> Option<Timestamp> {
-        let micros = i64::try_from(self.engine.last_event()).ok();
+        let micros = i64::try_from(self.counter.last_event()).ok();
         let micros = micros.filter(|micros| *micros > 0)?;
         Timestamp::from_microsecond(micros).ok()
     }
@@ -100,10 +100,10 @@ impl Recording {
     /// # Errors
     /// [`RecordingError`].
     pub fn count(&mut self, at: Timestamp, report: &[u8]) -> Result<(), RecordingError> {
-        let mut report = serde_json::from_slice::<Report>(report)?.captured(at);
+        let mut report = serde_json::from_slice::<ReceivedReport>(report)?.captured(at);
         report.camera.clone_from(&self.camera);
         let key = report.definition_key();
-        let known = self.engine.definition(&self.camera);
+        let known = self.counter.definition(&self.camera);
         let known = known.filter(|definition| definition.key == key);
         let definition = known.unwrap_or_else(|| {
             Arc::new(match &self.calibration {
@@ -115,7 +115,7 @@ impl Recording {
         });
         let event = u64::try_from(at.as_microsecond()).unwrap_or_default();
         let now = self.clocks(at);
-        self.engine.accept(event, &report, &definition, now);
+        self.counter.accept(event, &report, &definition, now);
         if Instant::now() >= self.next_commit {
             self.commit()?;
         }
@@ -138,9 +138,9 @@ impl Recording {
     /// [`StoreError`].
     pub fn commit(&mut self) -> Result<(), StoreError> {
         self.next_commit = Instant::now() + COMMIT_EVERY;
-        if let Some(batch) = self.engine.take_batch() {
+        if let Some(batch) = self.counter.take_batch() {
             self.store.commit(&batch, &[], None)?;
-            self.engine.stored(&batch);
+            self.counter.stored(&batch);
         }
         Ok(())
     }
@@ -148,14 +148,14 @@ impl Recording {
     /// Returns the persons at the last report.
     #[must_use]
     pub fn persons(&self) -> u64 {
-        let scene = self.engine.scene_of(&self.camera);
+        let scene = self.counter.scene_of(&self.camera);
         scene.map_or(0, |scene| scene.presence().persons)
     }
 
     /// Returns the crossings of the lines of the camera since the store was created.
     #[must_use]
     pub fn lines(&self) -> Vec<LineSnapshot> {
-        let snapshot = self.engine.snapshot(0);
+        let snapshot = self.counter.snapshot(0);
         let cameras = snapshot.cameras.into_iter();
         let mut own = cameras.filter(|camera| camera.name == self.camera);
         own.next().map(|camera| camera.lines).unwrap_or_default()
@@ -180,7 +180,7 @@ impl Recording {
         let Some(sums) = self.store.steps(&owner, span, MAX_VALUES)? else {
             return Ok(None);
         };
-        let definition = self.engine.definition(&self.camera);
+        let definition = self.counter.definition(&self.camera);
         Ok(table(owner, span, &sums, definition.as_deref()))
     }
 }

@@ -1,7 +1,10 @@
 //! The parts of a report of the server that are used.
 
 use jiff::Timestamp;
-use lookdown_common::text::is_camera_name;
+use lookdown_common::{
+    report::{ReportBearing, ReportCalibration, ReportFloor, ReportImage, ReportOrientedBox},
+    text::is_camera_name,
+};
 use lookdown_lens::{calibration::CalibrationId, geometry::Pixel};
 use lookdown_tracking::Observation;
 use nalgebra::Vector2;
@@ -20,16 +23,16 @@ const MAX_BEHIND_ON_SITE_MS: i64 = 1_000;
 /// The server's limit of revisions.
 const MAX_REVISION_BYTES: usize = 128;
 
-/// A report of the server.
+/// A report of the server, with the fields that counting needs.
 #[derive(Debug, Clone, Deserialize)]
-pub(crate) struct Report {
+pub(crate) struct ReceivedReport {
     /// The camera of the frame.
     pub(crate) camera: String,
     received_at: Timestamp,
     #[serde(default)]
     captured_at: Option<Timestamp>,
-    pub(crate) calibration: UsedCalibration,
-    pub(crate) image: Image,
+    pub(crate) calibration: ReportCalibration,
+    pub(crate) image: ReportImage,
     pub(crate) persons: Vec<Person>,
     /// Persons in the margin around the areas of the calibration.
     #[serde(default)]
@@ -43,52 +46,16 @@ pub(crate) struct ReportKey {
     received_ms: i64,
 }
 
-/// The calibration of a report.
-#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
-pub(crate) struct UsedCalibration {
-    pub(crate) id: String,
-    pub(crate) revision: String,
-    pub(crate) assumed: bool,
-}
-
-/// The size of a frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-pub(crate) struct Image {
-    pub(crate) width: u32,
-    pub(crate) height: u32,
-}
-
 /// One person.
 #[derive(Debug, Clone, Copy, Deserialize)]
 pub(crate) struct Person {
     score: f64,
-    oriented_box: OrientedBox,
-    bearing: Option<Bearing>,
-    floor: Option<Floor>,
+    oriented_box: ReportOrientedBox,
+    bearing: Option<ReportBearing>,
+    floor: Option<ReportFloor>,
 }
 
-#[derive(Debug, Clone, Copy, Deserialize)]
-struct OrientedBox {
-    cx: f64,
-    cy: f64,
-    width: f64,
-    height: f64,
-    angle_deg: f64,
-}
-
-#[derive(Debug, Clone, Copy, Deserialize)]
-struct Bearing {
-    azimuth_deg: f64,
-    off_axis_deg: f64,
-}
-
-#[derive(Debug, Clone, Copy, Deserialize)]
-struct Floor {
-    x_m: f64,
-    y_m: f64,
-}
-
-impl Report {
+impl ReceivedReport {
     /// Returns the report of a frame that was captured at this time, whenever it arrived.
     pub(crate) fn captured(self, at: Timestamp) -> Self {
         Self {
@@ -166,16 +133,16 @@ fn observation(
     definition: &CameraDefinition,
 ) -> Option<Observation> {
     let bearing = person.bearing?;
-    let OrientedBox {
+    let ReportOrientedBox {
         cx,
         cy,
         width,
         height,
         angle_deg,
     } = person.oriented_box;
-    let centre = Pixel::new(cx, cy);
+    let center = Pixel::new(cx, cy);
     // The angle does not tell the head from the foot.
-    let vertical = definition.up_at(centre);
+    let vertical = definition.up_at(center);
     let (sin, cos) = angle_deg.to_radians().sin_cos();
     let axis = Vector2::new(sin, -cos);
     let up = if axis.dot(&vertical) < 0.0 {
@@ -183,12 +150,12 @@ fn observation(
     } else {
         axis
     };
-    let foot = centre - up * (height / 2.0);
+    let foot = center - up * (height / 2.0);
     Some(Observation {
         floor_m: person.floor.map(|floor| [floor.x_m, floor.y_m]),
         azimuth_deg: bearing.azimuth_deg,
         off_axis_deg: bearing.off_axis_deg,
-        centre_px: [cx, cy],
+        center_px: [cx, cy],
         size_px: [width, height],
         foot_px: [foot.x, foot.y],
         score: person.score,
@@ -209,7 +176,7 @@ fn is_plausible(ahead_ms: i64, is_on_site: bool) -> bool {
 mod tests {
     use super::*;
 
-    fn report(captured_at: &str, person: &str) -> Report {
+    fn report(captured_at: &str, person: &str) -> ReceivedReport {
         serde_json::from_str(&format!(
             r#"{{"camera": "hall", "received_at": "2026-11-22T10:00:00Z", "captured_at": {captured_at},
                  "calibration": {{"id": "hall", "revision": "1", "assumed": true}},
@@ -242,7 +209,7 @@ mod tests {
     fn names_are_limited_as_those_of_the_server() {
         let report = report("null", "");
         assert!(report.has_valid_names());
-        let change = |change: fn(&mut Report)| {
+        let change = |change: fn(&mut ReceivedReport)| {
             let mut changed = report.clone();
             changed.calibration.assumed = false;
             change(&mut changed);

@@ -20,7 +20,7 @@ use tokio::{
 
 use crate::{
     calibrations::Calibrations,
-    engine::{CountingOptions, Engine},
+    counter::{Counter, CountingOptions},
     follower::Follower,
     hand_back::hand_back,
     http::{Api, operation_router, probes, router},
@@ -97,29 +97,30 @@ pub async fn count(
         longest_gap_ms: i64::try_from(options.longest_gap.as_millis()).unwrap_or(i64::MAX),
         max_cameras: options.max_cameras,
     };
-    let mut engine = Engine::new(counting, resumed.last_event, resumed.totals);
+    let mut counter = Counter::new(counting, resumed.last_event, resumed.totals);
     for state in resumed.scenes {
-        engine.resume(state, |key| calibrations.definition(key));
+        counter.resume(state, |key| calibrations.definition(key));
     }
     let conditions = Conditions::resumed(
         options.webhooks.clone(),
         &resumed.held,
-        engine.last_reports(),
+        counter.last_reports(),
         Timestamp::now().as_millisecond(),
     );
-    let engine = Arc::new(Mutex::new(engine));
+    let counter = Arc::new(Mutex::new(counter));
     let api = Api {
-        engine: Arc::clone(&engine),
+        counter: Arc::clone(&counter),
         store: store.clone(),
     };
     let counts = router(api);
-    let own_listener = |listener| serve_alone(listener, options, counts.clone(), &engine, &metrics);
+    let own_listener =
+        |listener| serve_alone(listener, options, counts.clone(), &counter, &metrics);
     let _serving = listener.map(own_listener);
-    let (shown, shown_engine) = (Arc::clone(&metrics), Arc::clone(&engine));
+    let (shown, shown_counter) = (Arc::clone(&metrics), Arc::clone(&counter));
     started(Started {
         routes: counts,
         metrics: Box::new(move || {
-            shown.text(&shown_engine.lock(), Timestamp::now().as_millisecond())
+            shown.text(&shown_counter.lock(), Timestamp::now().as_millisecond())
         }),
     });
     let handing_back = tokio::spawn(hand_back(client.clone(), snapshots.subscribe()));
@@ -135,7 +136,7 @@ pub async fn count(
         )?,
         conditions,
         client,
-        engine,
+        counter,
         calibrations,
         store,
         metrics,
@@ -147,8 +148,8 @@ pub async fn count(
         next_expiry: Instant::now(),
         stop: stop_receiver,
     };
-    if follower.engine.lock().last_event() > 0 {
-        let last_ms = follower.engine.lock().last_event() / 1000;
+    if follower.counter.lock().last_event() > 0 {
+        let last_ms = follower.counter.lock().last_event() / 1000;
         let last = time_of(i64::try_from(last_ms).unwrap_or(i64::MAX));
         tracing::info!("continuing after the report of {last}");
     }
@@ -171,7 +172,7 @@ fn serve_alone(
     listener: TcpListener,
     options: &CountOptions,
     counts: Router,
-    engine: &Arc<Mutex<Engine>>,
+    counter: &Arc<Mutex<Counter>>,
     metrics: &Arc<Metrics>,
 ) -> AbortOnDrop {
     let address = listener.local_addr().ok();
@@ -185,7 +186,7 @@ fn serve_alone(
         (None, None) => Access::OwnMachine,
     };
     let routes = Routes {
-        protected: counts.merge(operation_router(engine, metrics)),
+        protected: counts.merge(operation_router(counter, metrics)),
         probes: probes(),
     };
     let open = metrics.connections.clone();

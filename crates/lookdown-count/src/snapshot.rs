@@ -1,7 +1,7 @@
 //! The current counts of all cameras and sites, for metrics and MQTT.
 
 use crate::{
-    engine::{Engine, MAX_AHEAD_MS},
+    counter::{Counter, MAX_AHEAD_MS},
     sums::{LineDirection, Owner, ZoneOf},
 };
 
@@ -62,7 +62,7 @@ pub struct SiteSnapshot {
     pub persons: Option<u64>,
 }
 
-impl Engine {
+impl Counter {
     /// Returns the current counts.
     pub(crate) fn snapshot(&self, now_ms: i64) -> Snapshot {
         let is_known = |last_ms: Option<i64>| {

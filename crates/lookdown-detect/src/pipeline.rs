@@ -1,6 +1,7 @@
 //! The detection pipeline: turns an encoded frame into a report of the persons in it.
 
 mod calibration_lookup;
+mod camera_cache;
 mod camera_rig;
 mod default_models;
 mod engine;

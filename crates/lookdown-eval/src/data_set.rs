@@ -59,7 +59,7 @@ impl DataSet {
         if !heads.is_empty() {
             return heads::read_files(&heads);
         }
-        Err(DataSetError::Unrecognised {
+        Err(DataSetError::Unrecognized {
             path: path.to_owned(),
         })
     }
@@ -77,7 +77,7 @@ impl DataSet {
                 coco::read_files(&[path.to_owned()], &pictures)
             }
             Some("csv") if heads::is_head_file(path) => heads::read_files(&[path.to_owned()]),
-            _ => Err(DataSetError::Unrecognised {
+            _ => Err(DataSetError::Unrecognized {
                 path: path.to_owned(),
             }),
         }

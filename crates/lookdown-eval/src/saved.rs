@@ -9,7 +9,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use lookdown_common::files;
+use lookdown_common::{files, report::ReportOrientedBox};
 use lookdown_detect::detection::BBox;
 use lookdown_lens::geometry::{OrientedBox, Pixel};
 use serde::{Deserialize, Serialize};
@@ -36,17 +36,8 @@ struct Entry {
     bbox: [f64; 4],
     score: f64,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    oriented_box: Option<Oriented>,
-}
-
-/// The box of a report, with all digits.
-#[derive(Serialize, Deserialize)]
-struct Oriented {
-    cx: f64,
-    cy: f64,
-    width: f64,
-    height: f64,
-    angle_deg: f64,
+    /// Here with all digits.
+    oriented_box: Option<ReportOrientedBox>,
 }
 
 impl RowName {
@@ -172,7 +163,7 @@ fn entry(image_id: &ImageId, person: &FoundPerson) -> Entry {
         category_id: PERSON,
         bbox: [left, top, person.bbox.width(), person.bbox.height()],
         score: person.score,
-        oriented_box: person.oriented_box.map(|oriented| Oriented {
+        oriented_box: person.oriented_box.map(|oriented| ReportOrientedBox {
             cx: oriented.center.x,
             cy: oriented.center.y,
             width: oriented.width,

@@ -20,6 +20,8 @@ pub mod person_height;
 pub mod pixels;
 pub mod polygon;
 pub mod site_placement;
+#[cfg(test)]
+pub(crate) mod test_people;
 pub mod view_plan;
 pub mod virtual_view;
 pub mod zone;

@@ -62,7 +62,7 @@ impl PyView {
         let corner_origin = &self.planned.outline;
         let pixels: Vec<_> = corner_origin
             .iter()
-            .map(|&at| cross_half_pixel(at, PixelConvention::PixelCentre))
+            .map(|&at| cross_half_pixel(at, PixelConvention::PixelCenter))
             .map(|at| [at.x, at.y])
             .collect();
         arr2(&pixels).into_pyarray(py)

@@ -108,7 +108,7 @@ pub struct Furniture {
 impl Shape {
     fn of(person: &Observation) -> Self {
         Self {
-            center_px: person.centre_px,
+            center_px: person.center_px,
             log_size: person.size_px.map(f64::ln),
             log_odds: log_odds(person.score),
         }

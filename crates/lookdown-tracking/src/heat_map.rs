@@ -71,8 +71,8 @@ impl Cell {
     /// Returns the cell of a place in meters. `None` for places more than a kilometer away.
     #[must_use]
     pub fn of([x, y]: [f64; 2]) -> Option<Self> {
-        let index = |metres: f64| {
-            let cell = (metres / CELL_M).floor();
+        let index = |meters: f64| {
+            let cell = (meters / CELL_M).floor();
             #[expect(clippy::cast_possible_truncation, reason = "within the limit")]
             let index = cell as i16;
             (cell.abs() <= MAX_CELLS_FROM_ORIGIN).then_some(index)

@@ -10,7 +10,7 @@ pub struct Observation {
     /// Angle between that direction and the optical axis, in degrees (0 to 180).
     pub off_axis_deg: f64,
     /// Center of the oriented box in frame pixels (x, y).
-    pub centre_px: [f64; 2],
+    pub center_px: [f64; 2],
     /// Width and height of the oriented box in frame pixels.
     pub size_px: [f64; 2],
     /// Middle of the oriented box's lower side in frame pixels (x, y): lines and zones in the frame

@@ -17,7 +17,7 @@ pub(crate) fn with_score(x: f64, y: f64, score: f64) -> Observation {
         floor_m: Some([x, y]),
         azimuth_deg: y.atan2(x).to_degrees() + 90.0,
         off_axis_deg: x.hypot(y).atan2(CAMERA_M).to_degrees(),
-        centre_px: px,
+        center_px: px,
         size_px: [40.0, 80.0],
         foot_px: px,
         score,

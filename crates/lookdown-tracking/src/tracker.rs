@@ -151,7 +151,7 @@ impl Tracker {
         self.check(camera, at_s)?;
         let pose = &self.cameras[camera].pose;
         let candidates = candidates(persons, (pose, self.on_floor), &self.settings);
-        let report = Report {
+        let report = CurrentReport {
             camera,
             at_s,
             interval_s: self.interval_s(camera, at_s),
@@ -209,7 +209,7 @@ impl Tracker {
 
     /// Continues tracks with persons in the three steps of `ByteTrack`: high scores, low scores, then
     /// tracks without confirmation. Returns true for each candidate that continued a track.
-    fn associate(&mut self, report: &Report, candidates: &[Candidate]) -> Vec<bool> {
+    fn associate(&mut self, report: &CurrentReport, candidates: &[Candidate]) -> Vec<bool> {
         let high = self.settings.high_score;
         let mut used = vec![false; candidates.len()];
         for (confirmed, scores) in [
@@ -258,7 +258,7 @@ impl Tracker {
     /// Starts things where confirmed tracks have stood for a while.
     fn start_things(
         &mut self,
-        report: &Report,
+        report: &CurrentReport,
         persons: &[Observation],
         unknown: &BTreeSet<usize>,
     ) {
@@ -273,7 +273,7 @@ impl Tracker {
 
     fn start_tracks(
         &mut self,
-        report: &Report,
+        report: &CurrentReport,
         (candidates, furniture): (&[Candidate], &[Measurement]),
         used: &[bool],
     ) {
@@ -295,13 +295,13 @@ impl Tracker {
     }
 
     /// Returns true when this may be a further box of a person that the report holds already.
-    fn is_taken(&self, report: &Report, measured: &Measurement) -> bool {
+    fn is_taken(&self, report: &CurrentReport, measured: &Measurement) -> bool {
         let current = self.tracks.iter().filter(|track| report.shows(track));
         let mut motions = current.map(|track| &track.motion);
         motions.any(|motion| motion.is_same_person(measured, report.at_s))
     }
 
-    fn count_misses(&mut self, report: &Report) {
+    fn count_misses(&mut self, report: &CurrentReport) {
         let is_alone = self.cameras.len() == 1;
         let camera = &self.cameras[report.camera];
         for track in self.tracks.iter_mut().filter(|track| !report.shows(track)) {
@@ -328,13 +328,13 @@ impl Tracker {
 }
 
 /// The camera and the time of the current report.
-struct Report {
+struct CurrentReport {
     camera: usize,
     at_s: f64,
     interval_s: f64,
 }
 
-impl Report {
+impl CurrentReport {
     /// Returns true when a person of this report continued or started the track.
     fn shows(&self, track: &Track) -> bool {
         track.seen_by.get(&self.camera) == Some(&self.at_s)

@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn whole_images_are_recognised() {
+    fn whole_images_are_recognized() {
         let webp = b"RIFF\x04\0\0\0WEBP";
         assert_eq!(check(b"\xff\xd8\xff\xe0..\xff\xd9"), Ok(ImageFormat::Jpeg));
         assert_eq!(

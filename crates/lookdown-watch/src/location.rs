@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn kinds_are_recognised() {
+    fn kinds_are_recognized() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("clip.mp4");
         std::fs::write(&file, "").unwrap();

@@ -19,7 +19,7 @@ use axum::{
 use http_body_util::BodyExt;
 use lookdown::{
     api::{self, ApiOptions, ApiState, Readiness},
-    calibration_store::{CalibrationStore, Calibrations, Replaces, StoreError, StoredFile},
+    calibration_store::{CalibrationStore, Calibrations, ListedFile, Replaces, StoreError},
     metrics::Metrics,
     results::{MemoryResults, ResultLimits, ResultStore},
 };
@@ -196,8 +196,8 @@ impl CalibrationStore for DiscardingStore {
         "memory".to_owned()
     }
 
-    fn list(&self) -> Result<Vec<StoredFile>, StoreError> {
-        Ok(vec![StoredFile {
+    fn list(&self) -> Result<Vec<ListedFile>, StoreError> {
+        Ok(vec![ListedFile {
             name: "lobby.json".to_owned(),
             stamp: String::new(),
         }])

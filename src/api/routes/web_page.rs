@@ -19,13 +19,16 @@ use lookdown_lens::revision::revision_of;
 
 use serde::Serialize;
 
-use crate::api::{
-    ApiState,
-    http::{
-        entity_tags::{entity_tag, is_unmodified},
-        problem::{Problem, ProblemKind},
+use crate::{
+    api::{
+        ApiState,
+        http::{
+            entity_tags::{entity_tag, is_unmodified},
+            problem::{Problem, ProblemKind},
+        },
+        require_scope::RequireAdmin,
     },
-    require_scope::RequireAdmin,
+    samples::SAMPLES,
 };
 
 /// A file of the page.
@@ -40,69 +43,70 @@ struct Asset {
 const PAGE: &str = "index.html";
 
 macro_rules! assets {
-    ($($name:literal from $folder:literal),* $(,)?) => {
-        vec![$(Asset::new(
+    ($($name:literal),* $(,)?) => {
+        [$(Asset::new(
             $name,
-            include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/", $folder, "/", $name)),
+            include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/web/", $name)),
         )),*]
     };
 }
 
 /// All files of the page. A test checks that none is missing.
 static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
-    assets![
-        "index.html" from "web",
-        "style.css" from "web",
-        "panels.css" from "web",
-        "zones.css" from "web",
-        "icon.svg" from "web",
-        "furniture.js" from "web",
-        "ignore_place.js" from "web",
-        "main.js" from "web",
-        "dom.js" from "web",
-        "server.js" from "web",
-        "shared.js" from "web",
-        "key.js" from "web",
-        "progress.js" from "web",
-        "frame.js" from "web",
-        "parameters.js" from "web",
-        "detect.js" from "web",
-        "marks.js" from "web",
-        "findings.js" from "web",
-        "geometry.js" from "web",
-        "views.js" from "web",
-        "straighten.js" from "web",
-        "cameras.js" from "web",
-        "cameras.css" from "web",
-        "camera_card.js" from "web",
-        "camera_day.js" from "web",
-        "camera_form.js" from "web",
-        "camera_states.js" from "web",
-        "use_frame.js" from "web",
-        "suggestion.js" from "web",
-        "counts.js" from "web",
-        "counts_drawing.js" from "web",
-        "counts.css" from "web",
-        "plot.js" from "web",
-        "floor.js" from "web",
-        "lens.js" from "web",
-        "calibrate.js" from "web",
-        "comparison.js" from "web",
-        "circle_handles.js" from "web",
-        "zones.js" from "web",
-        "zone_surfaces.js" from "web",
-        "areas.js" from "web",
-        "area_editor.js" from "web",
-        "area_shapes.js" from "web",
-        "area_gestures.js" from "web",
-        "area_list.js" from "web",
-        "area_counts.js" from "web",
-        "edit_history.js" from "web",
-        "floor_map.js" from "web",
-        "office.jpg" from "samples",
-        "canteen.jpg" from "samples",
-        "lounge.jpg" from "samples",
-    ]
+    let files = assets![
+        "index.html",
+        "style.css",
+        "panels.css",
+        "zones.css",
+        "icon.svg",
+        "furniture.js",
+        "ignore_place.js",
+        "main.js",
+        "dom.js",
+        "server.js",
+        "shared.js",
+        "key.js",
+        "progress.js",
+        "frame.js",
+        "parameters.js",
+        "detect.js",
+        "marks.js",
+        "findings.js",
+        "geometry.js",
+        "views.js",
+        "straighten.js",
+        "cameras.js",
+        "cameras.css",
+        "camera_card.js",
+        "camera_day.js",
+        "camera_form.js",
+        "camera_states.js",
+        "use_frame.js",
+        "suggestion.js",
+        "counts.js",
+        "counts_drawing.js",
+        "counts.css",
+        "plot.js",
+        "floor.js",
+        "lens.js",
+        "calibrate.js",
+        "comparison.js",
+        "circle_handles.js",
+        "zones.js",
+        "zone_surfaces.js",
+        "areas.js",
+        "area_editor.js",
+        "area_shapes.js",
+        "area_gestures.js",
+        "area_list.js",
+        "area_counts.js",
+        "edit_history.js",
+        "floor_map.js",
+    ];
+    let samples = SAMPLES
+        .iter()
+        .map(|sample| Asset::new(sample.file, sample.jpeg));
+    files.into_iter().chain(samples).collect()
 });
 
 impl Asset {

@@ -8,7 +8,7 @@ use super::{
     CalibrationEntry, Calibrations, ChangeError, Reading, content::import, load::LoadedFile,
     named_file::written_name, samples::sample,
 };
-use crate::calibration_store::{Replaces, StoredFile};
+use crate::calibration_store::{ListedFile, Replaces};
 
 /// The precondition of a change to a calibration.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -150,7 +150,7 @@ fn shared_file(file: &LoadedFile) -> ChangeError {
 impl WriteCondition {
     /// Returns the content that the file called `name` may replace under this condition, when
     /// `known` is that of its ID: no change that was made after the condition was checked.
-    fn replaces<'a>(&self, known: Option<&'a StoredFile>, name: &str) -> Replaces<'a> {
+    fn replaces<'a>(&self, known: Option<&'a ListedFile>, name: &str) -> Replaces<'a> {
         match known {
             _ if *self == Self::Always => Replaces::Anything,
             Some(file) if file.name == name => Replaces::Stamp(&file.stamp),

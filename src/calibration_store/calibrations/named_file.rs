@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use lookdown_lens::calibration::CalibrationId;
 
-use crate::calibration_store::StoredFile;
+use crate::calibration_store::ListedFile;
 
 /// File endings that are read; of several files of one ID the first in this order counts.
 const ENDINGS: [&str; 6] = ["json", "yaml", "yml", "toml", "xml", "txt"];
@@ -13,7 +13,7 @@ const ENDINGS: [&str; 6] = ["json", "yaml", "yml", "toml", "xml", "txt"];
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct NamedFile {
     /// The file that counts.
-    pub(super) file: StoredFile,
+    pub(super) file: ListedFile,
     /// Names of files of the same ID that it hides.
     pub(super) hidden: Vec<String>,
 }
@@ -24,7 +24,7 @@ pub(super) fn written_name(id: &CalibrationId) -> String {
 }
 
 /// The files that are called `<id>.<ending>`; others are none of ours.
-pub(super) fn by_id(files: Vec<StoredFile>) -> BTreeMap<CalibrationId, NamedFile> {
+pub(super) fn by_id(files: Vec<ListedFile>) -> BTreeMap<CalibrationId, NamedFile> {
     let mut ranked: Vec<_> = files
         .into_iter()
         .filter_map(|file| {
@@ -63,7 +63,7 @@ mod tests {
             ".lobby.json.1-0.lookdown-unfinished",
             "yard.txt",
         ];
-        let files = names.map(|name| StoredFile {
+        let files = names.map(|name| ListedFile {
             name: name.to_owned(),
             stamp: String::new(),
         });

@@ -10,29 +10,16 @@ use std::{
 use lookdown_lens::calibration::{CalibrationId, native::NativeCalibration};
 
 use super::{CalibrationEntry, Reading, content::import, named_file::written_name};
+use crate::samples::SAMPLES;
 
-/// The native files of the samples.
-const FILES: [&str; 3] = [
-    include_str!(concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/samples/calibrations/canteen.json"
-    )),
-    include_str!(concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/samples/calibrations/lounge.json"
-    )),
-    include_str!(concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/samples/calibrations/office.json"
-    )),
-];
-
-static SAMPLES: LazyLock<HashMap<CalibrationId, Arc<CalibrationEntry>>> =
-    LazyLock::new(|| FILES.iter().filter_map(|file| read(file)).collect());
+static ENTRIES: LazyLock<HashMap<CalibrationId, Arc<CalibrationEntry>>> = LazyLock::new(|| {
+    let files = SAMPLES.iter().map(|sample| sample.calibration);
+    files.filter_map(read).collect()
+});
 
 /// Returns the calibration of the sample frame `id`, such as `sample-office`.
 pub(super) fn sample(id: &CalibrationId) -> Option<&'static Arc<CalibrationEntry>> {
-    SAMPLES.get(id)
+    ENTRIES.get(id)
 }
 
 fn read(file: &str) -> Option<(CalibrationId, Arc<CalibrationEntry>)> {
@@ -50,7 +37,7 @@ mod tests {
 
     #[test]
     fn each_sample_has_its_calibration() {
-        for name in ["canteen", "lounge", "office"] {
+        for name in crate::samples::NAMES {
             let id: CalibrationId = format!("sample-{name}").parse().unwrap();
             let entry = sample(&id).unwrap();
             assert_eq!(entry.calibration.id(), &id);

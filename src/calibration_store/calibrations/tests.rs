@@ -7,7 +7,7 @@ use std::{
 };
 
 use super::*;
-use crate::calibration_store::{FolderStore, Replaces, StoredFile};
+use crate::calibration_store::{FolderStore, ListedFile, Replaces};
 
 fn content(id: &str, focal: f64) -> String {
     format!(
@@ -158,9 +158,9 @@ fn an_unreadable_file_is_retried_and_reported_once() {
         fn place(&self) -> String {
             "liar".to_owned()
         }
-        fn list(&self) -> Result<Vec<StoredFile>, StoreError> {
+        fn list(&self) -> Result<Vec<ListedFile>, StoreError> {
             let (name, stamp) = ("lobby.json".to_owned(), "1".to_owned());
-            Ok(vec![StoredFile { name, stamp }])
+            Ok(vec![ListedFile { name, stamp }])
         }
         fn read(&self, _: &[&str], _: usize) -> Vec<Result<Vec<u8>, StoreError>> {
             let (place, problem) = (self.place(), "it is gone".to_owned());
@@ -189,7 +189,7 @@ fn a_change_that_cannot_be_looked_at_is_not_said_to_have_failed() {
         fn place(&self) -> String {
             "mute".to_owned()
         }
-        fn list(&self) -> Result<Vec<StoredFile>, StoreError> {
+        fn list(&self) -> Result<Vec<ListedFile>, StoreError> {
             if self.0.load(Ordering::Relaxed) {
                 let (place, problem) = (self.place(), "it is silent".to_owned());
                 return Err(StoreError::Unreachable { place, problem });

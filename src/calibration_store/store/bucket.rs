@@ -16,7 +16,7 @@ use object_store::{
 use url::Url;
 
 use self::{background::Background, connection::Objects};
-use super::{CalibrationStore, MAX_FILES, Replaces, StoreError, StoredFile};
+use super::{CalibrationStore, ListedFile, MAX_FILES, Replaces, StoreError};
 
 /// Most pages of a listing: some may hold nothing but deeper levels.
 const MAX_PAGES: usize = 500;
@@ -83,7 +83,7 @@ impl CalibrationStore for BucketStore {
         self.place.clone()
     }
 
-    fn list(&self) -> Result<Vec<StoredFile>, StoreError> {
+    fn list(&self) -> Result<Vec<ListedFile>, StoreError> {
         let found = self.wait(list(Arc::clone(&self.objects), self.level.clone()))?;
         if found.len() > MAX_FILES {
             return Err(StoreError::Failed {
@@ -95,7 +95,7 @@ impl CalibrationStore for BucketStore {
             // One level only; the level itself may be an object, too.
             let mut below = object.location.prefix_match(&self.level)?;
             let (name, deeper) = (below.next()?, below.next());
-            deeper.is_none().then(|| StoredFile {
+            deeper.is_none().then(|| ListedFile {
                 name: name.as_ref().to_owned(),
                 stamp: stamp(object),
             })

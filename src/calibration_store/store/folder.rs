@@ -12,7 +12,7 @@ use std::{
 use lookdown_common::files;
 use uuid::Uuid;
 
-use super::{CalibrationStore, MAX_FILES, Replaces, StoreError, StoredFile};
+use super::{CalibrationStore, ListedFile, MAX_FILES, Replaces, StoreError};
 
 /// Files with this ending were about to take another's place when their writer was killed.
 const UNFINISHED: &str = "lookdown-unfinished";
@@ -101,7 +101,7 @@ impl CalibrationStore for FolderStore {
         self.path.display().to_string()
     }
 
-    fn list(&self) -> Result<Vec<StoredFile>, StoreError> {
+    fn list(&self) -> Result<Vec<ListedFile>, StoreError> {
         let entries = match fs::read_dir(&self.path) {
             Err(error) if self.may_be_missing && error.kind() == ErrorKind::NotFound => {
                 return Ok(Vec::new());
@@ -118,7 +118,7 @@ impl CalibrationStore for FolderStore {
             // A link to nothing, as while files are being replaced, is not a file.
             if let (Ok(name), Some(stamp)) = (entry.file_name().into_string(), stamp(&entry.path()))
             {
-                files.push(StoredFile { name, stamp });
+                files.push(ListedFile { name, stamp });
             }
         }
         Ok(files)

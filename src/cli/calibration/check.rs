@@ -140,7 +140,7 @@ fn sourced((name, source): (&String, &NativeSource)) -> (&'static str, String) {
 /// Describes the rim of the lens image, and its position in the frame.
 fn circle(lens: &Lens, width: u32, height: u32) -> String {
     const AZIMUTHS: u32 = 72;
-    let centre = lens.principal_point();
+    let center = lens.principal_point();
     let rim: Vec<Pixel> = (0..AZIMUTHS)
         .filter_map(|step| {
             let azimuth = std::f64::consts::TAU * f64::from(step) / f64::from(AZIMUTHS);
@@ -148,7 +148,7 @@ fn circle(lens: &Lens, width: u32, height: u32) -> String {
             lens.project_to_rim(&Ray::new(sin * azimuth.cos(), sin * azimuth.sin(), cos))
         })
         .collect();
-    let radii = rim.iter().map(|pixel| (pixel - centre).norm());
+    let radii = rim.iter().map(|pixel| (pixel - center).norm());
     let (least, most) = radii.fold((f64::INFINITY, 0.0_f64), |(least, most), radius| {
         (least.min(radius), most.max(radius))
     });
@@ -167,7 +167,7 @@ fn circle(lens: &Lens, width: u32, height: u32) -> String {
     };
     format!(
         "center {:.1}, {:.1}; radius {radius} pixels, {held}",
-        centre.x, centre.y
+        center.x, center.y
     )
 }
 

@@ -4,7 +4,7 @@ use std::{path::PathBuf, process::ExitCode};
 
 use anyhow::Context;
 use clap::Args;
-use lookdown_lens::calibration::{export::Target, native::NativeImage};
+use lookdown_lens::calibration::export::Target;
 
 use super::{native_output::write_content, source::Source};
 use crate::cli::parameters::one_of;
@@ -29,19 +29,10 @@ pub(in super::super) struct Arguments {
 /// error.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let path = arguments.source.file.display();
-    let (_, camera) = arguments.source.read_one()?;
-    let calibration = camera.checked.with_context(|| path.to_string())?;
-    let stated = camera.stated.camera.with_context(|| path.to_string())?;
-    let (width, height) = calibration.image_size();
-    let id = match &arguments.id {
-        Some(id) => id
-            .parse::<lookdown_lens::calibration::CalibrationId>()
-            .context("--id")?,
-        None => calibration.id().clone(),
-    };
-    let native = stated.to_native(id.to_string(), NativeImage { width, height });
+    let id = arguments.id.as_deref().map(str::parse).transpose();
+    let (native, notes) = arguments.source.read_native(id.context("--id")?)?;
     let exported = arguments.to.write(&native)?;
-    let notes = stated.notes.iter().map(ToString::to_string);
+    let notes = notes.iter().map(ToString::to_string);
     for note in notes.chain(exported.lost) {
         eprintln!("lookdown: {path}: {note}");
     }

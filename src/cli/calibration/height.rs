@@ -4,7 +4,6 @@ use std::{path::PathBuf, process::ExitCode};
 
 use anyhow::Context;
 use clap::Args;
-use lookdown_lens::calibration::native::NativeImage;
 
 use super::{
     frame_file::read_frames, native_output::write_native, people::set_height, source::Source,
@@ -29,12 +28,7 @@ pub(in super::super) struct Arguments {
 /// Writes the calibration with the height of the camera.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let path = arguments.source.file.display();
-    let (_, camera) = arguments.source.read_one()?;
-    let calibration = camera.checked.with_context(|| path.to_string())?;
-    let stated = camera.stated.camera.with_context(|| path.to_string())?;
-    let (width, height) = calibration.image_size();
-    let id = calibration.id().to_string();
-    let mut native = stated.to_native(id, NativeImage { width, height });
+    let (mut native, _) = arguments.source.read_native(None)?;
     let (_, frames) = read_frames(&arguments.frames)?;
     set_height(&mut native, &frames, &arguments.settings_file).with_context(|| path.to_string())?;
     write_native(&native, arguments.out.as_deref())?;

@@ -4,11 +4,14 @@ use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use clap::Args;
-use lookdown_lens::calibration::{
-    Calibration, CalibrationFile, FormatError,
-    formats::{FileCamera, Format},
-    native::NativeImage,
-    read_content,
+use lookdown_lens::{
+    calibration::{
+        Calibration, CalibrationFile, CalibrationId, FormatError,
+        formats::{FileCamera, Format},
+        native::{NativeCalibration, NativeImage},
+        read_content,
+    },
+    warning::Warning,
 };
 
 use crate::calibration_store::defaults;
@@ -93,6 +96,22 @@ impl Source {
                 )
             }
         }
+    }
+
+    /// Reads the only camera of the file, or the requested one, as the content of a native file with
+    /// this ID or its own one. Returns the notes of the reader, too.
+    pub(super) fn read_native(
+        &self,
+        id: Option<CalibrationId>,
+    ) -> anyhow::Result<(NativeCalibration, Vec<Warning>)> {
+        let path = self.file.display();
+        let (_, camera) = self.read_one()?;
+        let calibration = camera.checked.with_context(|| path.to_string())?;
+        let stated = camera.stated.camera.with_context(|| path.to_string())?;
+        let (width, height) = calibration.image_size();
+        let id = id.as_ref().unwrap_or(calibration.id()).to_string();
+        let native = stated.to_native(id, NativeImage { width, height });
+        Ok((native, stated.notes))
     }
 }
 

@@ -11,10 +11,9 @@ use clap::Args;
 use lookdown_common::{ServerClient, read_body};
 use serde::Deserialize;
 use serde_json::json;
-use tokio::runtime;
 
 use super::walked_area::{HeatMap, walked_area};
-use crate::cli::{output::UNWRITABLE, server_flags::ServerFlags};
+use crate::cli::{async_runtime::of_this_thread, output::UNWRITABLE, server_flags::ServerFlags};
 
 /// Longest time for the heat map.
 const TIMEOUT: Duration = Duration::from_secs(30);
@@ -44,10 +43,7 @@ struct Answer {
 
 /// Prints the field `areas` of a calibration.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
-    let runtime = runtime::Builder::new_current_thread()
-        .enable_all()
-        .build()
-        .context("the operating system gives no runtime")?;
+    let runtime = of_this_thread()?;
     let heat_map = runtime.block_on(heat_map(arguments))?;
     let Some(corners) = walked_area(&heat_map) else {
         bail!(

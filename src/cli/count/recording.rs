@@ -22,7 +22,7 @@ use lookdown_detect::{
 };
 use lookdown_lens::calibration::{Calibration, CalibrationId};
 use lookdown_watch::{VideoFrames, VideoOptions, VideoWriter, video_created_at, video_duration};
-use tokio::runtime::{self, Runtime};
+use tokio::runtime::Runtime;
 
 use crate::{
     annotated_image::AnnotationOptions,
@@ -30,6 +30,7 @@ use crate::{
     app::{engine_for, open_calibrations},
     cli::{
         SettingsFile, annotate,
+        async_runtime::of_this_thread,
         detect::stream::{interval, is_video},
         output::UNWRITABLE,
         parameters::ParameterFlags,
@@ -129,10 +130,7 @@ pub(super) fn run(
         (None, Some(id), _) => id.to_owned(),
         (None, None, files) => files.first().map(|file| stem(file)).unwrap_or_default(),
     };
-    let runtime = runtime::Builder::new_current_thread()
-        .enable_all()
-        .build()
-        .context("the operating system creates no thread")?;
+    let runtime = of_this_thread()?;
     let clips = clips(files, flags.start, &runtime)?;
     let (Some(first), Some(last)) = (clips.first(), clips.last()) else {
         bail!("there is no recording: give a video such as clip.mp4");

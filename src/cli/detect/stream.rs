@@ -10,9 +10,9 @@ use anyhow::{Context, bail};
 use bytes::Bytes;
 use lookdown_common::parse_duration;
 use lookdown_watch::{ImageReader, VideoFrames, VideoOptions, VideoWriter, video_duration};
-use tokio::runtime::{self, Runtime};
+use tokio::runtime::Runtime;
 
-use crate::cli::progress::Progress;
+use crate::cli::{async_runtime::of_this_thread, progress::Progress};
 
 /// Endings of video files, in lower case.
 const ENDINGS: [&str; 10] = [
@@ -105,10 +105,7 @@ impl StreamReader {
     /// # Errors
     /// Returns an error if `ffmpeg` is missing.
     pub(super) fn open(stream: &Stream, every: Option<Duration>) -> anyhow::Result<Self> {
-        let runtime = runtime::Builder::new_current_thread()
-            .enable_all()
-            .build()
-            .context("the operating system creates no thread")?;
+        let runtime = of_this_thread()?;
         let name = stream.name();
         let options = VideoOptions::default();
         let every = every.unwrap_or(DEFAULT_EVERY);

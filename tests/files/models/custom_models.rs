@@ -8,12 +8,12 @@ use lookdown_detect::{
 use crate::models::folder::{fixture, library, load, options};
 
 /// Runs the detector on views of one color each.
-fn detect(detector: &mut OnnxDetector, colours: &[[u8; 3]]) -> HeadOutput {
+fn detect(detector: &mut OnnxDetector, colors: &[[u8; 3]]) -> HeadOutput {
     let input: NetworkInput = detector.input().clone();
     let mut batch = ViewBatch::default();
-    let views = batch.prepare(colours.len(), &input);
-    for (slot, colour) in views.zip(colours) {
-        let pixels = colour.repeat((input.width * input.height) as usize);
+    let views = batch.prepare(colors.len(), &input);
+    for (slot, color) in views.zip(colors) {
+        let pixels = color.repeat((input.width * input.height) as usize);
         let frame = Frame::new(input.width, input.height, pixels).unwrap();
         Letterbox::new(input.width, input.height, &input).render(&frame, &input, slot);
     }
@@ -61,15 +61,12 @@ fn planes_and_scaling_follow_the_manifest() {
 
 #[test]
 fn a_model_with_a_fixed_batch_gets_all_views() {
-    let colours = [RED, DARK_RED, BLUE, RED, DARK_RED];
+    let colors = [RED, DARK_RED, BLUE, RED, DARK_RED];
     let mut pairs = load("pairs", "").unwrap();
-    assert_eq!(scores(&detect(&mut pairs, &colours)), [100, 40, 0, 100, 40]);
+    assert_eq!(scores(&detect(&mut pairs, &colors)), [100, 40, 0, 100, 40]);
     assert_eq!(pairs.description().views_per_run.unwrap().get(), 2);
     let mut threes = load("any_batch", "[input]\nbatch = 3").unwrap();
-    assert_eq!(
-        scores(&detect(&mut threes, &colours)),
-        [100, 40, 0, 100, 40]
-    );
+    assert_eq!(scores(&detect(&mut threes, &colors)), [100, 40, 0, 100, 40]);
     assert!(detect(&mut threes, &[]).per_view.is_empty());
 }
 

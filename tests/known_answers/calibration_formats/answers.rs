@@ -103,7 +103,7 @@ const FILES: [(&str, usize, &str, &str); 33] = [
 ];
 
 #[test]
-fn every_file_is_recognised_and_projects_as_its_camera() {
+fn every_file_is_recognized_and_projects_as_its_camera() {
     for (file, index, format, vector) in FILES {
         let content = fixture(&format!("calibrations/{file}"));
         let found = CalibrationFile::parse(&content).unwrap();

@@ -31,7 +31,7 @@ fn assert_projects(content: &str, set: &Value, tolerance: f64, convention: Pixel
             continue;
         };
         let projected = match convention {
-            PixelConvention::PixelCentre => projected,
+            PixelConvention::PixelCenter => projected,
             PixelConvention::CornerOrigin => cross_half_pixel(projected, convention),
         };
         let off = (projected - Pixel::new(u, v)).norm();
@@ -69,7 +69,7 @@ fn opencv_fisheye() {
             matrix(&set),
             numbers(&set["D"])
         );
-        assert_projects(&content, &set, 1e-6, PixelConvention::PixelCentre);
+        assert_projects(&content, &set, 1e-6, PixelConvention::PixelCenter);
     }
 }
 
@@ -85,7 +85,7 @@ fn ros_fisheye_is_the_same_lens() {
         matrix(&set),
         numbers(&set["D"])
     );
-    assert_projects(&content, &set, 1e-6, PixelConvention::PixelCentre);
+    assert_projects(&content, &set, 1e-6, PixelConvention::PixelCenter);
 }
 
 #[test]
@@ -98,7 +98,7 @@ fn kalibr_pinhole_equidistant() {
         numbers(&set["D"]),
         set["size"]
     );
-    assert_projects(&content, &set, 1e-6, PixelConvention::PixelCentre);
+    assert_projects(&content, &set, 1e-6, PixelConvention::PixelCenter);
 }
 
 #[test]
@@ -112,7 +112,7 @@ fn kalibr_omni() {
         set["xi"],
         set["size"]
     );
-    assert_projects(&content, &set, 1e-6, PixelConvention::PixelCentre);
+    assert_projects(&content, &set, 1e-6, PixelConvention::PixelCenter);
 }
 
 #[test]
@@ -132,7 +132,7 @@ fn camodocal_mei() {
         set["D"][2],
         set["D"][3]
     );
-    assert_projects(&content, &set, 1e-6, PixelConvention::PixelCentre);
+    assert_projects(&content, &set, 1e-6, PixelConvention::PixelCenter);
 }
 
 #[test]
@@ -213,7 +213,7 @@ fn basalt_double_sphere() {
             "resolution": [[512, 512]]}}}}"#,
         set["params"]
     );
-    assert_projects(&content, &set, 1e-6, PixelConvention::PixelCentre);
+    assert_projects(&content, &set, 1e-6, PixelConvention::PixelCenter);
 }
 
 #[test]

@@ -10,11 +10,11 @@ use lookdown_detect::imaging::{
 };
 use proptest::prelude::*;
 
-const GREY: [u8; 3] = [90, 90, 90];
+const GRAY: [u8; 3] = [90, 90, 90];
 
-fn grey_frame(width: u32, height: u32) -> Frame {
+fn gray_frame(width: u32, height: u32) -> Frame {
     let length = 3 * width as usize * height as usize;
-    Frame::new(width, height, vec![GREY[0]; length]).unwrap()
+    Frame::new(width, height, vec![GRAY[0]; length]).unwrap()
 }
 
 fn aligned(bbox: [f64; 4]) -> Mark {
@@ -27,23 +27,23 @@ fn aligned(bbox: [f64; 4]) -> Mark {
 }
 
 fn annotated(width: u32, height: u32, marks: &[Mark]) -> Frame {
-    let mut frame = grey_frame(width, height);
+    let mut frame = gray_frame(width, height);
     annotate(&mut frame, &Drawing::of(marks.to_vec()));
     frame
 }
 
 fn is_painted(frame: &Frame, x: u32, y: u32) -> bool {
-    frame.pixel(x, y) != GREY
+    frame.pixel(x, y) != GRAY
 }
 
 fn painted_count(frame: &Frame) -> usize {
     let pixels = frame.pixels().chunks_exact(3);
-    pixels.filter(|pixel| *pixel != GREY).count()
+    pixels.filter(|pixel| *pixel != GRAY).count()
 }
 
 #[test]
 fn no_marks_leave_the_frame_as_it_was() {
-    assert_eq!(annotated(60, 40, &[]), grey_frame(60, 40));
+    assert_eq!(annotated(60, 40, &[]), gray_frame(60, 40));
 }
 
 #[test]
@@ -90,7 +90,7 @@ fn drawing_stops_at_the_next_mark_when_cancelled() {
         asked.set(asked.get() + 1);
         asked.get() > 3
     };
-    let mut frame = grey_frame(400, 400);
+    let mut frame = gray_frame(400, 400);
     let drawing = Drawing::of(vec![aligned([50.0, 50.0, 90.0, 90.0]); 900]);
     let outcome = annotate_unless(&mut frame, &drawing, &is_cancelled);
     assert_eq!(outcome, Err(Cancelled));
@@ -110,7 +110,7 @@ fn only_the_boxes_that_are_asked_for_are_outlined() {
         ..aligned([40.0, 40.0, 160.0, 160.0])
     };
     for (boxes, oriented) in [(true, true), (true, false), (false, true), (false, false)] {
-        let mut frame = grey_frame(200, 200);
+        let mut frame = gray_frame(200, 200);
         let drawing = Drawing {
             boxes,
             oriented,
@@ -148,7 +148,7 @@ fn an_outline_stands_out_from_bright_and_from_dark_floors() {
 
 #[test]
 fn lines_are_drawn_below_the_marks() {
-    let mut frame = grey_frame(200, 200);
+    let mut frame = gray_frame(200, 200);
     let drawing = Drawing {
         lines: vec![
             vec![[10.5, 30.5], [190.5, 30.5], [190.5, 180.5]],
@@ -201,23 +201,23 @@ fn lines_and_text_grow_with_the_frame() {
 
 /// The rectangle painted by a label, apart from its box: left, top, right, bottom, in whole pixels.
 fn painted_by_label(width: u32, height: u32, mark: &Mark) -> [u32; 4] {
-    let labelled = annotated(width, height, std::slice::from_ref(mark));
+    let labeled = annotated(width, height, std::slice::from_ref(mark));
     let bare = Mark {
         label: String::new(),
         ..mark.clone()
     };
     let without = annotated(width, height, &[bare]);
     let row_bytes = 3 * width as usize;
-    let rows = labelled
+    let rows = labeled
         .pixels()
         .chunks_exact(row_bytes)
         .zip(without.pixels().chunks_exact(row_bytes));
     let mut painted = [u32::MAX, u32::MAX, 0, 0];
     for (y, _) in (0..height)
         .zip(rows)
-        .filter(|(_, (labelled, without))| labelled != without)
+        .filter(|(_, (labeled, without))| labeled != without)
     {
-        for x in (0..width).filter(|&x| labelled.pixel(x, y) != without.pixel(x, y)) {
+        for x in (0..width).filter(|&x| labeled.pixel(x, y) != without.pixel(x, y)) {
             let [left, top, right, bottom] = painted;
             painted = [left.min(x), top.min(y), right.max(x + 1), bottom.max(y + 1)];
         }
@@ -270,7 +270,7 @@ fn a_label_keeps_clear_of_heads() {
         cy: 95.0,
         radius: 40.0,
     };
-    let neighbour = Mark {
+    let neighbor = Mark {
         head: Some(head),
         ..aligned([160.0, 40.0, 240.0, 148.0])
     };
@@ -282,8 +282,8 @@ fn a_label_keeps_clear_of_heads() {
         label: String::new(),
         ..own.clone()
     };
-    let with = annotated(400, 400, &[neighbour.clone(), own]);
-    let without = annotated(400, 400, &[neighbour, bare]);
+    let with = annotated(400, 400, &[neighbor.clone(), own]);
+    let without = annotated(400, 400, &[neighbor, bare]);
     let changed = (0..150).flat_map(|y| (0..400).map(move |x| (x, y)));
     let changed = changed.filter(|&(x, y)| with.pixel(x, y) != without.pixel(x, y));
     assert_eq!(changed.count(), 0);
@@ -294,7 +294,7 @@ fn a_label_keeps_clear_of_heads() {
 fn a_caption_is_complete_and_labels_keep_clear_of_it() {
     let caption = "2026-11-21 09:30:00 UTC";
     for (width, height) in [(64, 64), (300, 300), (2000, 1000)] {
-        let mut frame = grey_frame(width, height);
+        let mut frame = gray_frame(width, height);
         let drawing = Drawing {
             caption: caption.to_owned(),
             ..Drawing::of(Vec::new())
@@ -309,7 +309,7 @@ fn a_caption_is_complete_and_labels_keep_clear_of_it() {
 }
 
 #[test]
-fn labels_of_neighbours_do_not_cover_each_other() {
+fn labels_of_neighbors_do_not_cover_each_other() {
     let mark = || Mark {
         label: "0.87".into(),
         ..aligned([150.0, 120.0, 220.0, 180.0])
@@ -335,7 +335,7 @@ fn a_mark_that_is_not_finite_is_left_out() {
             label: label.clone(),
             ..aligned([10.0, 10.0, bad, 30.0])
         };
-        assert_eq!(annotated(60, 40, &[mark]), grey_frame(60, 40));
+        assert_eq!(annotated(60, 40, &[mark]), gray_frame(60, 40));
     }
 }
 
@@ -354,7 +354,7 @@ fn png_keeps_every_pixel_and_jpeg_comes_close() {
 
 #[test]
 fn a_frame_too_long_for_jpeg_is_a_clear_error() {
-    let error = encode_jpeg(&grey_frame(70_000, 1), 90).unwrap_err();
+    let error = encode_jpeg(&gray_frame(70_000, 1), 90).unwrap_err();
     assert!(
         error
             .to_string()
@@ -386,7 +386,7 @@ proptest! {
         let mark = Mark { bbox, oriented, head, label };
         let lines = vec![vec![[bbox[0], bbox[1]], [bbox[2], bbox[3]]]];
         let drawing = Drawing { lines, caption, ..Drawing::of(vec![mark]) };
-        let mut frame = grey_frame(width, height);
+        let mut frame = gray_frame(width, height);
         annotate(&mut frame, &drawing);
         prop_assert_eq!((frame.width(), frame.height()), (width, height));
     }

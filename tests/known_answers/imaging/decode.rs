@@ -62,13 +62,13 @@ fn assert_close(name: &str, actual: [u8; 3], expected: [u8; 3], tolerance: u8) {
 fn assert_shows_the_quarters(name: &str, image: &DecodedFrame, tolerance: u8) {
     let frame = &image.frame;
     assert_eq!((frame.width(), frame.height()), (64, 32), "{name}");
-    for ((x, y), colour) in QUARTERS {
-        assert_close(name, frame.pixel(x, y), colour, tolerance);
+    for ((x, y), color) in QUARTERS {
+        assert_close(name, frame.pixel(x, y), color, tolerance);
     }
 }
 
 #[test]
-fn every_colour_format_decodes_to_the_same_image() {
+fn every_color_format_decodes_to_the_same_image() {
     for name in [
         "rgb.png",
         "rgb_16_bit.png",
@@ -103,7 +103,7 @@ fn png_and_webp_orientations_are_honoured_too() {
 }
 
 #[test]
-fn grey_images_become_rgb_and_sixteen_bits_become_eight() {
+fn gray_images_become_rgb_and_sixteen_bits_become_eight() {
     for (name, tolerance) in [("grey.png", 0), ("grey.jpg", 4), ("grey_16_bit.png", 1)] {
         let image = decoded(name);
         for x in [0, 20, 63] {
@@ -234,7 +234,7 @@ fn the_format_is_detected_from_content_and_others_are_named() {
 }
 
 #[test]
-fn a_truncated_file_is_an_error_and_never_grey_rows() {
+fn a_truncated_file_is_an_error_and_never_gray_rows() {
     for name in IMAGES {
         let bytes = fixture(name);
         for length in 0..bytes.len() {

@@ -69,7 +69,7 @@ impl Room {
     }
 }
 
-fn paint(width: u32, height: u32, mut colour: impl FnMut(f64, f64) -> [f64; 3]) -> Frame {
+fn paint(width: u32, height: u32, mut color: impl FnMut(f64, f64) -> [f64; 3]) -> Frame {
     let mut pixels = Vec::new();
     for y in 0..height {
         for x in 0..width {
@@ -79,7 +79,7 @@ fn paint(width: u32, height: u32, mut colour: impl FnMut(f64, f64) -> [f64; 3]) 
                 clippy::cast_sign_loss,
                 reason = "saturation is intended"
             )]
-            pixels.extend(colour(f64::from(x), f64::from(y)).map(|value| value as u8));
+            pixels.extend(color(f64::from(x), f64::from(y)).map(|value| value as u8));
         }
     }
     Frame::new(width, height, pixels).unwrap()
@@ -152,7 +152,7 @@ fn a_dark_quarter_of_the_room_does_not_move_the_circle() {
 }
 
 #[test]
-fn a_dim_room_on_a_grey_noisy_surround_is_found() {
+fn a_dim_room_on_a_gray_noisy_surround_is_found() {
     let room = Room {
         light: 40.0,
         surround: 30.0,
@@ -217,7 +217,7 @@ fn a_lamp_or_a_table_in_the_dark_is_no_lens() {
 }
 
 #[test]
-fn a_frame_of_one_colour_has_no_circle() {
+fn a_frame_of_one_color_has_no_circle() {
     for value in [0.0, 60.0, 255.0] {
         assert_eq!(find_lens_circle(&paint(320, 240, |_, _| [value; 3])), None);
     }

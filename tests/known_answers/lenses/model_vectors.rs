@@ -80,14 +80,14 @@ fn lens_fields(fixture: &Value) -> Value {
             "cx": params["yc"], "cy": params["xc"],
         }),
         "ftheta" => {
-            let centre = numbers(&params["principal_point"]);
+            let center = numbers(&params["principal_point"]);
             let affine = numbers(&params["linear_cde"]);
             json!({
                 "model": "f_theta",
                 "angle_to_pixel": params["angle_to_pixeldist_poly"],
                 "pixel_to_angle": params["pixeldist_to_angle_poly"],
                 "c": affine[0], "d": affine[1], "e": affine[2],
-                "cx": centre[0], "cy": centre[1],
+                "cx": center[0], "cy": center[1],
                 "max_theta": params["max_angle"],
             })
         }

@@ -73,10 +73,10 @@ fn along_the_axis(set: &Value) -> Vec<(Ray, Option<Pixel>)> {
     let Some(radii) = set["alpha_deg_to_r_px"].as_object() else {
         return Vec::new();
     };
-    let centre = pixel(&set["center"]);
+    let center = pixel(&set["center"]);
     let cases = radii.iter().map(|(degrees, radius)| {
         let (sin, cos) = degrees.parse::<f64>().unwrap().to_radians().sin_cos();
-        let expected = Pixel::new(centre.x, centre.y + radius.as_f64().unwrap());
+        let expected = Pixel::new(center.x, center.y + radius.as_f64().unwrap());
         (Ray::new(0.0, sin, cos), Some(expected))
     });
     cases.collect()

@@ -53,9 +53,9 @@ pageTest("the marks are at the positions of the report", "#detect", async (page)
   );
   const scale = Math.min(picture.width, picture.height) / 960;
   const at = (box, side, start) => box[start] + box[side] / 2;
-  const fromCentre = (value) => (value - 480) * scale;
-  assert.ok(Math.abs(at(badge, "width", "x") - at(picture, "width", "x") - fromCentre(first.oriented_box.cx)) < 1);
-  assert.ok(Math.abs(at(badge, "height", "y") - at(picture, "height", "y") - fromCentre(first.oriented_box.cy)) < 1);
+  const fromCenter = (value) => (value - 480) * scale;
+  assert.ok(Math.abs(at(badge, "width", "x") - at(picture, "width", "x") - fromCenter(first.oriented_box.cx)) < 1);
+  assert.ok(Math.abs(at(badge, "height", "y") - at(picture, "height", "y") - fromCenter(first.oriented_box.cy)) < 1);
 });
 
 pageTest("a frame is dropped, pasted or opened", "#detect", async (page) => {

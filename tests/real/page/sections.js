@@ -39,12 +39,12 @@ for (const [lens, what] of [["", "a lens that was assumed"], ["office", "a calib
     await tiles.nth(2).click();
     await page.locator("#outlines polygon.chosen").waitFor();
     assert.equal(await tiles.nth(2).getAttribute("aria-pressed"), "true");
-    assert.ok((await colours(page, ".tile canvas")) > 200);
+    assert.ok((await colors(page, ".tile canvas")) > 200);
   });
 }
 
 /** The number of colors of a canvas, which shows if anything is drawn. */
-const colours = (page, selector) =>
+const colors = (page, selector) =>
   page.locator(selector).first().evaluate((canvas) => {
     const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
     return new Set(new Uint32Array(data.buffer)).size;

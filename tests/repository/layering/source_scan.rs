@@ -136,7 +136,7 @@ pub fn names_crate(code: &str, name: &str) -> bool {
 }
 
 #[test]
-fn the_scan_recognises_all_forms_of_imports() {
+fn the_scan_recognizes_all_forms_of_imports() {
     let found = used_paths(
         "use crate::api; use crate::{\n    cli::{self, run as go},\n    metrics::*,\n};\nlet x = crate::app::f();",
     );

@@ -77,7 +77,7 @@ fn counting_continues_after_a_clock_that_was_ahead() {
     // Each connection takes a second, in which two cameras have five frames each. Their latest
     // reports arrive with the connection.
     assert_eq!(counted, world.sent.len() - 2 * (10 - 2));
-    assert_eq!(world.engine.position_resets(), 1);
+    assert_eq!(world.counter.position_resets(), 1);
 }
 
 #[test]
@@ -97,16 +97,16 @@ fn repeated_and_late_reports_are_shown_as_dropped() {
     world.run(4);
     let (id, number) = *world.server.kept.last().unwrap();
     world.deliver(id, number);
-    let drops = world.engine.drops().of("hall").unwrap();
+    let drops = world.counter.drops().of("hall").unwrap();
     assert_eq!((drops.reports, drops.reason.label()), (1, "repeated"));
     assert_eq!(drops.since_ms, Some(world.true_ms));
 
     world.step(&Step::CameraClock { ahead_ms: -4_000 });
     world.run(1);
-    let drops = world.engine.drops().of("hall").unwrap();
+    let drops = world.counter.drops().of("hall").unwrap();
     assert_eq!((drops.reports, drops.reason.label()), (6, "out_of_order"));
     world.run(10);
-    let drops = world.engine.drops().of("hall").unwrap();
+    let drops = world.counter.drops().of("hall").unwrap();
     assert_eq!(drops.since_ms, None);
 }
 
@@ -121,12 +121,12 @@ fn a_report_of_the_future_changes_no_other_camera() {
     });
     let number = world.capture(0, &[]);
     world.deliver(u64::MAX / 2, number);
-    let snapshot = world.engine.snapshot(present_ms);
+    let snapshot = world.counter.snapshot(present_ms);
     let [gate, hall] = snapshot.cameras.as_slice() else {
         panic!("{snapshot:?}");
     };
     assert!(gate.last_report_ms > present_ms && gate.persons.is_none());
     assert_eq!(hall.persons, Some(1));
-    world.engine.forget_silent(present_ms);
-    assert!(world.engine.scene_of("hall").is_some());
+    world.counter.forget_silent(present_ms);
+    assert!(world.counter.scene_of("hall").is_some());
 }

@@ -195,7 +195,7 @@ fn current_names(api: &Shared, owner: &Owner) -> Names {
     let Owner::Camera(camera) = owner else {
         return Names::default();
     };
-    names(api.engine.lock().definition(camera).as_deref())
+    names(api.counter.lock().definition(camera).as_deref())
 }
 
 fn names(definition: Option<&CameraDefinition>) -> Names {

@@ -31,13 +31,13 @@ pub(super) async fn svg(
 ) -> Result<Response, Problem> {
     let owner = Owner::Site(site.clone());
     check_known(&api, &owner).await?;
-    let engine = api.engine.lock();
-    let Some(scene) = engine.site(&site) else {
+    let counter = api.counter.lock();
+    let Some(scene) = counter.site(&site) else {
         let detail = "the site has no camera now: send frames of its cameras";
         return Err(not_found(detail));
     };
     let last = scene.presence().last_ms;
-    let is_current = last.is_some_and(|last| now_ms() - last <= engine.longest_gap_ms());
+    let is_current = last.is_some_and(|last| now_ms() - last <= counter.longest_gap_ms());
     let content_type = [(CONTENT_TYPE, "image/svg+xml")];
     Ok((content_type, drawn(scene, is_current)).into_response())
 }
@@ -59,7 +59,7 @@ fn drawn(scene: &Scene, is_current: bool) -> String {
             [x + AROUND_CAMERA_M, y + AROUND_CAMERA_M],
         ]
     });
-    let near = |value: f64, centre: f64| value.clamp(centre - MAX_EXTENT_M, centre + MAX_EXTENT_M);
+    let near = |value: f64, center: f64| value.clamp(center - MAX_EXTENT_M, center + MAX_EXTENT_M);
     let (mut least, mut most) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
     for point in around.chain(places) {
         for axis in 0..2 {
@@ -129,12 +129,12 @@ fn drawn(scene: &Scene, is_current: bool) -> String {
 fn polyline<'a>(
     svg: &mut String,
     points: impl Iterator<Item = &'a [f64; 2]>,
-    colour: &str,
+    color: &str,
     width: f64,
 ) {
     svg.push_str("<polyline fill=\"none\" points=\"");
     for [x, y] in points {
         let _ = write!(svg, "{x:.2},{y:.2} ");
     }
-    let _ = write!(svg, "\" stroke=\"{colour}\" stroke-width=\"{width}\"/>");
+    let _ = write!(svg, "\" stroke=\"{color}\" stroke-width=\"{width}\"/>");
 }

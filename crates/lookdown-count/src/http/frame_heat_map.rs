@@ -10,7 +10,7 @@ use lookdown_http::problem::Problem;
 use lookdown_tracking::heat_map::Cell;
 
 use super::{
-    heat_map::{Parameters, colour, image, stored},
+    heat_map::{Parameters, color, image, stored},
     shared::{Shared, blocking, not_found},
     time::TimeParameters,
 };
@@ -34,7 +34,7 @@ pub(super) async fn png(
     parameters: Parameters,
 ) -> Result<Response, Problem> {
     let (_, cells) = stored(&api, Owner::Camera(camera.clone()), parameters).await?;
-    let definition = api.engine.lock().definition(&camera);
+    let definition = api.counter.lock().definition(&camera);
     let Some(definition) = definition.filter(|definition| definition.geometry.is_some()) else {
         let detail = "the camera has no calibration now: send frames with one";
         return Err(not_found(detail));
@@ -67,7 +67,7 @@ fn drawn(cells: &BTreeMap<Cell, u64>, definition: &Arc<CameraDefinition>) -> (Ve
             let middle = [x, y].map(|pixel| (f64::from(pixel) + 0.5) * scale);
             let cell = definition.floor_at(middle).and_then(Cell::of);
             let time = cell.and_then(|cell| cells.get(&cell));
-            pixels.extend(colour(time.copied().map_or(0.0, seconds), most));
+            pixels.extend(color(time.copied().map_or(0.0, seconds), most));
         }
     }
     (pixels, height)

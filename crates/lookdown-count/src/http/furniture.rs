@@ -58,8 +58,8 @@ pub(super) async fn list(
     Path(camera): Path<String>,
 ) -> Result<Json<Vec<Thing>>, Problem> {
     check_known(&api, &Owner::Camera(camera.clone())).await?;
-    let engine = api.engine.lock();
-    let scene = engine.scene_of(&camera);
+    let counter = api.counter.lock();
+    let scene = counter.scene_of(&camera);
     Ok(Json(
         scene.map_or_else(Vec::new, |scene| things(scene, &camera)),
     ))
@@ -109,9 +109,9 @@ fn decide(
     decision: fn(&mut Furniture, u64) -> bool,
 ) -> Result<StatusCode, Problem> {
     let id = thing.parse::<u64>().ok();
-    let mut engine = api.engine.lock();
+    let mut counter = api.counter.lock();
     let decided =
-        id.and_then(|id| engine.change_furniture(camera, |furniture| decision(furniture, id)));
+        id.and_then(|id| counter.change_furniture(camera, |furniture| decision(furniture, id)));
     if decided == Some(true) {
         return Ok(StatusCode::NO_CONTENT);
     }

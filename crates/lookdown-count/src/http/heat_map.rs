@@ -142,8 +142,8 @@ pub(super) async fn stored(
     // A camera of a site shares the floor of the site.
     let owner = match &owner {
         Owner::Camera(camera) => {
-            let engine = api.engine.lock();
-            engine
+            let counter = api.counter.lock();
+            counter
                 .scene_of(camera)
                 .map_or(owner.clone(), |scene| scene.owner.clone())
         }
@@ -206,11 +206,11 @@ fn drawn(map: &HeatMap) -> Result<Response, Problem> {
     let width = columns * CELL_PX;
     for (row, cells) in map.seconds.iter().enumerate() {
         for (column, seconds) in cells.iter().enumerate() {
-            let colour = colour(*seconds, most);
+            let color = color(*seconds, most);
             for y in row * CELL_PX..(row + 1) * CELL_PX {
                 let start = (y * width + column * CELL_PX) * 4;
                 for pixel in pixels[start..start + CELL_PX * 4].chunks_exact_mut(4) {
-                    pixel.copy_from_slice(&colour);
+                    pixel.copy_from_slice(&color);
                 }
             }
         }
@@ -238,7 +238,7 @@ fn encoded(pixels: &[u8], width: usize, height: usize) -> Result<Vec<u8>, png::E
 }
 
 /// Returns the color of a time of presence, with the most of any cell.
-pub(super) fn colour(seconds: f64, most: f64) -> [u8; 4] {
+pub(super) fn color(seconds: f64, most: f64) -> [u8; 4] {
     if seconds <= 0.0 {
         return [0; 4];
     }

@@ -13,24 +13,24 @@ use utoipa::openapi::OpenApi;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::shared::now_ms;
-use crate::{engine::Engine, metrics::Metrics};
+use crate::{counter::Counter, metrics::Metrics};
 
 /// Everything that the routes show.
 #[derive(Clone)]
 pub(super) struct Shown {
-    engine: Arc<Mutex<Engine>>,
+    counter: Arc<Mutex<Counter>>,
     metrics: Arc<Metrics>,
     document: fn() -> OpenApi,
 }
 
 /// Returns the routes for clients with access: the metrics and the OpenAPI document.
 pub(super) fn router(
-    engine: &Arc<Mutex<Engine>>,
+    counter: &Arc<Mutex<Counter>>,
     metrics: &Arc<Metrics>,
     document: fn() -> OpenApi,
 ) -> Router {
     let shown = Shown {
-        engine: Arc::clone(engine),
+        counter: Arc::clone(counter),
         metrics: Arc::clone(metrics),
         document,
     };
@@ -61,7 +61,7 @@ pub(super) fn unprotected() -> OpenApiRouter {
     responses((status = OK, description = "The text format of Prometheus.", body = String, content_type = "text/plain"))
 )]
 async fn metrics(State(shown): State<Shown>) -> Response {
-    let text = shown.metrics.text(&shown.engine.lock(), now_ms());
+    let text = shown.metrics.text(&shown.counter.lock(), now_ms());
     ([(CONTENT_TYPE, "text/plain; version=0.0.4")], text).into_response()
 }
 

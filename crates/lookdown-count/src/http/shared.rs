@@ -9,7 +9,7 @@ use parking_lot::Mutex;
 use tokio::sync::Semaphore;
 
 use crate::{
-    engine::Engine,
+    counter::Counter,
     store::{Store, StoreError},
     sums::Owner,
 };
@@ -21,7 +21,7 @@ static PERMITS: Semaphore = Semaphore::const_new(MAX_CONCURRENT);
 
 /// Everything that requests read.
 pub(crate) struct Api {
-    pub(crate) engine: Arc<Mutex<Engine>>,
+    pub(crate) counter: Arc<Mutex<Counter>>,
     pub(crate) store: Store,
 }
 
@@ -66,8 +66,8 @@ pub(super) fn not_found(detail: impl Into<String>) -> Problem {
 /// Refuses an owner that has neither a scene nor sums.
 pub(super) async fn check_known(api: &Shared, owner: &Owner) -> Result<(), Problem> {
     let is_followed = match owner {
-        Owner::Camera(camera) => api.engine.lock().scene_of(camera).is_some(),
-        Owner::Site(site) => api.engine.lock().site(site).is_some(),
+        Owner::Camera(camera) => api.counter.lock().scene_of(camera).is_some(),
+        Owner::Site(site) => api.counter.lock().site(site).is_some(),
     };
     if is_followed {
         return Ok(());

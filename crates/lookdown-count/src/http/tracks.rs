@@ -17,7 +17,7 @@ use super::{
     shared::{Shared, check_known, now_ms, rounded},
 };
 use crate::{
-    engine::Engine,
+    counter::Counter,
     now::time_of,
     scene::Scene,
     scene_camera::SceneCamera,
@@ -107,10 +107,10 @@ pub(super) async fn of_camera(
     Path(camera): Path<String>,
 ) -> Result<Json<Tracks>, Problem> {
     check_known(&api, &Owner::Camera(camera.clone())).await?;
-    let engine = api.engine.lock();
-    let answer = engine
+    let counter = api.counter.lock();
+    let answer = counter
         .scene_of(&camera)
-        .map(|scene| tracks(&engine, scene, Some(&camera)));
+        .map(|scene| tracks(&counter, scene, Some(&camera)));
     Ok(Json(answer.unwrap_or_else(Tracks::none)))
 }
 
@@ -126,25 +126,27 @@ pub(super) async fn of_site(
     Path(site): Path<String>,
 ) -> Result<Json<Tracks>, Problem> {
     check_known(&api, &Owner::Site(site.clone())).await?;
-    let engine = api.engine.lock();
-    let answer = engine.site(&site).map(|scene| tracks(&engine, scene, None));
+    let counter = api.counter.lock();
+    let answer = counter
+        .site(&site)
+        .map(|scene| tracks(&counter, scene, None));
     Ok(Json(answer.unwrap_or_else(Tracks::none)))
 }
 
-fn tracks(engine: &Engine, scene: &Scene, camera: Option<&str>) -> Tracks {
+fn tracks(counter: &Counter, scene: &Scene, camera: Option<&str>) -> Tracks {
     let of_camera = camera.and_then(|name| scene.camera(name));
     let presence = of_camera.map_or(scene.presence(), |(_, camera)| camera.presence());
     let now_ms = now_ms();
     let is_current = presence
         .last_ms
-        .is_some_and(|last_ms| now_ms - last_ms <= engine.longest_gap_ms());
+        .is_some_and(|last_ms| now_ms - last_ms <= counter.longest_gap_ms());
     let is_site = matches!(scene.owner, Owner::Site(_));
     let seen = scene.tracks().filter(|track| match of_camera {
         Some((index, _)) if is_site => track.last_person().camera == index,
         _ => true,
     });
     let snapshot = camera.and_then(|name| {
-        let mut cameras = engine.snapshot(now_ms).cameras.into_iter();
+        let mut cameras = counter.snapshot(now_ms).cameras.into_iter();
         cameras.find(|camera| camera.name == name)
     });
     let (lines, zones) = snapshot

@@ -13,7 +13,7 @@ fn person(x: f64, y: f64) -> Observation {
         floor_m: Some([x, y]),
         azimuth_deg: y.atan2(x).to_degrees() + 90.0,
         off_axis_deg: x.hypot(y).atan2(3.0).to_degrees(),
-        centre_px: px,
+        center_px: px,
         size_px: [40.0, 80.0],
         foot_px: px,
         score: 0.95,

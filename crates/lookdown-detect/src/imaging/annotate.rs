@@ -46,7 +46,7 @@ pub struct Drawing {
 pub const MOST_MARKS: usize = 1000;
 
 /// Bright enough for dark text, and distinguishable by lightness for most color-blind people.
-const COLOURS: [Rgb; 6] = [
+const COLORS: [Rgb; 6] = [
     [0, 214, 255],
     [255, 200, 30],
     [126, 240, 110],
@@ -115,9 +115,9 @@ pub fn annotate_unless(
     let marks = drawing.marks.iter().take(MOST_MARKS);
     let mut marks: Vec<_> = marks
         .filter(|mark| mark.is_drawable())
-        .zip(COLOURS.into_iter().cycle())
+        .zip(COLORS.into_iter().cycle())
         .collect();
-    for (mark, colour) in &marks {
+    for (mark, color) in &marks {
         if !effort.allows_more()? {
             break;
         }
@@ -132,9 +132,9 @@ pub fn annotate_unless(
         effort.spend(shadow.draw(frame, SHADOW, SHADOW_OPACITY));
         if let (Some(_), Some(aligned)) = (oriented, aligned) {
             let thin = Outline::new(aligned, line_width * 0.4);
-            effort.spend(thin.draw(frame, *colour, THIN_OPACITY));
+            effort.spend(thin.draw(frame, *color, THIN_OPACITY));
         }
-        effort.spend(Outline::new(main, line_width).draw(frame, *colour, 1.0));
+        effort.spend(Outline::new(main, line_width).draw(frame, *color, 1.0));
     }
     let caption = caption::draw(frame, &drawing.caption);
     let names: Vec<_> = drawing.zones.iter().filter_map(ZoneOutline::mark).collect();

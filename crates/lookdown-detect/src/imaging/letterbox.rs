@@ -75,7 +75,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_frame_fills_one_side_and_the_rest_is_grey() {
+    fn the_frame_fills_one_side_and_the_rest_is_gray() {
         let frame = Frame::new(40, 20, vec![200; 40 * 20 * 3]).unwrap();
         let input = NetworkInput::plain(10, 10);
         let letterbox = Letterbox::new(40, 20, &input);

@@ -126,7 +126,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn plain_pixels_are_normalised_in_the_networks_plane_order() {
+    fn plain_pixels_are_normalized_in_the_networks_plane_order() {
         let input = NetworkInput {
             channel_order: ChannelOrder::Bgr,
             scale: [2.0, 1.0, 0.5],

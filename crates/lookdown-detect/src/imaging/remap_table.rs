@@ -153,8 +153,8 @@ impl RemapTable {
     pub fn sees_pixel(&self, counts: impl Fn(u32, u32) -> bool) -> bool {
         let width = self.frame_width as usize;
         self.has_sample(|sample| {
-            let mut neighbours = sample.neighbours(width);
-            neighbours.any(|[x, y]| counts(x, y))
+            let mut neighbors = sample.neighbors(width);
+            neighbors.any(|[x, y]| counts(x, y))
         })
     }
 

@@ -162,7 +162,7 @@ impl ModelManifest {
             }
         }
         self.tuning.check()?;
-        self.input.normalisation().map(drop)
+        self.input.normalization().map(drop)
     }
 }
 

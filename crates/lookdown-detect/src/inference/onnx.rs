@@ -99,7 +99,7 @@ impl OnnxDetector {
         let shapes: Vec<_> = description::float_shapes(&outputs).collect();
         let size = (signature.width, signature.height);
         manifest.output.check(&shapes, size).map_err(unusable)?;
-        let (scale, offset) = manifest.input.normalisation().map_err(unusable)?;
+        let (scale, offset) = manifest.input.normalization().map_err(unusable)?;
         let input = NetworkInput {
             width: signature.width,
             height: signature.height,

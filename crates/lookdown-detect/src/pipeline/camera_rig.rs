@@ -225,7 +225,7 @@ impl CameraRig {
 
     /// Returns true if a position in the frame (corner-origin) can show a person who counts.
     pub(super) fn shows(&self, position: Pixel) -> bool {
-        let pixel = cross_half_pixel(position, PixelConvention::PixelCentre);
+        let pixel = cross_half_pixel(position, PixelConvention::PixelCenter);
         let reach = self.hidden.reach.as_ref();
         self.geometry.lens.unproject(&pixel).is_some()
             && reach.is_none_or(|reach| reach.holds(position))

@@ -11,20 +11,17 @@ use std::sync::{Arc, Weak};
 
 use jiff::{SignedDuration, Timestamp};
 use lookdown_lens::geometry::{crop_placement::CropTarget, oriented_box::vertical_in_frame};
-use moka::{policy::EvictionPolicy, sync::Cache};
 use nalgebra::Point2;
 use parking_lot::Mutex;
 
 use self::target::{SAME_IOU, Target, hull, overlap, targets_of, widened};
-use super::{Person, camera_rig::CameraRig};
+use super::{Person, camera_cache::CameraCache, camera_rig::CameraRig};
 use crate::{
     detection::{BBox, FramePixels, RefinementParameters},
     imaging::{Frame, FrameSignature, MovedCell},
     inference::Model,
 };
 
-/// Maximum number of followed cameras. The least recently used camera is dropped first.
-const MAX_CAMERAS: u64 = 256;
 /// Time from a search to the next one, a little less than a second: frames jitter.
 const SEARCH_EVERY: SignedDuration = SignedDuration::from_millis(900);
 /// Most persons in motion that are followed. With more, every frame is searched.
@@ -40,14 +37,8 @@ const MOST_MOVED: usize = 4;
 const LEAST_SCORE: f64 = 1e-4;
 
 /// The followed persons of each camera.
-pub(super) struct FollowCache(Cache<String, Arc<Mutex<Option<Followed>>>>);
-
-impl Default for FollowCache {
-    fn default() -> Self {
-        let cameras = Cache::builder().max_capacity(MAX_CAMERAS);
-        Self(cameras.eviction_policy(EvictionPolicy::lru()).build())
-    }
-}
+#[derive(Default)]
+pub(super) struct FollowCache(CameraCache<Mutex<Option<Followed>>>);
 
 impl FollowCache {
     /// Compares a frame of a camera, captured at `at`, with those before. While one frame is
@@ -59,7 +50,7 @@ impl FollowCache {
         frame: &Frame,
         at: Timestamp,
     ) -> FollowedFrame {
-        let kept = self.0.get_with_by_ref(camera, Arc::default);
+        let kept = self.0.get_or_renew(camera, Mutex::default, |_| false);
         let before = kept.lock().take();
         let before = before.filter(|before| before.origin.is_same(&origin));
         let signature = FrameSignature::of(frame);

@@ -9,22 +9,20 @@ use std::{
 };
 
 use lookdown_lens::geometry::FrameCrop;
-use moka::{policy::EvictionPolicy, sync::Cache};
 use parking_lot::{Mutex, MutexGuard};
 
-use super::camera_rig::CameraRig;
+use super::{camera_cache::CameraCache, camera_rig::CameraRig};
 use crate::{
     imaging::ViewSignature,
     inference::{Model, ViewDetection},
 };
 
-/// Maximum number of cached cameras. The least recently used camera is evicted first.
-const MAX_CAMERAS: u64 = 256;
 /// Maximum age of cached detections, with or without motion.
 const MAX_AGE: Duration = Duration::from_secs(10);
 
 /// The latest detections of each camera.
-pub(super) struct MotionCache(Cache<String, Arc<CachedCamera>>);
+#[derive(Default)]
+pub(super) struct MotionCache(CameraCache<CachedCamera>);
 
 struct CachedCamera {
     views: Arc<CameraViews>,
@@ -52,13 +50,6 @@ struct CachedView {
     inferred_at: Instant,
 }
 
-impl Default for MotionCache {
-    fn default() -> Self {
-        let cameras = Cache::builder().max_capacity(MAX_CAMERAS);
-        Self(cameras.eviction_policy(EvictionPolicy::lru()).build())
-    }
-}
-
 impl MotionCache {
     /// Returns the cached views of a camera. They are empty if the camera is new or if its rig or
     /// its model has changed.
@@ -72,12 +63,9 @@ impl MotionCache {
             views: CameraViews::new(rig, model, vec![None; rig.view_count()]),
             crops: Mutex::default(),
         };
-        let entry = self.0.entry_by_ref(camera);
-        let entry = entry.or_insert_with_if(
-            || Arc::new(no_views()),
-            |known| !known.views.are_of(rig, model),
-        );
-        Arc::clone(&entry.value().views)
+        let is_stale = |known: &CachedCamera| !known.views.are_of(rig, model);
+        let entry = self.0.get_or_renew(camera, no_views, is_stale);
+        Arc::clone(&entry.views)
     }
 
     /// Returns the cached crops of a camera, filled where the last second pass had the same crop.

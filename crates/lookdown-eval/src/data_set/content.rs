@@ -138,7 +138,7 @@ impl DataSetImage {
             return Some((from_center / (width.min(height) / 2.0)).min(1.0) * 90.0);
         };
         let camera = calibration.for_frame(width, height).ok()?;
-        let pixel = cross_half_pixel([x, y].into(), PixelConvention::PixelCentre);
+        let pixel = cross_half_pixel([x, y].into(), PixelConvention::PixelCenter);
         Some(off_axis(&camera.lens, &pixel).to_degrees())
     }
 }

@@ -22,7 +22,7 @@ pub enum DataSetError {
         "{path}: holds no data set in a known format; expected annotations.json, \
          annotations/*.json, *.json, *.xml or Ground_Truth_Annotations/groundTruth_*.csv"
     )]
-    Unrecognised {
+    Unrecognized {
         /// The path given.
         path: PathBuf,
     },

@@ -29,7 +29,7 @@ fn a_folder_of_other_files_is_refused() {
         "{message}"
     );
     let file = DataSet::open(&folder.path().join("readme.txt"));
-    assert!(matches!(file, Err(DataSetError::Unrecognised { .. })));
+    assert!(matches!(file, Err(DataSetError::Unrecognized { .. })));
     let nowhere = DataSet::open(Path::new("/nowhere"))
         .unwrap_err()
         .to_string();
@@ -78,7 +78,7 @@ fn rotated_truth_can_be_scored_as_bounds_of_ellipses() {
 }
 
 #[test]
-fn the_distance_from_the_centre_is_an_angle_through_the_lens() {
+fn the_distance_from_the_center_is_an_angle_through_the_lens() {
     let folder = folder(&[("lobby.json", CALIBRATION)]);
     let mut image = DataSetImage::empty(ImageId::Number(1), PathBuf::new());
     assert_eq!(image.off_axis_deg([300.0, 300.0]), None);

@@ -25,7 +25,7 @@ const INK: RGBColor = RGBColor(40, 44, 52);
 const GRID: RGBColor = RGBColor(225, 228, 232);
 
 /// Distinguishable with color blindness (Okabe and Ito, Color Universal Design, 2008).
-const COLOURS: [RGBColor; 7] = [
+const COLORS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
@@ -118,8 +118,8 @@ fn name<DB: DrawingBackend>(
 /// The style of a line among `count`.
 fn style(index: usize, count: usize, scale: u32) -> ShapeStyle {
     let width = 2 * scale;
-    if count <= COLOURS.len() {
-        return COLOURS[index].stroke_width(width);
+    if count <= COLORS.len() {
+        return COLORS[index].stroke_width(width);
     }
     #[expect(clippy::cast_precision_loss, reason = "a few dozen lines")]
     let hue = index as f64 / count as f64;

@@ -35,10 +35,10 @@ fn an_svg_names_its_lines_axes_and_title_in_well_formed_text() {
 }
 
 #[test]
-fn a_png_shows_each_line_in_its_own_colour() {
+fn a_png_shows_each_line_in_its_own_color() {
     let png = plot(&["a", "b"]).png().unwrap();
     let frame = decode(&png, &DecodeLimits::default()).unwrap().frame;
-    let has = |colour: [u8; 3]| frame.pixels().chunks_exact(3).any(|pixel| pixel == colour);
+    let has = |color: [u8; 3]| frame.pixels().chunks_exact(3).any(|pixel| pixel == color);
     // The second covers the first, except in the legend.
     assert!(has([0, 114, 178]) && has([213, 94, 0]));
 }

@@ -52,9 +52,9 @@ fn ap50(stratum: &Stratum) -> Option<f64> {
 
 #[test]
 fn a_false_positive_lowers_only_its_own_stratum() {
-    let (centre, rim) = (square(300.0, 300.0, 40.0), square(580.0, 300.0, 40.0));
+    let (center, rim) = (square(300.0, 300.0, 40.0), square(580.0, 300.0, 40.0));
     let wrong_at_the_rim = square(300.0, 20.0, 40.0);
-    let image = image([centre.into(), rim.into()], [wrong_at_the_rim, centre, rim]);
+    let image = image([center.into(), rim.into()], [wrong_at_the_rim, center, rim]);
     let strata = strata(Stratification::Distance, &image);
     let persons: Vec<_> = strata.iter().map(|stratum| stratum.persons).collect();
     assert_eq!(persons, [1, 0, 0, 1]);

@@ -110,8 +110,8 @@ fn the_plot_has_a_point_per_iou_threshold() {
 
 #[test]
 fn the_matrix_is_cropped_to_the_boxes_of_all_cells() {
-    let grey = Frame::new(200, 200, vec![90; 200 * 200 * 3]).unwrap();
-    let picture = matrix("tiny".to_owned(), &swept(), &grey, 0).unwrap();
+    let gray = Frame::new(200, 200, vec![90; 200 * 200 * 3]).unwrap();
+    let picture = matrix("tiny".to_owned(), &swept(), &gray, 0).unwrap();
     // The two boxes lie within columns 20 to 160. With the margin this is a square of 157 pixels.
     assert!(
         (5 * 157..5 * 157 + 160).contains(&picture.width()),

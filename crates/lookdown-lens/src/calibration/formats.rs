@@ -27,7 +27,7 @@ mod ocam;
 mod opencv;
 mod opencv_xml;
 mod py_ocamcalib;
-mod recognise;
+mod recognize;
 mod ros;
 mod woodscape;
 
@@ -39,7 +39,7 @@ use self::{
     camera_file::alone,
     document::Document,
     fields::Fields,
-    recognise::{recognise_lines, recognise_tree},
+    recognize::{recognize_lines, recognize_tree},
 };
 use super::native::NativeImage;
 
@@ -58,13 +58,13 @@ impl CalibrationFile {
             Document::Lines(text) => read_lines(text)?,
             Document::Tree(tree) => {
                 let fields = Fields::of(tree)?;
-                match recognise_tree(&fields) {
+                match recognize_tree(&fields) {
                     Some(Format::Native) => native_file::read(&fields, text, syntax)?,
                     Some(format) => Self {
                         format,
                         cameras: read_tree(format, &fields)?,
                     },
-                    None => return Err(unrecognised()),
+                    None => return Err(unrecognized()),
                 }
             }
         };
@@ -99,7 +99,7 @@ impl CalibrationFile {
     }
 }
 
-fn unrecognised() -> FormatError {
+fn unrecognized() -> FormatError {
     FormatError::malformed(
         "its fields are those of no format that is read (the native one, Kalibr, OpenCV, ROS, \
          OCamCalib, py-OCamCalib, COLMAP, camodocal, Basalt, WoodScape, NVIDIA f-theta, MOIL and a \
@@ -108,7 +108,7 @@ fn unrecognised() -> FormatError {
 }
 
 fn read_lines(text: &str) -> Result<CalibrationFile, FormatError> {
-    let format = recognise_lines(text).ok_or_else(unrecognised)?;
+    let format = recognize_lines(text).ok_or_else(unrecognized)?;
     let cameras = match format {
         Format::OCamCalib => alone(ocam::read(text)),
         Format::MultiCol => alone(multicol::read(text)),

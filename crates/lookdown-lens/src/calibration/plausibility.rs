@@ -20,18 +20,18 @@ const NEAR_AXIS: f64 = 1e-4;
 /// Checks `lens` for frames of `width` × `height` pixels, of whose image the farthest
 /// point is `corner_theta` radians off the axis.
 pub(super) fn check(lens: &Lens, width: u32, height: u32, corner_theta: f64) -> Result<(), String> {
-    let centre = lens.principal_point();
+    let center = lens.principal_point();
     let (frame_width, frame_height) = (f64::from(width), f64::from(height));
-    let is_inside = (-0.5..=frame_width - 0.5).contains(&centre.x)
-        && (-0.5..=frame_height - 0.5).contains(&centre.y);
+    let is_inside = (-0.5..=frame_width - 0.5).contains(&center.x)
+        && (-0.5..=frame_height - 0.5).contains(&center.y);
     if !is_inside {
         return Err(format!(
             "its center, cx {} and cy {}, lies outside the frame of {width}×{height} pixels: give \
              both in pixels of that frame",
-            centre.x, centre.y
+            center.x, center.y
         ));
     }
-    let near_axis = |x, y| distance(lens, centre, &Ray::new(x, y, 1.0));
+    let near_axis = |x, y| distance(lens, center, &Ray::new(x, y, 1.0));
     let aspect = near_axis(NEAR_AXIS, 0.0) / near_axis(0.0, NEAR_AXIS);
     if !(1.0 / MAX_PIXEL_ASPECT..=MAX_PIXEL_ASPECT).contains(&aspect) {
         return Err(format!(
@@ -40,7 +40,7 @@ pub(super) fn check(lens: &Lens, width: u32, height: u32, corner_theta: f64) -> 
         ));
     }
     let rim = Ray::new(lens.max_theta().sin(), 0.0, lens.max_theta().cos());
-    let rim_radius = distance(lens, centre, &rim);
+    let rim_radius = distance(lens, center, &rim);
     if rim_radius < MIN_RIM_RADIUS * frame_width.min(frame_height) {
         return Err(format!(
             "its image ends {rim_radius:.0} pixels from the center, a speck in a frame of \
@@ -60,7 +60,7 @@ pub(super) fn check(lens: &Lens, width: u32, height: u32, corner_theta: f64) -> 
 
 /// Returns the distance from the center at which the lens shows `ray`, pixels; infinite where it
 /// does not show it.
-fn distance(lens: &Lens, centre: Pixel, ray: &Ray) -> f64 {
+fn distance(lens: &Lens, center: Pixel, ray: &Ray) -> f64 {
     lens.project_to_rim(ray)
-        .map_or(f64::INFINITY, |pixel| (pixel - centre).norm())
+        .map_or(f64::INFINITY, |pixel| (pixel - center).norm())
 }

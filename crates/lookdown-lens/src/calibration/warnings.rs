@@ -7,7 +7,7 @@ use crate::{
 };
 
 /// A lens center farther than this from the frame's, as a share of the side, is rare.
-const OFF_CENTRE: f64 = 0.1;
+const OFF_CENTER: f64 = 0.1;
 /// Pixels are square to within this in nearly all cameras.
 const SQUARE_PIXELS: f64 = 0.05;
 /// A lens that sees no farther than this off its axis (radians) is not a fisheye.
@@ -42,16 +42,16 @@ impl Calibration {
     }
 
     fn off_center(&self) -> Vec<Warning> {
-        let centre = self.lens().principal_point();
+        let center = self.lens().principal_point();
         let (width, height) = self.image_size();
         let (middle_x, middle_y) = (f64::from(width - 1) / 2.0, f64::from(height - 1) / 2.0);
         let is_near = |value: f64, middle: f64, side: u32| {
-            (value - middle).abs() <= OFF_CENTRE * f64::from(side)
+            (value - middle).abs() <= OFF_CENTER * f64::from(side)
         };
-        if is_near(centre.x, middle_x, width) && is_near(centre.y, middle_y, height) {
+        if is_near(center.x, middle_x, width) && is_near(center.y, middle_y, height) {
             return Vec::new();
         }
-        let cause = if is_near(centre.y, middle_x, width) && is_near(centre.x, middle_y, height) {
+        let cause = if is_near(center.y, middle_x, width) && is_near(center.x, middle_y, height) {
             "row and column are swapped"
         } else {
             "the frame size is not the one it was calibrated with, or the frame was cropped"
@@ -59,7 +59,7 @@ impl Calibration {
         let message = format!(
             "cx, cy is {:.1}, {:.1}, far from the middle of the frame ({middle_x:.1}, \
              {middle_y:.1}): perhaps {cause}",
-            centre.x, centre.y
+            center.x, center.y
         );
         vec![Warning::new(WarningCode::PrincipalPointOffCenter, message)]
     }
@@ -67,12 +67,12 @@ impl Calibration {
 
 /// Pixels per radian at the optical axis, across and down.
 fn scales_at_axis(lens: &Lens) -> Option<(f64, f64)> {
-    let centre = lens.principal_point();
+    let center = lens.principal_point();
     let across = lens.project(&Ray::new(NEAR_AXIS.sin(), 0.0, NEAR_AXIS.cos()))?;
     let down = lens.project(&Ray::new(0.0, NEAR_AXIS.sin(), NEAR_AXIS.cos()))?;
     Some((
-        (across - centre).norm() / NEAR_AXIS,
-        (down - centre).norm() / NEAR_AXIS,
+        (across - center).norm() / NEAR_AXIS,
+        (down - center).norm() / NEAR_AXIS,
     ))
 }
 

@@ -16,7 +16,7 @@ const SERVED_COSINE: f64 = 0.6;
 /// The greatest enlargement, crop pixels per frame pixel: beyond it there is nothing to see.
 const MAX_SCALE: f64 = 3.0;
 /// Most neighbors that are considered for one crop; bounds the work.
-const MAX_NEIGHBOURS: usize = 32;
+const MAX_NEIGHBORS: usize = 32;
 /// Boxes smaller than this, pixels, are taken to be of this size.
 const MIN_EXTENT: f64 = 1.0;
 
@@ -75,18 +75,18 @@ fn crop_around(first: &CropTarget, others: &[&CropTarget], fill: f64, side: u32)
     let may_share = |target: &&&CropTarget| {
         suits(&crop, target, fill) && joint(first.bbox, target.bbox).fits(reach)
     };
-    let neighbours = others.iter().filter(may_share).take(MAX_NEIGHBOURS);
-    let neighbours: Vec<&CropTarget> = neighbours.copied().collect();
-    crop.center = best_hull(first, &neighbours, reach).middle();
+    let neighbors = others.iter().filter(may_share).take(MAX_NEIGHBORS);
+    let neighbors: Vec<&CropTarget> = neighbors.copied().collect();
+    crop.center = best_hull(first, &neighbors, reach).middle();
     crop
 }
 
 /// The hull of `first` and of those neighbors that, within a square of side `reach`, have the
 /// greatest sum of scores. The square may be moved until the hull touches its left and upper
 /// sides, so that these need only be tried where boxes begin.
-fn best_hull(first: &CropTarget, neighbours: &[&CropTarget], reach: f64) -> Hull {
+fn best_hull(first: &CropTarget, neighbors: &[&CropTarget], reach: f64) -> Hull {
     let begins = |axis: usize| {
-        let all = neighbours.iter().map(|target| target.bbox[axis]);
+        let all = neighbors.iter().map(|target| target.bbox[axis]);
         let all = all.chain([first.bbox[axis]]);
         let holds_first = |&begin: &f64| {
             begin <= first.bbox[axis]
@@ -102,7 +102,7 @@ fn best_hull(first: &CropTarget, neighbours: &[&CropTarget], reach: f64) -> Hull
                 left <= x_min && x_max <= left + reach && top <= y_min && y_max <= top + reach
             };
             let mut found = (0.0, Hull(first.bbox));
-            for target in neighbours.iter().filter(is_within) {
+            for target in neighbors.iter().filter(is_within) {
                 found = (found.0 + target.score, joint(found.1.0, target.bbox));
             }
             if found.0 > best.0 {

@@ -31,7 +31,7 @@ pub struct FloorPosition {
 /// The bearing of `point` (corner-origin frame pixels); `None` outside the lens image.
 #[must_use]
 pub fn bearing(point: Pixel, lens: &Lens) -> Option<Bearing> {
-    let ray = lens.unproject(&cross_half_pixel(point, PixelConvention::PixelCentre))?;
+    let ray = lens.unproject(&cross_half_pixel(point, PixelConvention::PixelCenter))?;
     Some(Bearing {
         azimuth: ray.y.atan2(ray.x).rem_euclid(std::f64::consts::TAU),
         off_axis: ray.x.hypot(ray.y).atan2(ray.z),
@@ -44,7 +44,7 @@ pub fn bearing(point: Pixel, lens: &Lens) -> Option<Bearing> {
 #[must_use]
 pub fn floor_position(point: Pixel, lens: &Lens, mount: &Mount) -> Option<FloorPosition> {
     let height_m = mount.height_m()?;
-    let ray = lens.unproject(&cross_half_pixel(point, PixelConvention::PixelCentre))?;
+    let ray = lens.unproject(&cross_half_pixel(point, PixelConvention::PixelCenter))?;
     let levelled = mount.camera_from_floor().inverse_transform_vector(&ray);
     (levelled.z >= MIN_DOWNWARD_COSINE).then(|| FloorPosition {
         x_m: height_m * levelled.x / levelled.z,

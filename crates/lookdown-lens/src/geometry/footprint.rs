@@ -115,7 +115,7 @@ impl Footprint {
         let center = Pixel::new(f64::midpoint(x_min, x_max), f64::midpoint(y_min, y_max));
         let half = Vector2::new(x_max - x_min, y_max - y_min) / 2.0;
         let ray = |point: &Pixel| {
-            let pixel = cross_half_pixel(*point, PixelConvention::PixelCentre);
+            let pixel = cross_half_pixel(*point, PixelConvention::PixelCenter);
             lens.unproject(&pixel)
         };
         ray(&center)?;
@@ -188,7 +188,7 @@ fn corners([x_min, y_min, x_max, y_max]: [f64; 4]) -> [Pixel; 4] {
 
 /// The ray (camera frame) through a point of a view (corner-origin pixels).
 fn ray_through(point: Pixel, view: &VirtualView) -> Ray {
-    view.ray_in_camera(&cross_half_pixel(point, PixelConvention::PixelCentre))
+    view.ray_in_camera(&cross_half_pixel(point, PixelConvention::PixelCenter))
 }
 
 /// An ellipse in the plane of a view, as rays (camera frame).
@@ -211,7 +211,7 @@ impl Ellipse {
         let center = Pixel::new(f64::midpoint(x_min, x_max), f64::midpoint(y_min, y_max));
         let half_width = (x_max - x_min) / 2.0;
         let half_height = (y_max - y_min) / 2.0;
-        let center_pixel = cross_half_pixel(center, PixelConvention::PixelCentre);
+        let center_pixel = cross_half_pixel(center, PixelConvention::PixelCenter);
         let (up, along, across) = view
             .vertical_at(&center_pixel, mount)
             .and_then(|vertical| ellipse_axes(vertical, half_width, half_height))

@@ -154,7 +154,7 @@ impl Lens {
     /// The pixel of the point `scale · (x, y)` in the plane before distortion.
     fn pixel_at(&self, ray: &Ray, scale: f64) -> Option<Pixel> {
         let (x, y) = self.distorted(ray.x * scale, ray.y * scale);
-        let pixel = self.plane.pixel_from_normalised(x, y);
+        let pixel = self.plane.pixel_from_normalized(x, y);
         (pixel.x.is_finite() && pixel.y.is_finite()).then_some(pixel)
     }
 
@@ -169,7 +169,7 @@ impl Lens {
     /// lens image.
     #[must_use]
     pub fn unproject(&self, pixel: &Pixel) -> Option<Ray> {
-        let (x, y) = self.plane.normalised_from_pixel(pixel);
+        let (x, y) = self.plane.normalized_from_pixel(pixel);
         let (x, y) = match &self.distortion {
             None => (x, y),
             Some(distortion) => distortion.undistort(x, y, self.max_radius)?,

@@ -126,7 +126,7 @@ impl OrientedBox {
 #[must_use]
 pub fn vertical_in_frame(point: Pixel, lens: &Lens, mount: &Mount) -> Vector2<f64> {
     let image_up = Vector2::new(0.0, -1.0);
-    let pixel = cross_half_pixel(point, PixelConvention::PixelCentre);
+    let pixel = cross_half_pixel(point, PixelConvention::PixelCenter);
     let Some(ray) = lens.unproject(&pixel) else {
         return image_up;
     };

@@ -33,7 +33,7 @@ impl PersonHeight {
     pub fn of(person: &OrientedBox, lens: &Lens, mount: &Mount) -> Option<Self> {
         let camera_m = mount.height_m()?;
         let nadir = mount.nadir();
-        let ray = |end: Pixel| lens.unproject(&cross_half_pixel(end, PixelConvention::PixelCentre));
+        let ray = |end: Pixel| lens.unproject(&cross_half_pixel(end, PixelConvention::PixelCenter));
         let foot = ray(person.foot())?;
         let head = ray(person.center + person.up * (person.height / 2.0))?;
         let horizontal = |ray: &Ray| ray - nadir * ray.dot(&nadir);
@@ -54,24 +54,7 @@ impl PersonHeight {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-
-    /// The box of a person `out_m` away from the point below a camera 3 m above the floor.
-    fn standing(out_m: f64, height_m: f64, lens: &Lens) -> OrientedBox {
-        let pixel = |up_m: f64| {
-            let pixel = lens.project(&Ray::new(out_m, 0.0, 3.0 - up_m)).unwrap();
-            cross_half_pixel(pixel, PixelConvention::CornerOrigin)
-        };
-        let (foot, head) = (pixel(0.0), pixel(height_m));
-        let along = head - foot;
-        OrientedBox {
-            center: foot + along / 2.0,
-            width: 20.0,
-            height: along.norm(),
-            angle: std::f64::consts::FRAC_PI_2,
-            up: along.normalize(),
-        }
-    }
+    use super::{super::test_people::standing, *};
 
     #[test]
     fn height_of_a_standing_person_is_found_with_its_error() {
@@ -79,17 +62,17 @@ mod tests {
         let up = -nalgebra::Vector3::z_axis();
         let mount = Mount::new(up, Some(3.0));
         for (out_m, height_m) in [(1.5, 1.7), (3.0, 1.2), (4.0, 1.9)] {
-            let person = standing(out_m, height_m, &lens);
+            let person = standing(&lens, 3.0, [out_m, 0.0], height_m);
             let found = PersonHeight::of(&person, &lens, &mount).unwrap();
             assert!((found.height_m - height_m).abs() < 1e-6, "{found:?}");
             assert!((0.05..0.6).contains(&found.sd_m), "{found:?}");
         }
-        let person = standing(2.0, 1.7, &lens);
+        let person = standing(&lens, 3.0, [2.0, 0.0], 1.7);
         assert_eq!(
             PersonHeight::of(&person, &lens, &Mount::new(up, None)),
             None
         );
-        let far = standing(40.0, 1.7, &lens);
+        let far = standing(&lens, 3.0, [40.0, 0.0], 1.7);
         assert_eq!(PersonHeight::of(&far, &lens, &mount), None);
     }
 }

@@ -12,7 +12,7 @@ pub enum PixelConvention {
     /// Pixel `i` covers `[i, i + 1)`: boxes in reports, data sets and files.
     CornerOrigin,
     /// The center of pixel `i` is at `i`: `project`, `cx`, `cy`, remap tables.
-    PixelCentre,
+    PixelCenter,
 }
 
 /// Crosses the half pixel: `point` is given in the other convention and returned in `target`.
@@ -20,7 +20,7 @@ pub enum PixelConvention {
 pub fn cross_half_pixel(point: Pixel, target: PixelConvention) -> Pixel {
     let shift = match target {
         PixelConvention::CornerOrigin => HALF_PIXEL,
-        PixelConvention::PixelCentre => -HALF_PIXEL,
+        PixelConvention::PixelCenter => -HALF_PIXEL,
     };
     Pixel::new(point.x + shift, point.y + shift)
 }

@@ -1,6 +1,6 @@
 //! The camera that is fitted: an odd polynomial, a center, and the directions of the room.
 
-use nalgebra::{Rotation3, Vector3};
+use nalgebra::Rotation3;
 
 use crate::geometry::Ray;
 
@@ -49,8 +49,6 @@ pub(super) struct RoomCamera {
     pub center: [f64; 2],
     /// Camera from room: the third axis of the room is the vertical.
     pub room: Rotation3<f64>,
-    /// Headings of further horizontal frames of edges, radians from the first.
-    pub headings: Vec<f64>,
 }
 
 /// A ray and what it changes with.
@@ -89,19 +87,9 @@ impl RoomCamera {
         Angles::of(self, radius).map(|angles| angles.theta(radius / self.focal))
     }
 
-    /// The directions of edges: the vertical, then pairs of horizontal ones.
-    pub(super) fn directions(&self) -> Vec<Ray> {
-        let mut directions = vec![
-            self.room * Ray::z(),
-            self.room * Ray::x(),
-            self.room * Ray::y(),
-        ];
-        for heading in &self.headings {
-            let (sin, cos) = heading.sin_cos();
-            directions.push(self.room * Vector3::new(cos, sin, 0.0));
-            directions.push(self.room * Vector3::new(-sin, cos, 0.0));
-        }
-        directions
+    /// The directions of edges: the vertical, then the two horizontal ones.
+    pub(super) fn directions(&self) -> [Ray; 3] {
+        [Ray::z(), Ray::x(), Ray::y()].map(|axis| self.room * axis)
     }
 }
 

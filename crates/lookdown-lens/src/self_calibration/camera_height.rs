@@ -190,31 +190,10 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::geometry::{
-        Pixel, Ray,
-        pixels::{PixelConvention, cross_half_pixel},
-    };
+    use crate::geometry::test_people::standing;
 
     fn lens() -> Lens {
         Lens::equidistant_circle(799.5, 799.5, 800.0, 1.57).unwrap()
-    }
-
-    /// The box of an upright thing, `out_m` away in the direction `azimuth`, below a camera.
-    fn standing(camera_m: f64, out_m: f64, azimuth: f64, height_m: f64) -> OrientedBox {
-        let pixel = |up_m: f64| -> Pixel {
-            let (sin, cos) = azimuth.sin_cos();
-            let ray = Ray::new(out_m * cos, out_m * sin, camera_m - up_m);
-            cross_half_pixel(lens().project(&ray).unwrap(), PixelConvention::CornerOrigin)
-        };
-        let (foot, head) = (pixel(0.0), pixel(height_m));
-        let along = head - foot;
-        OrientedBox {
-            center: foot + along / 2.0,
-            width: 20.0,
-            height: along.norm(),
-            angle: 0.0,
-            up: along.normalize(),
-        }
     }
 
     fn mount() -> Mount {
@@ -230,7 +209,7 @@ mod tests {
             wrong in prop::collection::vec((1.5..4.0_f64, -3.1..3.1_f64, 0.4..0.8_f64), 0..3),
         ) {
             let boxes: Vec<_> = people.iter().chain(&seated).chain(&wrong)
-                .map(|(out_m, azimuth, height_m)| standing(camera_m, *out_m, *azimuth, *height_m))
+                .map(|(out_m, azimuth, height_m)| standing(&lens(), camera_m, [*out_m, *azimuth], *height_m))
                 .collect();
             let found = CameraHeight::from_people(&boxes, &lens(), &mount()).unwrap();
             let error = found.height_m / camera_m - 1.0;
@@ -241,7 +220,7 @@ mod tests {
 
     #[test]
     fn too_few_people_are_refused() {
-        let boxes = [standing(3.0, 2.0, 0.3, 1.7), standing(3.0, 3.0, 2.0, 1.7)];
+        let boxes = [[2.0, 0.3], [3.0, 2.0]].map(|place| standing(&lens(), 3.0, place, 1.7));
         let refusal = CameraHeight::from_people(&boxes, &lens(), &mount()).unwrap_err();
         assert_eq!(refusal, HeightRefusal::TooFewPeople { people: 2 });
     }
@@ -249,7 +228,7 @@ mod tests {
     #[test]
     fn heights_that_fit_several_cameras_are_refused() {
         // Three people who sit below a usual camera, or who stand below a high one.
-        let boxes = [0.0, 1.0, 2.0].map(|azimuth| standing(3.0, 2.0, azimuth, 0.9));
+        let boxes = [0.0, 1.0, 2.0].map(|azimuth| standing(&lens(), 3.0, [2.0, azimuth], 0.9));
         let refusal = CameraHeight::from_people(&boxes, &lens(), &mount()).unwrap_err();
         assert!(
             matches!(refusal, HeightRefusal::Uncertain { .. }),

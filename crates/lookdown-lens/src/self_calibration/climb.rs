@@ -3,10 +3,7 @@
 use nalgebra::{DVector, Rotation3, Vector3};
 
 use super::{
-    camera::RoomCamera,
-    edge_curve::EdgeCurve,
-    evaluation::{Evaluation, PARAMETERS},
-    evidence::evaluate,
+    camera::RoomCamera, edge_curve::EdgeCurve, evaluation::Evaluation, evidence::evaluate,
     prior::Prior,
 };
 
@@ -18,12 +15,6 @@ fn stepped(camera: &RoomCamera, step: &DVector<f64>) -> RoomCamera {
         k2_offset: camera.k2_offset + step[2],
         center: [camera.center[0] + step[3], camera.center[1] + step[4]],
         room: Rotation3::new(Vector3::new(step[5], step[6], step[7])) * camera.room,
-        headings: camera
-            .headings
-            .iter()
-            .enumerate()
-            .map(|(index, heading)| heading + step[PARAMETERS + index])
-            .collect(),
     }
 }
 

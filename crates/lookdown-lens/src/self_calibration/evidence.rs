@@ -42,11 +42,10 @@ pub(super) fn evaluate(
 ) -> Option<Evaluation> {
     let angles = Angles::of(camera, prior.radius)?;
     let directions = camera.directions();
-    let size = PARAMETERS + camera.headings.len();
     let mut result = Evaluation {
         evidence: 0.0,
-        normal: DMatrix::zeros(size, size),
-        right: DVector::zeros(size),
+        normal: DMatrix::zeros(PARAMETERS, PARAMETERS),
+        right: DVector::zeros(PARAMETERS),
         shares: vec![0.0; directions.len()],
         explained: Vec::with_capacity(curves.len()),
     };
@@ -145,19 +144,17 @@ fn add_curve(
     camera: &RoomCamera,
     rays: &[SeenRay],
     fit: &Fitted,
-    directions: &[Ray],
+    directions: &[Ray; 3],
     scale: f64,
 ) {
-    let size = result.right.len();
     let direction = &directions[fit.direction];
     let turned = direction.cross(&fit.normal);
-    let heading = fit.direction.checked_sub(3).map(|further| further / 2);
     let ideal = ideal_shape_slope(camera.k1);
-    let mut row = [0.0; 16];
+    let mut row = [0.0; PARAMETERS];
     // Sums for the elimination of the plane's own angle.
     let mut own = 0.0;
     let mut own_residual = 0.0;
-    let mut own_rows = [0.0; 16];
+    let mut own_rows = [0.0; PARAMETERS];
     for seen in rays {
         let factor = pixels_per_unit(seen, &fit.normal);
         let residual = factor * fit.normal.dot(&seen.ray);
@@ -181,14 +178,10 @@ fn add_curve(
         // The normal turns with the room.
         let turn = fit.normal.cross(&seen.ray) * factor;
         row[5..8].copy_from_slice(turn.as_slice());
-        row[8..size].fill(0.0);
-        if let Some(heading) = heading {
-            row[PARAMETERS + heading] = turn.dot(&directions[0]);
-        }
         let own_slope = factor * turned.dot(&seen.ray);
         own += own_slope * own_slope;
         own_residual += own_slope * residual;
-        for index in 0..size {
+        for index in 0..PARAMETERS {
             own_rows[index] += own_slope * row[index];
             result.right[index] -= scale * row[index] * residual;
             for other in 0..=index {
@@ -197,7 +190,7 @@ fn add_curve(
         }
     }
     let own = own.max(1e-12);
-    for index in 0..size {
+    for index in 0..PARAMETERS {
         result.right[index] += scale * own_rows[index] * own_residual / own;
         for other in 0..=index {
             result.normal[(index, other)] -= scale * own_rows[index] * own_rows[other] / own;

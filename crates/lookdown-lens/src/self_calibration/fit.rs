@@ -6,7 +6,7 @@ use super::{
     camera::{RoomCamera, ideal_shape_slope},
     climb::climb,
     edge_curve::EdgeCurve,
-    evaluation::{Evaluation, PARAMETERS},
+    evaluation::Evaluation,
     prior::Prior,
     refusal::FitRefusal,
     search,
@@ -280,13 +280,12 @@ fn checked(
         });
     }
     let [k1, k2, k3] = camera.shape();
-    let directions = camera.directions();
     Ok(RoomFit {
         focal: camera.focal,
         k: [k1, k2, k3, 0.0],
         center: camera.center,
         max_theta: camera.theta(prior.radius).ok_or(FitRefusal::Ambiguous)?,
-        directions: [directions[0], directions[1], directions[2]],
+        directions: camera.directions(),
         explained,
         edges: curves.len(),
         uncertainty,
@@ -296,7 +295,6 @@ fn checked(
 /// Standard deviations from the curvature of the evidence.
 fn curvature(camera: &RoomCamera, evaluation: &Evaluation) -> Option<FitUncertainty> {
     let covariance = evaluation.normal.clone().try_inverse()?;
-    debug_assert!(covariance.nrows() >= PARAMETERS);
     let ideal = ideal_shape_slope(camera.k1);
     let radius = angles().map(|theta| {
         let (radius, _) = camera.curve(theta);

@@ -56,7 +56,6 @@ pub(super) fn starts(
                 k2_offset: 0.0,
                 center: prior.center,
                 room: Rotation3::identity(),
-                headings: Vec::new(),
             };
             let Some(angles) = Angles::of(&camera, prior.radius) else {
                 continue;

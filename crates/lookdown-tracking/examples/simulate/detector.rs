@@ -72,8 +72,8 @@ impl Camera {
         mut chance: Chance,
         reach_m: Vector2<f64>,
     ) -> Self {
-        let centre = (FRAME_PX - 1.0) / 2.0;
-        let lens = Lens::equidistant_circle(centre, centre, FRAME_PX / 2.0, 90_f64.to_radians());
+        let center = (FRAME_PX - 1.0) / 2.0;
+        let lens = Lens::equidistant_circle(center, center, FRAME_PX / 2.0, 90_f64.to_radians());
         let places = chance.count(figures.background.count * FIXED_SHARE);
         let fixed = (0..places).map(|_| FixedPlace {
             place: Vector2::new(
@@ -199,9 +199,9 @@ impl Camera {
     }
 
     fn is_hidden(&self, person: &Shown, shown: &[Shown]) -> bool {
-        let centre = self.lens.principal_point();
+        let center = self.lens.principal_point();
         let polar = |shown: &Shown| {
-            let away = shown.oriented.center - centre;
+            let away = shown.oriented.center - center;
             (away.norm(), away.y.atan2(away.x))
         };
         let (radius, azimuth) = polar(person);
@@ -228,7 +228,7 @@ impl Camera {
                 floor_m: floor.map(|place| [place.x_m, place.y_m]),
                 azimuth_deg: (seen.azimuth.to_degrees() + 90.0).rem_euclid(360.0),
                 off_axis_deg: seen.off_axis.to_degrees(),
-                centre_px: [oriented.center.x, oriented.center.y],
+                center_px: [oriented.center.x, oriented.center.y],
                 size_px: [oriented.width, oriented.height],
                 foot_px: [foot.x, foot.y],
                 score,
@@ -263,14 +263,14 @@ fn moved(oriented: &OrientedBox, [lower, upper, left, right]: [f64; 4]) -> Orien
 }
 
 fn with_edges(
-    centre: Pixel,
+    center: Pixel,
     up: Vector2<f64>,
     low: Vector2<f64>,
     high: Vector2<f64>,
 ) -> OrientedBox {
     let across = Vector2::new(-up.y, up.x);
     let middle = (low + high) / 2.0;
-    let place: Point2<f64> = centre + across * middle.x + up * middle.y;
+    let place: Point2<f64> = center + across * middle.x + up * middle.y;
     let mut oriented = OrientedBox::turned(place, high.x - low.x, high.y - low.y, 0.0);
     oriented.up = up;
     oriented
@@ -281,11 +281,11 @@ pub fn bounds(oriented: &OrientedBox) -> [f64; 4] {
     let up = oriented.up * (oriented.height / 2.0);
     let across = Vector2::new(-oriented.up.y, oriented.up.x) * (oriented.width / 2.0);
     let half = Vector2::new(up.x.hypot(across.x), up.y.hypot(across.y));
-    let centre = oriented.center;
+    let center = oriented.center;
     [
-        centre.x - half.x,
-        centre.y - half.y,
-        centre.x + half.x,
-        centre.y + half.y,
+        center.x - half.x,
+        center.y - half.y,
+        center.x + half.x,
+        center.y + half.y,
     ]
 }

@@ -6,7 +6,7 @@ fn person(x: f64, y: f64) -> Observation {
         floor_m: Some([x, y]),
         azimuth_deg: y.atan2(x).to_degrees().rem_euclid(360.0),
         off_axis_deg: (x.hypot(y) / 2.8).atan().to_degrees(),
-        centre_px: [0.0, 0.0],
+        center_px: [0.0, 0.0],
         size_px: [40.0, 80.0],
         foot_px: [0.0, 0.0],
         score: 0.9,

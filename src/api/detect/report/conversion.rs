@@ -1,5 +1,6 @@
 //! Converts the report of the pipeline to the units and decimals of the API.
 
+use lookdown_common::report::ReportCircle;
 use lookdown_detect::{
     imaging::lens_circle::LensCircle,
     parameters::DefaultUsed,
@@ -8,11 +9,12 @@ use lookdown_detect::{
 use lookdown_lens::warning::Warning;
 
 use super::{
-    Report, ReportBearing, ReportBox, ReportCalibration, ReportCircle, ReportDefault, ReportFloor,
-    ReportImage, ReportModel, ReportOrientedBox, ReportPerson, ReportRefinement, ReportTimings,
-    ReportViews, ReportWarning, ReportZone,
+    Report, ReportBearing, ReportBox, ReportCalibration, ReportDefault, ReportImage, ReportModel,
+    ReportPerson, ReportRefinement, ReportTimings, ReportViews, ReportWarning, ReportZone,
 };
-use crate::rounding::{azimuth_degrees, degrees, metres, milliseconds, pixels, share};
+use crate::rounding::{
+    azimuth_degrees, degrees, floor, meters, milliseconds, oriented_box, pixels, share,
+};
 
 impl From<&DetectionReport> for Report {
     fn from(report: &DetectionReport) -> Self {
@@ -26,7 +28,7 @@ impl From<&DetectionReport> for Report {
                 id: report.calibration.id.clone(),
                 revision: report.calibration.revision.clone(),
                 assumed: report.calibration.assumed_circle.is_some(),
-                assumed_circle: report.calibration.assumed_circle.map(ReportCircle::from),
+                assumed_circle: report.calibration.assumed_circle.map(circle),
             },
             image: ReportImage {
                 width: report.image_width,
@@ -66,14 +68,12 @@ impl From<&DetectionReport> for Report {
     }
 }
 
-impl From<LensCircle> for ReportCircle {
-    /// Converts pixel centers to the corner-origin pixels of reports.
-    fn from(circle: LensCircle) -> Self {
-        Self {
-            cx: pixels(circle.cx + 0.5),
-            cy: pixels(circle.cy + 0.5),
-            radius: pixels(circle.radius),
-        }
+/// Converts pixel centers to the corner-origin pixels of reports.
+fn circle(circle: LensCircle) -> ReportCircle {
+    ReportCircle {
+        cx: pixels(circle.cx + 0.5),
+        cy: pixels(circle.cy + 0.5),
+        radius: pixels(circle.radius),
     }
 }
 
@@ -108,7 +108,6 @@ impl From<&ModelUsed> for ReportModel {
 impl From<&pipeline::Person> for ReportPerson {
     fn from(person: &pipeline::Person) -> Self {
         let [x_min, y_min, x_max, y_max] = person.bbox.corners().map(pixels);
-        let oriented = &person.oriented_box;
         Self {
             bbox: ReportBox {
                 x_min,
@@ -117,23 +116,14 @@ impl From<&pipeline::Person> for ReportPerson {
                 y_max,
             },
             score: share(person.score),
-            oriented_box: ReportOrientedBox {
-                cx: pixels(oriented.center.x),
-                cy: pixels(oriented.center.y),
-                width: pixels(oriented.width),
-                height: pixels(oriented.height),
-                angle_deg: degrees(oriented.angle),
-            },
+            oriented_box: oriented_box(&person.oriented_box),
             bearing: person.bearing.map(|bearing| ReportBearing {
                 azimuth_deg: azimuth_degrees(bearing.azimuth),
                 off_axis_deg: degrees(bearing.off_axis),
             }),
-            floor: person.floor.map(|floor| ReportFloor {
-                x_m: metres(floor.x_m),
-                y_m: metres(floor.y_m),
-            }),
-            height_m: person.height.map(|height| metres(height.height_m)),
-            height_sd_m: person.height.map(|height| metres(height.sd_m)),
+            floor: person.floor.map(floor),
+            height_m: person.height.map(|height| meters(height.height_m)),
+            height_sd_m: person.height.map(|height| meters(height.sd_m)),
             views: person.views,
             zones: person.zones.clone(),
         }

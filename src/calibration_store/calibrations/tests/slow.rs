@@ -11,7 +11,7 @@ use std::{
 
 use super::{content, revision};
 use crate::calibration_store::{
-    FolderStore, Replaces, StoredFile,
+    FolderStore, ListedFile, Replaces,
     calibrations::{content::cameras, *},
 };
 
@@ -134,7 +134,7 @@ fn a_store_that_fails_after_the_start_is_reported() {
         fn place(&self) -> String {
             "late".to_owned()
         }
-        fn list(&self) -> Result<Vec<StoredFile>, StoreError> {
+        fn list(&self) -> Result<Vec<ListedFile>, StoreError> {
             let _ = self.0.lock().recv();
             let (place, problem) = (self.place(), "it is silent".to_owned());
             Err(StoreError::Unreachable { place, problem })
@@ -170,8 +170,8 @@ impl CalibrationStore for HalfSilent {
     fn place(&self) -> String {
         "half".to_owned()
     }
-    fn list(&self) -> Result<Vec<StoredFile>, StoreError> {
-        let file = |stem: &String| StoredFile {
+    fn list(&self) -> Result<Vec<ListedFile>, StoreError> {
+        let file = |stem: &String| ListedFile {
             name: format!("{stem}.json"),
             stamp: "1".to_owned(),
         };

@@ -93,8 +93,8 @@ fn field_of_view(text: &str) -> Result<f64, &'static str> {
 }
 
 fn height(text: &str) -> Result<f64, &'static str> {
-    let metres = text.parse().ok();
-    metres
-        .filter(|metres| *metres > 0.0 && *metres <= 100.0)
+    let meters = text.parse().ok();
+    meters
+        .filter(|meters| *meters > 0.0 && *meters <= 100.0)
         .ok_or("give meters above 0, at most 100")
 }

@@ -37,7 +37,7 @@ fn errors_name_the_given_and_the_expected_coordinates() {
 }
 
 #[test]
-fn sides_area_and_centre_are_continuous() {
+fn sides_area_and_center_are_continuous() {
     let bbox = frame_box([10.0, 20.0, 30.0, 50.0]);
     assert_eq!(
         (bbox.width(), bbox.height(), bbox.area(), bbox.center()),
@@ -53,7 +53,7 @@ fn half_covered_boxes_of_equal_size_overlap_by_a_third() {
 }
 
 #[test]
-fn diagonal_neighbours_do_not_overlap() {
+fn diagonal_neighbors_do_not_overlap() {
     let here = frame_box([0.0, 0.0, 1.0, 1.0]);
     let there = frame_box([5.0, 5.0, 6.0, 6.0]);
     assert!(here.intersection_area(&there) <= 0.0);

@@ -133,7 +133,7 @@ fn expected_views_are_averaged_like_the_coordinates() {
 }
 
 #[test]
-fn a_nested_box_loses_score_and_a_neighbouring_box_does_not() {
+fn a_nested_box_loses_score_and_a_neighboring_box_does_not() {
     let legs = [100.0, 170.0, 150.0, 200.0];
     let beside = [160.0, 100.0, 210.0, 200.0];
     let fused = fuse(

@@ -52,11 +52,11 @@ impl ZoneOutline {
         self.draw_in(frame, width, ZONE)
     }
 
-    fn draw_in(&self, frame: &mut Frame, width: f64, colour: Rgb) -> u64 {
+    fn draw_in(&self, frame: &mut Frame, width: f64, color: Rgb) -> u64 {
         let lines = self.lines.iter().filter(|line| is_drawable(line));
         let pairs = lines.flat_map(|line| line.windows(2));
         pairs
-            .map(|pair| Stroke::new(pair[0], pair[1], width).draw(frame, colour, 1.0))
+            .map(|pair| Stroke::new(pair[0], pair[1], width).draw(frame, color, 1.0))
             .sum()
     }
 
@@ -128,13 +128,13 @@ pub fn sketch_lines(frame: &mut Frame, lines: &[CountingLine], lens: &Lens, moun
 }
 
 /// Draws outlines with their names in a color.
-fn sketch_outlines(frame: &mut Frame, outlines: &[ZoneOutline], colour: Rgb) {
+fn sketch_outlines(frame: &mut Frame, outlines: &[ZoneOutline], color: Rgb) {
     let width = line_width(frame);
     for outline in outlines {
-        outline.draw_in(frame, width, colour);
+        outline.draw_in(frame, width, color);
     }
     let names: Vec<_> = outlines.iter().filter_map(ZoneOutline::mark).collect();
-    let names: Vec<_> = names.iter().map(|name| (name, colour)).collect();
+    let names: Vec<_> = names.iter().map(|name| (name, color)).collect();
     let mut effort = Effort::new(frame.width(), frame.height(), &|| false);
     // This drawing is never cancelled.
     let _ = Labels::new(frame, &names, None).draw(frame, &mut effort);

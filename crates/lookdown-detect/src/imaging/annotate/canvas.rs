@@ -9,12 +9,12 @@ use crate::imaging::frame::Frame;
 pub(super) type Rgb = [u8; 3];
 
 /// Mixes a color into one pixel. `opacity` ranges from 0 to 1.
-pub(super) fn blend(frame: &mut Frame, x: u32, y: u32, colour: Rgb, opacity: f64) {
+pub(super) fn blend(frame: &mut Frame, x: u32, y: u32, color: Rgb, opacity: f64) {
     let start = 3 * (y as usize * frame.width() as usize + x as usize);
     let Some(pixel) = frame.pixels_mut().get_mut(start..start + 3) else {
         return;
     };
-    for (value, target) in pixel.iter_mut().zip(colour) {
+    for (value, target) in pixel.iter_mut().zip(color) {
         let mixed = f64::from(*value) + (f64::from(target) - f64::from(*value)) * opacity;
         // `as` cuts off the fraction, so that adding 0.5 rounds; `round` is slower.
         #[expect(
@@ -57,7 +57,7 @@ impl Outline {
 
     /// Paints the outline, each pixel once, so that translucent lines stay even at their joints.
     /// Returns the number of painted pixels.
-    pub(super) fn draw(&self, frame: &mut Frame, colour: Rgb, opacity: f64) -> u64 {
+    pub(super) fn draw(&self, frame: &mut Frame, color: Rgb, opacity: f64) -> u64 {
         let mut painted_pixels = 0;
         let reach = self.half_width + 0.5;
         let rows = self.corners.map(|corner| corner[1]);
@@ -84,7 +84,7 @@ impl Outline {
                         .fold(f64::INFINITY, f64::min)
                         .sqrt();
                     let coverage = (reach - distance).clamp(0.0, 1.0);
-                    blend(frame, x, y, colour, opacity * coverage);
+                    blend(frame, x, y, color, opacity * coverage);
                     painted_pixels += 1;
                 }
             }
@@ -114,7 +114,7 @@ impl Stroke {
     }
 
     /// Paints the line. Returns the number of painted pixels.
-    pub(super) fn draw(&self, frame: &mut Frame, colour: Rgb, opacity: f64) -> u64 {
+    pub(super) fn draw(&self, frame: &mut Frame, color: Rgb, opacity: f64) -> u64 {
         let mut painted_pixels = 0;
         let reach = self.half_width + 0.5;
         let [[_, from], [_, to]] = self.edge;
@@ -124,7 +124,7 @@ impl Stroke {
             for x in pixels(left, right, frame.width()) {
                 let distance = squared_edge_distance(self.edge, [f64::from(x) + 0.5, row]).sqrt();
                 let coverage = reach - distance;
-                blend(frame, x, y, colour, opacity * coverage.clamp(0.0, 1.0));
+                blend(frame, x, y, color, opacity * coverage.clamp(0.0, 1.0));
                 painted_pixels += 1;
             }
         }
@@ -186,10 +186,10 @@ pub(super) struct Plate {
 
 impl Plate {
     /// Paints the rectangle. Returns the number of painted pixels.
-    pub(super) fn draw(&self, frame: &mut Frame, colour: Rgb, opacity: f64) -> u64 {
+    pub(super) fn draw(&self, frame: &mut Frame, color: Rgb, opacity: f64) -> u64 {
         let mut painted_pixels = 0;
         let (right, bottom) = (self.left + self.width, self.top + self.height);
-        let centre = [self.left + self.width / 2.0, self.top + self.height / 2.0];
+        let center = [self.left + self.width / 2.0, self.top + self.height / 2.0];
         let straight = [
             self.width / 2.0 - self.radius,
             self.height / 2.0 - self.radius,
@@ -197,13 +197,13 @@ impl Plate {
         for y in pixels(self.top - 0.5, bottom + 0.5, frame.height()) {
             for x in pixels(self.left - 0.5, right + 0.5, frame.width()) {
                 let from_corner = [
-                    (f64::from(x) + 0.5 - centre[0]).abs() - straight[0],
-                    (f64::from(y) + 0.5 - centre[1]).abs() - straight[1],
+                    (f64::from(x) + 0.5 - center[0]).abs() - straight[0],
+                    (f64::from(y) + 0.5 - center[1]).abs() - straight[1],
                 ];
                 let outside = from_corner[0].max(0.0).hypot(from_corner[1].max(0.0));
                 let inside = from_corner[0].max(from_corner[1]).min(0.0);
                 let coverage = 0.5 + self.radius - outside - inside;
-                blend(frame, x, y, colour, opacity * coverage.clamp(0.0, 1.0));
+                blend(frame, x, y, color, opacity * coverage.clamp(0.0, 1.0));
                 painted_pixels += 1;
             }
         }

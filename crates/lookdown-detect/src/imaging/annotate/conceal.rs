@@ -66,8 +66,8 @@ pub fn conceal(
         let mut done = 0;
         for span in spans {
             for x in span.start.max(done)..span.end {
-                let colour = means.as_ref().map_or(SILHOUETTE, |means| means.at(x, y));
-                row[3 * x as usize..][..3].copy_from_slice(&colour);
+                let color = means.as_ref().map_or(SILHOUETTE, |means| means.at(x, y));
+                row[3 * x as usize..][..3].copy_from_slice(&color);
             }
             done = done.max(span.end);
         }

@@ -56,7 +56,7 @@ impl<'a> Labels<'a> {
         frame: &mut Frame,
         effort: &mut Effort<'_>,
     ) -> Result<(), Cancelled> {
-        for (mark, colour) in self.marks {
+        for (mark, color) in self.marks {
             if !effort.allows_more()? {
                 break;
             }
@@ -68,7 +68,7 @@ impl<'a> Labels<'a> {
             let padding = 0.3 * line_height;
             let height = 1.15 * line_height;
             let plate = self.place(mark, [text_width + 2.0 * padding, height]);
-            effort.spend(plate.draw(frame, *colour, PLATE_OPACITY));
+            effort.spend(plate.draw(frame, *color, PLATE_OPACITY));
             let text_top = plate.top + (height - line_height) / 2.0;
             let corner = [plate.left + padding, text_top];
             effort.spend(self.text.write(frame, &mark.label, corner, INK));

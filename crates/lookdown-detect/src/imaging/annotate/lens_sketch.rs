@@ -49,7 +49,7 @@ pub fn sketch_lens(frame: &mut Frame, lens: &Lens, views: &[VirtualView]) {
     let rings = (1_u32..).map(|ring| RING_STEP * f64::from(ring));
     for theta in rings.take_while(|&theta| theta < lens.max_theta()) {
         let is_right_angle = (theta - FRAC_PI_2).abs() < 1e-9;
-        let (colour, width) = if is_right_angle {
+        let (color, width) = if is_right_angle {
             (RIGHT_ANGLE, 2.0 * thin)
         } else {
             (RING, thin)
@@ -57,7 +57,7 @@ pub fn sketch_lens(frame: &mut Frame, lens: &Lens, views: &[VirtualView]) {
         draw(
             frame,
             circle(theta).map(|ray| lens.project(&ray)),
-            colour,
+            color,
             width,
         );
     }
@@ -81,7 +81,7 @@ fn circle(theta: f64) -> impl Iterator<Item = Ray> {
 
 /// Draws a line through points (pixel centers), interrupted where a point is outside the lens
 /// image.
-fn draw(frame: &mut Frame, points: impl Iterator<Item = Option<Pixel>>, colour: Rgb, width: f64) {
+fn draw(frame: &mut Frame, points: impl Iterator<Item = Option<Pixel>>, color: Rgb, width: f64) {
     let mut previous = None;
     for point in points {
         let point = point.map(|point| {
@@ -89,7 +89,7 @@ fn draw(frame: &mut Frame, points: impl Iterator<Item = Option<Pixel>>, colour: 
             [corner_origin.x, corner_origin.y]
         });
         if let (Some(from), Some(to)) = (previous, point) {
-            Stroke::new(from, to, width).draw(frame, colour, 1.0);
+            Stroke::new(from, to, width).draw(frame, color, 1.0);
         }
         previous = point;
     }
@@ -103,7 +103,7 @@ mod tests {
         Frame::new(200, 200, vec![0; 3 * 200 * 200]).expect("the pixels fit the size")
     }
 
-    fn colour_at(frame: &Frame, x: usize, y: usize) -> [u8; 3] {
+    fn color_at(frame: &Frame, x: usize, y: usize) -> [u8; 3] {
         let start = 3 * (y * 200 + x);
         [0, 1, 2].map(|channel| frame.pixels()[start + channel])
     }
@@ -114,9 +114,9 @@ mod tests {
         let mut frame = frame();
         sketch_lens(&mut frame, &lens, &[]);
         // Corner-origin (180, 100) lies at pixel center (179.5, 99.5).
-        let [red, ..] = colour_at(&frame, 179, 103);
-        assert!(red > 100, "{:?}", colour_at(&frame, 179, 103));
-        assert_eq!(colour_at(&frame, 190, 60), [0, 0, 0]);
+        let [red, ..] = color_at(&frame, 179, 103);
+        assert!(red > 100, "{:?}", color_at(&frame, 179, 103));
+        assert_eq!(color_at(&frame, 190, 60), [0, 0, 0]);
     }
 
     #[test]

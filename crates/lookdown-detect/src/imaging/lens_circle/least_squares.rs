@@ -31,10 +31,10 @@ pub(super) fn circle(points: &[[f64; 2]], start: &LensCircle) -> Option<LensCirc
         for point in points {
             let distance = circle.distance(*point);
             let weight = (1.0 - (distance / cutoff).powi(2)).max(0.0).powi(2);
-            let from_centre = distance + circle.radius;
+            let from_center = distance + circle.radius;
             let gradient = Vector3::new(
-                (point[0] - circle.cx) / from_centre,
-                (point[1] - circle.cy) / from_centre,
+                (point[0] - circle.cx) / from_center,
+                (point[1] - circle.cy) / from_center,
                 1.0,
             );
             normal += weight * gradient * gradient.transpose();

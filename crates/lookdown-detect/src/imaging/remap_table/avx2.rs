@@ -98,7 +98,7 @@ fn sample_block(source: &Source, frame_lines: &FrameLines, samples: &Samples) ->
 fn whole_samples(source: &Source, block: &Block) -> Samples {
     let [left, top] = [0, 1].map(|axis| {
         let position = positions(block.start[axis], block.step[axis]);
-        Neighbours::of(position, _mm256_cvttps_epi32(position))
+        Neighbors::of(position, _mm256_cvttps_epi32(position))
     });
     let all = _mm256_castsi256_ps(_mm256_set1_epi32(-1));
     Samples::new(source, &left, &top, all)
@@ -117,7 +117,7 @@ fn samples(source: &Source, block: &Block, lanes: Lanes) -> Samples {
 
 impl Samples {
     #[target_feature(enable = "avx2")]
-    fn new(source: &Source, left: &Neighbours, top: &Neighbours, is_visible: __m256) -> Self {
+    fn new(source: &Source, left: &Neighbors, top: &Neighbors, is_visible: __m256) -> Self {
         let pixel = _mm256_mullo_epi32(top.lower, whole(source.width));
         let pixel = _mm256_add_epi32(pixel, left.lower);
         let first_byte = _mm256_add_epi32(_mm256_slli_epi32::<1>(pixel), pixel);
@@ -136,12 +136,12 @@ impl Samples {
 
 /// Along one axis, of two neighbors each the lower one (the left or upper one in the frame), and the
 /// weight of the other.
-struct Neighbours {
+struct Neighbors {
     lower: __m256i,
     upper_weight: __m256,
 }
 
-impl Neighbours {
+impl Neighbors {
     #[target_feature(enable = "avx2")]
     fn of(position: __m256, lower: __m256i) -> Self {
         Self {
@@ -188,7 +188,7 @@ fn positions(start: f32, step: f32) -> __m256 {
 
 /// As `scalar::split`: neighbors, and whether that is within.
 #[target_feature(enable = "avx2")]
-fn split(start: f32, step: f32, count: usize) -> (Neighbours, __m256) {
+fn split(start: f32, step: f32, count: usize) -> (Neighbors, __m256) {
     let position = positions(start, step);
     let last = _mm256_cvtepi32_ps(whole(count - 1));
     // In this order what is not a number becomes 0, and is not within.
@@ -196,7 +196,7 @@ fn split(start: f32, step: f32, count: usize) -> (Neighbours, __m256) {
     let beyond = _mm256_andnot_ps(_mm256_set1_ps(-0.0), _mm256_sub_ps(position, within));
     let is_within = _mm256_cmp_ps::<_CMP_LE_OQ>(beyond, _mm256_set1_ps(0.5));
     let lower = _mm256_min_epi32(_mm256_cvttps_epi32(within), whole(count - 2));
-    (Neighbours::of(within, lower), is_within)
+    (Neighbors::of(within, lower), is_within)
 }
 
 /// Eight bytes from each of the given ones: of pixels 0, 1, 4 and 5, and of 2, 3, 6 and 7.

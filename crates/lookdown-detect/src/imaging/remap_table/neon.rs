@@ -97,7 +97,7 @@ fn sample_quartet(
 fn whole_samples(source: &Source, block: &Block, first_lane: usize) -> Samples {
     let [left, top] = [0, 1].map(|axis| {
         let position = positions(block.start[axis], block.step[axis], first_lane);
-        Neighbours::of(position, vcvtq_s32_f32(position))
+        Neighbors::of(position, vcvtq_s32_f32(position))
     });
     Samples::new(source, &left, &top, vdupq_n_u32(u32::MAX))
 }
@@ -115,7 +115,7 @@ fn samples(source: &Source, block: &Block, first_lane: usize, lanes: Lanes) -> S
 
 impl Samples {
     #[target_feature(enable = "neon")]
-    fn new(source: &Source, left: &Neighbours, top: &Neighbours, is_visible: uint32x4_t) -> Self {
+    fn new(source: &Source, left: &Neighbors, top: &Neighbors, is_visible: uint32x4_t) -> Self {
         let pixel = vmlaq_s32(left.lower, top.lower, whole(source.width));
         let first_byte = vmulq_n_s32(pixel, i32::from(PIXEL_BYTES));
         let right = vmulq_f32(left.upper_weight, vdupq_n_f32(f32::from(WEIGHT_ONE)));
@@ -132,12 +132,12 @@ impl Samples {
 
 /// Along one axis, of two neighbors each the lower one (the left or upper one in the frame), and the
 /// weight of the other.
-struct Neighbours {
+struct Neighbors {
     lower: int32x4_t,
     upper_weight: float32x4_t,
 }
 
-impl Neighbours {
+impl Neighbors {
     #[target_feature(enable = "neon")]
     fn of(position: float32x4_t, lower: int32x4_t) -> Self {
         Self {
@@ -156,7 +156,7 @@ fn positions(start: f32, step: f32, first_lane: usize) -> float32x4_t {
 
 /// As `scalar::split`: neighbors, and whether that is within.
 #[target_feature(enable = "neon")]
-fn split(position: float32x4_t, count: usize) -> (Neighbours, uint32x4_t) {
+fn split(position: float32x4_t, count: usize) -> (Neighbors, uint32x4_t) {
     let (first, last) = (vdupq_n_f32(0.0), vcvtq_f32_s32(whole(count - 1)));
     // What is not a number becomes 0, and is not within.
     let within = vbslq_f32(vcgtq_f32(position, first), position, first);
@@ -164,7 +164,7 @@ fn split(position: float32x4_t, count: usize) -> (Neighbours, uint32x4_t) {
     let beyond = vabsq_f32(vsubq_f32(position, within));
     let is_within = vcleq_f32(beyond, vdupq_n_f32(0.5));
     let lower = vminq_s32(vcvtq_s32_f32(within), whole(count - 2));
-    (Neighbours::of(within, lower), is_within)
+    (Neighbors::of(within, lower), is_within)
 }
 
 /// Eight bytes from each of the given ones.

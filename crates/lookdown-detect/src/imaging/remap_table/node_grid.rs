@@ -42,7 +42,7 @@ impl NodeGrid {
         Self::of_positions(size, Visibility::everywhere(size), |pixel| {
             let position = cross_half_pixel(*pixel, PixelConvention::CornerOrigin);
             let position = crop.frame_from_crop(&position);
-            cross_half_pixel(position, PixelConvention::PixelCentre)
+            cross_half_pixel(position, PixelConvention::PixelCenter)
         })
     }
 

@@ -78,7 +78,7 @@ impl Sample {
     }
 
     /// Column and row of its four neighbors.
-    pub(super) fn neighbours(&self, width: usize) -> impl Iterator<Item = [u32; 2]> {
+    pub(super) fn neighbors(&self, width: usize) -> impl Iterator<Item = [u32; 2]> {
         let upper_left = [self.first_pixel % width, self.first_pixel / width];
         #[expect(clippy::cast_possible_truncation, reason = "a frame's sides are u32")]
         let [left, top] = upper_left.map(|index| index as u32);

@@ -68,7 +68,7 @@ impl ManifestInput {
     ///
     /// # Errors
     /// One sentence when both pairs are used at once, a number is not finite or a divisor is 0.
-    pub(in crate::inference) fn normalisation(&self) -> Result<([f32; 3], [f32; 3]), String> {
+    pub(in crate::inference) fn normalization(&self) -> Result<([f32; 3], [f32; 3]), String> {
         let one_way = self.scale.is_some() || self.offset.is_some();
         let other_way = self.mean.is_some() || self.std.is_some();
         if one_way && other_way {

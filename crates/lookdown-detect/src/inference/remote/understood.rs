@@ -64,7 +64,7 @@ impl RemoteModel {
         let shapes: Vec<_> = float_shapes(&outputs).collect();
         let size = (signature.width, signature.height);
         manifest.output.check(&shapes, size).map_err(unusable)?;
-        let (scale, offset) = manifest.input.normalisation().map_err(unusable)?;
+        let (scale, offset) = manifest.input.normalization().map_err(unusable)?;
         let versions = &model.versions;
         let ModelManifest {
             input,

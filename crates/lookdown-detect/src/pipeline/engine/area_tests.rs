@@ -23,9 +23,9 @@ fn detected(
 /// and the person extend from about 400 to 440, with the foot at 400.
 const ZONES: &str = r#", "zones": [
     {"name": "foot", "frame_px": [[380, 280], [410, 280], [410, 320], [380, 320]]},
-    {"name": "box-centre", "frame_px": [[411, 280], [450, 280], [450, 320], [411, 320]]},
+    {"name": "box-center", "frame_px": [[411, 280], [450, 280], [450, 320], [411, 320]]},
     {"name": "floor-at-foot", "floor_m": [[1.4, -0.5], [1.95, -0.5], [1.95, 0.5], [1.4, 0.5]]},
-    {"name": "floor-at-centre", "floor_m": [[2.0, -0.5], [2.5, -0.5], [2.5, 0.5], [2.0, 0.5]]}]"#;
+    {"name": "floor-at-center", "floor_m": [[2.0, -0.5], [2.5, -0.5], [2.5, 0.5], [2.0, 0.5]]}]"#;
 
 #[test]
 fn a_person_is_in_the_zones_of_its_foot_only() {
@@ -51,9 +51,9 @@ fn a_person_is_in_the_zones_of_its_foot_only() {
             counts,
             [
                 ("foot", 1),
-                ("box-centre", 0),
+                ("box-center", 0),
                 ("floor-at-foot", 1),
-                ("floor-at-centre", 0)
+                ("floor-at-center", 0)
             ]
         );
     }

@@ -28,8 +28,8 @@ pub(super) fn write(calibration: &NativeCalibration) -> Option<String> {
             }
         }
     };
-    let centre = cross_half_pixel(Pixel::new(cx, cy), PixelConvention::CornerOrigin);
-    let mut parameters = vec![fx, fy, centre.x, centre.y];
+    let center = cross_half_pixel(Pixel::new(cx, cy), PixelConvention::CornerOrigin);
+    let mut parameters = vec![fx, fy, center.x, center.y];
     parameters.extend(rest);
     Some(format!(
         "# Camera list with one line of data per camera:\n#   CAMERA_ID, MODEL, WIDTH, HEIGHT, \

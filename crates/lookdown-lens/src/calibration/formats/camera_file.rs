@@ -2,7 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use super::{Format, FormatError};
+use serde_json::Value;
+
+use super::{Format, FormatError, fields::Fields};
 use crate::{
     calibration::native::{
         NativeCalibration, NativeImage, NativeLine, NativeMask, NativeMount, NativePlace,
@@ -95,6 +97,21 @@ impl CalibrationFile {
     /// Largest content that is read, bytes: a real calibration has a few hundred, one that carries
     /// its corner points some ten thousand.
     pub const MAX_BYTES: usize = 1024 * 1024;
+}
+
+/// The cameras of a format that holds several to a file: the entries that are cameras, by name.
+pub(super) fn named(
+    fields: &Fields<'_>,
+    is_camera: impl Fn(&Value) -> bool,
+    read: impl Fn(&Fields<'_>) -> Result<Camera, FormatError>,
+) -> Vec<FileCamera> {
+    let cameras = fields.map().iter().filter(|(_, entry)| is_camera(entry));
+    cameras
+        .map(|(name, _)| FileCamera {
+            name: Some(name.clone()),
+            camera: fields.child(name).and_then(|camera| read(&camera)),
+        })
+        .collect()
 }
 
 /// The camera of a format that holds one to a file.

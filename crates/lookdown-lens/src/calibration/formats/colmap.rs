@@ -56,8 +56,8 @@ fn read_camera(words: &[&str]) -> Result<Camera, FormatError> {
 
 fn lens(model: &str, parameters: &[f64]) -> Result<LensModel, FormatError> {
     let pinhole = |fx, fy, cx, cy| {
-        let centre = cross_half_pixel(Pixel::new(cx, cy), PixelConvention::PixelCentre);
-        [fx, fy, centre.x, centre.y]
+        let center = cross_half_pixel(Pixel::new(cx, cy), PixelConvention::PixelCenter);
+        [fx, fy, center.x, center.y]
     };
     Ok(match (model, parameters) {
         ("SIMPLE_PINHOLE", &[f, cx, cy]) => Rectilinear::new(pinhole(f, f, cx, cy)).into(),

@@ -49,7 +49,7 @@ fn syntax_of(text: &str) -> Syntax {
         Some('<') => return Syntax::Xml,
         _ => {}
     }
-    if super::recognise_lines(text).is_some() {
+    if super::recognize_lines(text).is_some() {
         return Syntax::Lines;
     }
     let first_line = text

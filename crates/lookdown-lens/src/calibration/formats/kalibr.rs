@@ -4,24 +4,19 @@
 //! The parameters of the sphere models come before the focal lengths: `omni` is `xi fu fv pu pv`,
 //! `ds` is `xi alpha fu fv pu pv`, `eucm` is `alpha beta fu fv pu pv`.
 
+use serde_json::Value;
+
 use super::{
     Camera, FileCamera, FormatError,
+    camera_file::named,
     distortion::{Distortion, are_all_zero, four, not_a_fisheye},
     fields::Fields,
 };
 use crate::geometry::lens::{DoubleSphere, Eucm, Fov, KannalaBrandt, LensModel, Mei, Rectilinear};
 
 pub(super) fn read(fields: &Fields<'_>) -> Vec<FileCamera> {
-    let cameras = fields
-        .map()
-        .iter()
-        .filter(|(_, entry)| entry.get("camera_model").is_some());
-    cameras
-        .map(|(name, _)| FileCamera {
-            name: Some(name.clone()),
-            camera: fields.child(name).and_then(|camera| read_camera(&camera)),
-        })
-        .collect()
+    let is_camera = |entry: &Value| entry.get("camera_model").is_some();
+    named(fields, is_camera, read_camera)
 }
 
 fn read_camera(camera: &Fields<'_>) -> Result<Camera, FormatError> {

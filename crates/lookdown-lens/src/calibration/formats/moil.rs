@@ -4,23 +4,15 @@
 
 use serde_json::Value;
 
-use super::{Camera, FileCamera, FormatError, claimed_field, fields::Fields};
+use super::{Camera, FileCamera, FormatError, camera_file::named, claimed_field, fields::Fields};
 use crate::geometry::lens::RadialPolynomial;
 
 pub(super) fn read(fields: &Fields<'_>) -> Vec<FileCamera> {
     if fields.has("calibrationRatio") {
         return super::alone(read_camera(fields));
     }
-    let cameras = fields
-        .map()
-        .iter()
-        .filter(|(_, entry)| entry.get("calibrationRatio").is_some_and(Value::is_number));
-    cameras
-        .map(|(name, _)| FileCamera {
-            name: Some(name.clone()),
-            camera: fields.child(name).and_then(|camera| read_camera(&camera)),
-        })
-        .collect()
+    let is_camera = |entry: &Value| entry.get("calibrationRatio").is_some_and(Value::is_number);
+    named(fields, is_camera, read_camera)
 }
 
 fn read_camera(camera: &Fields<'_>) -> Result<Camera, FormatError> {

@@ -16,7 +16,7 @@ pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
         ));
     }
     let image = intrinsic.image("width", "height")?;
-    let centre = |side: u32| f64::from(side) / 2.0 - 0.5;
+    let center = |side: u32| f64::from(side) / 2.0 - 0.5;
     let coefficients = vec![
         0.0,
         intrinsic.number("k1")?,
@@ -25,8 +25,8 @@ pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
         intrinsic.number("k4")?,
     ];
     let aspect = intrinsic.number_or("aspect_ratio", 1.0)?;
-    let cx = intrinsic.number("cx_offset")? + centre(image.width);
-    let cy = intrinsic.number("cy_offset")? + centre(image.height);
+    let cx = intrinsic.number("cx_offset")? + center(image.width);
+    let cy = intrinsic.number("cy_offset")? + center(image.height);
     let lens = RadialPolynomial {
         aspect,
         ..RadialPolynomial::new(coefficients, [cx, cy])

@@ -61,7 +61,7 @@ fn target(x: f64, y: f64, side: f64) -> CropTarget {
 }
 
 #[test]
-fn neighbours_of_like_size_share_one_crop() {
+fn neighbors_of_like_size_share_one_crop() {
     let near = [target(0.0, 0.0, 100.0), target(210.0, 190.0, 100.0)];
     assert_eq!(place_crops(&near, 9, FILL, SIDE).len(), 1);
     let far = [target(0.0, 0.0, 100.0), target(260.0, 0.0, 100.0)];
@@ -71,7 +71,7 @@ fn neighbours_of_like_size_share_one_crop() {
 }
 
 #[test]
-fn a_crop_moves_to_the_side_with_more_neighbours() {
+fn a_crop_moves_to_the_side_with_more_neighbors() {
     let crowd = [
         target(1000.0, 1000.0, 100.0),
         target(780.0, 1000.0, 100.0),

@@ -134,7 +134,7 @@ fn cell(position: f64, side: f64) -> u32 {
 
 /// Returns true if a position of the frame can show a person who stands near an area.
 fn may_show(filter: &FootFilter, at: Pixel, lens: &Lens, mount: &Mount) -> bool {
-    let Some(ray) = lens.unproject(&cross_half_pixel(at, PixelConvention::PixelCentre)) else {
+    let Some(ray) = lens.unproject(&cross_half_pixel(at, PixelConvention::PixelCenter)) else {
         return false;
     };
     let levelled = mount.camera_from_floor().inverse_transform_vector(&ray);

@@ -45,8 +45,8 @@ mod tests {
         let plane = ImagePlane::new(210.0, 205.0, 299.5, 301.25);
         let lens = stereographic(plane);
         for theta in [0.0, 0.3, 1.399] {
-            let normalised = lens.continued_beyond_rim(&at(theta)).unwrap();
-            let pixel = plane.pixel_from_normalised(normalised.x, normalised.y);
+            let normalized = lens.continued_beyond_rim(&at(theta)).unwrap();
+            let pixel = plane.pixel_from_normalized(normalized.x, normalized.y);
             assert!((pixel - lens.project(&at(theta)).unwrap()).norm() < 1e-9);
         }
     }

@@ -73,14 +73,14 @@ impl ImagePlane {
         self.fx * self.fy - self.skew * self.row_skew
     }
 
-    pub(super) fn pixel_from_normalised(&self, x: f64, y: f64) -> Pixel {
+    pub(super) fn pixel_from_normalized(&self, x: f64, y: f64) -> Pixel {
         Pixel::new(
             self.fx * x + self.skew * y + self.cx,
             self.row_skew * x + self.fy * y + self.cy,
         )
     }
 
-    pub(super) fn normalised_from_pixel(&self, pixel: &Pixel) -> (f64, f64) {
+    pub(super) fn normalized_from_pixel(&self, pixel: &Pixel) -> (f64, f64) {
         let (right, down) = (pixel.x - self.cx, pixel.y - self.cy);
         let determinant = self.determinant();
         (

@@ -28,7 +28,7 @@ pub(super) fn one() -> f64 {
 /// * `Ideal`: `focal`, or `fx` and `fy`, for a curve without parameters;
 /// * `Pinhole`: `fx` and `fy`;
 /// * `SkewedPinhole`: `fx`, `fy` and `skew`;
-/// * `Centred`: none but `cx` and `cy`; the model's file has a `plane` function for the rest.
+/// * `Centered`: none but `cx` and `cy`; the model's file has a `plane` function for the rest.
 macro_rules! lens_parameters {
     ($(#[$doc:meta])* pub struct $Model:ident: Ideal with $Curve:ident;) => {
         lens_parameters! {
@@ -98,7 +98,7 @@ macro_rules! lens_parameters {
             } { skew }
         }
     };
-    ($(#[$doc:meta])* pub struct $Model:ident: Centred { $($own:tt)* }) => {
+    ($(#[$doc:meta])* pub struct $Model:ident: Centered { $($own:tt)* }) => {
         lens_parameters! { @struct $(#[$doc])* $Model { $($own)* } {} }
     };
     (

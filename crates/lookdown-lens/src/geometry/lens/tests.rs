@@ -14,7 +14,7 @@ fn plane() -> ImagePlane {
 
 /// Replaced by [`plane`].
 const ANY_PINHOLE: Pinhole = [1.0, 1.0, 0.0, 0.0];
-const CENTRE: [f64; 2] = [0.0, 0.0];
+const CENTER: [f64; 2] = [0.0, 0.0];
 
 fn lens_of(
     model: impl Into<LensModel>,
@@ -29,11 +29,11 @@ fn kannala_brandt(k: [f64; 4]) -> LensModel {
 }
 
 fn radial_polynomial(coefficients: Vec<f64>) -> LensModel {
-    RadialPolynomial::new(coefficients, CENTRE).into()
+    RadialPolynomial::new(coefficients, CENTER).into()
 }
 
 fn ocam(polynomial: Vec<f64>) -> LensModel {
-    Ocam::new(polynomial, CENTRE).into()
+    Ocam::new(polynomial, CENTER).into()
 }
 
 fn mei(xi: f64, [k1, k2, p1, p2]: [f64; 4]) -> LensModel {
@@ -41,7 +41,7 @@ fn mei(xi: f64, [k1, k2, p1, p2]: [f64; 4]) -> LensModel {
 }
 
 fn f_theta(angle_to_pixel: Option<[f64; 6]>, pixel_to_angle: Option<[f64; 6]>) -> LensModel {
-    let [cx, cy] = CENTRE;
+    let [cx, cy] = CENTER;
     LensModel::FTheta(FTheta {
         angle_to_pixel,
         pixel_to_angle,
@@ -155,15 +155,15 @@ proptest! {
     }
 
     #[test]
-    fn every_model_sees_more_of_the_world_farther_from_its_centre(
+    fn every_model_sees_more_of_the_world_farther_from_its_center(
         lens in every_lens(),
         share in 0.0..0.999,
         azimuth in -PI..PI,
     ) {
-        let centre = lens.principal_point();
+        let center = lens.principal_point();
         let distance = |share: f64| {
             let ray = ray_at(lens.max_theta() * share, azimuth);
-            (lens.project(&ray).expect("inside the valid range") - centre).norm()
+            (lens.project(&ray).expect("inside the valid range") - center).norm()
         };
         prop_assert!(distance(share) < distance(share + 1e-3));
     }

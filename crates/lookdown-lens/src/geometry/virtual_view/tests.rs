@@ -17,7 +17,7 @@ fn direction(elevation: f64, azimuth: f64) -> ViewDirection {
 
 proptest! {
     #[test]
-    fn a_pole_at_the_view_centre_stands_upright_under_any_mount(
+    fn a_pole_at_the_view_center_stands_upright_under_any_mount(
         up in prop::array::uniform3(-1.0..1.0_f64),
         elevation in 0.05..1.3,
         azimuth in -3.2..3.2,
@@ -47,7 +47,7 @@ proptest! {
 }
 
 #[test]
-fn a_tilted_ceiling_camera_is_centred_on_the_nadir() {
+fn a_tilted_ceiling_camera_is_centered_on_the_nadir() {
     let mount = mount([0.3, 0.1, -1.0]);
     assert!(mount.is_near_nadir());
     let view = VirtualView::new(&direction(0.0, 0.0), &mount, 301, 301);

@@ -12,7 +12,7 @@ use lookdown_lens::geometry::{
 pub(super) const FRAME_SIDE: u32 = 1680;
 /// Replaced by the image plane of [`every_lens`].
 const ANY_PINHOLE: Pinhole = [1.0, 1.0, 0.0, 0.0];
-const CENTRE: [f64; 2] = [0.0, 0.0];
+const CENTER: [f64; 2] = [0.0, 0.0];
 
 /// Lenses of all fourteen models, by name, with the tangential distortion that only `mei` has.
 pub(super) fn every_lens() -> Vec<Lens> {
@@ -23,7 +23,7 @@ pub(super) fn every_lens() -> Vec<Lens> {
         (Orthographic::new(ANY_PINHOLE).into(), 840.0, 1.5),
         (Rectilinear::new(ANY_PINHOLE).into(), 300.0, 1.2),
         (
-            RadialPolynomial::new(vec![0.0, 560.0, 8.0, -15.0, 2.0], CENTRE).into(),
+            RadialPolynomial::new(vec![0.0, 560.0, 8.0, -15.0, 2.0], CENTER).into(),
             1.0,
             1.65,
         ),
@@ -41,7 +41,7 @@ pub(super) fn every_lens() -> Vec<Lens> {
         ),
         (DoubleSphere::new(ANY_PINHOLE, -0.2, 0.6).into(), 420.0, 1.6),
         (
-            Ocam::new(vec![-530.0, 0.0, 6e-4, -2e-7, 4e-10], CENTRE).into(),
+            Ocam::new(vec![-530.0, 0.0, 6e-4, -2e-7, 4e-10], CENTER).into(),
             1.0,
             1.6,
         ),
@@ -69,7 +69,7 @@ pub(super) fn every_lens() -> Vec<Lens> {
 }
 
 fn f_theta(angle_to_pixel: Option<[f64; 6]>, pixel_to_angle: Option<[f64; 6]>) -> LensModel {
-    let [cx, cy] = CENTRE;
+    let [cx, cy] = CENTER;
     LensModel::FTheta(FTheta {
         angle_to_pixel,
         pixel_to_angle,

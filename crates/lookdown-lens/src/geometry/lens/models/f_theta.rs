@@ -12,7 +12,7 @@ lens_parameters! {
     /// The radius in pixels is a polynomial of the angle, or the angle one of the radius: the
     /// calibration declares one of the two as its reference. Valid while the polynomial rises.
     /// `u = c · x + d · y + cx`, `v = e · x + y + cy`.
-    pub struct FTheta: Centred {
+    pub struct FTheta: Centered {
         /// From radians to pixels, lowest power first; the constant is 0.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub angle_to_pixel: Option<[f64; 6]>,

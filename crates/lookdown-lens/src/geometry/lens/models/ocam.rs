@@ -17,7 +17,7 @@ lens_parameters! {
     /// while the angle rises, up to a radius of 16 `|a0|`. Scaramuzza, Martinelli and Siegwart
     /// 2006, with `OCamCalib`'s signs. `column = e · y + x + cx`, `row = c · y + d · x + cy`,
     /// counted from 0.
-    pub struct Ocam: Centred {
+    pub struct Ocam: Centered {
         /// The direct polynomial, `a0 … an`; `a0` is negative.
         pub polynomial: Vec<f64>,
         /// Stretch of the rows.

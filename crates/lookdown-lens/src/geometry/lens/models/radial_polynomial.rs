@@ -8,7 +8,7 @@ use crate::geometry::lens::{
 lens_parameters! {
     /// `r = c0 + c1 theta + c2 theta² + …` in pixels. Valid up to the first angle at which it stops
     /// rising.
-    pub struct RadialPolynomial: Centred {
+    pub struct RadialPolynomial: Centered {
         /// `c0 … cn`; `c0` is 0.
         pub coefficients: Vec<f64>,
         /// The height of a pixel's step over its width.

@@ -3,7 +3,7 @@
 use super::{Format, fields::Fields};
 
 /// The line-based format of a text, if it is in one.
-pub(super) fn recognise_lines(text: &str) -> Option<Format> {
+pub(super) fn recognize_lines(text: &str) -> Option<Format> {
     let mut content = text
         .lines()
         .map(str::trim)
@@ -34,7 +34,7 @@ fn is_colmap_camera(line: &str) -> bool {
 }
 
 /// The format of a tree.
-pub(super) fn recognise_tree(fields: &Fields<'_>) -> Option<Format> {
+pub(super) fn recognize_tree(fields: &Fields<'_>) -> Option<Format> {
     let has = |key: &str| fields.has(key);
     let any_entry_has = |keys: &[&str]| {
         let mut entries = fields.map().values();

@@ -7,10 +7,10 @@ use lookdown_lens::calibration::CalibrationFile;
 use lookdown_tracking::furniture::{Furniture, Thing, ThingState};
 
 use crate::{
+    counter::{Counter, CountingOptions},
     definition::CameraDefinition,
-    engine::{CountingOptions, Engine},
     now::Now,
-    report::Report,
+    report::ReceivedReport,
     store::Store,
     sums::Totals,
 };
@@ -22,16 +22,16 @@ const OPTIONS: CountingOptions = CountingOptions {
 /// Time of the first report, seconds since the Unix epoch.
 const START_S: i64 = 1_795_262_400;
 
-/// An engine whose camera `hall` has a mannequin in each report, one a second.
+/// An counter whose camera `hall` has a mannequin in each report, one a second.
 struct Hall {
-    engine: Engine,
+    counter: Counter,
     definition: Arc<CameraDefinition>,
     started: Instant,
     second: i64,
 }
 
 /// The definition of the camera: `mount` has further members.
-fn definition(report: &Report, mount: &str) -> Arc<CameraDefinition> {
+fn definition(report: &ReceivedReport, mount: &str) -> Arc<CameraDefinition> {
     let text = format!(
         r#"{{"id": "hall", "image": {{"width": 1000, "height": 1000}},
             "lens": {{"model": "equidistant", "focal": 318.3, "cx": 499.5, "cy": 499.5,
@@ -44,7 +44,7 @@ fn definition(report: &Report, mount: &str) -> Arc<CameraDefinition> {
     Arc::new(CameraDefinition::new(key, &calibration.unwrap()))
 }
 
-fn report(second: i64, revision: u8) -> Report {
+fn report(second: i64, revision: u8) -> ReceivedReport {
     let received = jiff::Timestamp::from_second(START_S + second).unwrap();
     let text = format!(
         r#"{{"camera": "hall", "received_at": "{received}",
@@ -61,7 +61,7 @@ fn report(second: i64, revision: u8) -> Report {
 impl Hall {
     fn new() -> Self {
         Self {
-            engine: Engine::new(OPTIONS, 0, Totals::default()),
+            counter: Counter::new(OPTIONS, 0, Totals::default()),
             definition: definition(&report(0, 1), ""),
             started: Instant::now(),
             second: 0,
@@ -78,19 +78,19 @@ impl Hall {
                 unix_ms: (START_S + self.second) * 1000,
                 instant: self.started,
             };
-            self.engine.accept(event, &report, &self.definition, now);
+            self.counter.accept(event, &report, &self.definition, now);
             self.started += clock;
             self.second += 1;
         }
     }
 
     fn persons(&self) -> Option<u64> {
-        let snapshot = self.engine.snapshot((START_S + self.second) * 1000);
+        let snapshot = self.counter.snapshot((START_S + self.second) * 1000);
         snapshot.cameras[0].persons
     }
 
     fn states(&self) -> Vec<ThingState> {
-        let furniture = self.engine.furniture("hall");
+        let furniture = self.counter.furniture("hall");
         let things = furniture.into_iter().flat_map(Furniture::things);
         things.map(Thing::state).collect()
     }
@@ -129,19 +129,19 @@ fn furniture_and_decisions_survive_a_restart() {
     let path = folder.path().join("counts.sqlite");
     let mut hall = Hall::with_furniture();
     assert_eq!(
-        hall.engine.change_furniture("hall", |all| all.confirm(1)),
+        hall.counter.change_furniture("hall", |all| all.confirm(1)),
         Some(true)
     );
-    assert!(hall.engine.is_urgent());
-    let batch = hall.engine.take_batch().unwrap();
+    assert!(hall.counter.is_urgent());
+    let batch = hall.counter.take_batch().unwrap();
     Store::open(&path)
         .unwrap()
         .commit(&batch, &[], None)
         .unwrap();
     let resumed = Store::open(&path).unwrap().resumed().unwrap();
-    hall.engine = Engine::new(OPTIONS, resumed.last_event, resumed.totals);
+    hall.counter = Counter::new(OPTIONS, resumed.last_event, resumed.totals);
     for scene in resumed.scenes {
-        hall.engine.resume(scene, |_| Arc::clone(&hall.definition));
+        hall.counter.resume(scene, |_| Arc::clone(&hall.definition));
     }
     hall.follow(10, Duration::from_secs(1));
     assert_eq!(
@@ -154,15 +154,17 @@ fn furniture_and_decisions_survive_a_restart() {
 fn furniture_taken_back_counts_again() {
     let mut hall = Hall::with_furniture();
     assert_eq!(
-        hall.engine.change_furniture("hall", |all| all.take_back(9)),
+        hall.counter
+            .change_furniture("hall", |all| all.take_back(9)),
         Some(false)
     );
     assert_eq!(
-        hall.engine.change_furniture("hall", |all| all.take_back(1)),
+        hall.counter
+            .change_furniture("hall", |all| all.take_back(1)),
         Some(true)
     );
     assert_eq!(
-        hall.engine
+        hall.counter
             .change_furniture("attic", |all| all.take_back(1)),
         None
     );

@@ -2,10 +2,10 @@
 
 use lookdown_tracking::furniture::Furniture;
 
-use super::Engine;
+use super::Counter;
 use crate::definition::CameraDefinition;
 
-impl Engine {
+impl Counter {
     /// Returns the furniture of a camera.
     pub(crate) fn furniture(&self, camera: &str) -> Option<&Furniture> {
         self.scene_of(camera)?.furniture(camera)

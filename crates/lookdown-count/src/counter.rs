@@ -17,7 +17,7 @@ use crate::{
     definition_key::DefinitionKey,
     drops::{DropReason, Drops},
     now::{LogPause, Now},
-    report::Report,
+    report::ReceivedReport,
     scene::{ReportTime, Scene, SceneState},
     scene_camera::NamedCrossing,
     sums::{DAY_MS, Owner, Sums, Totals},
@@ -38,7 +38,7 @@ pub(crate) struct CountingOptions {
 }
 
 /// The cameras and sites.
-pub(crate) struct Engine {
+pub(crate) struct Counter {
     options: CountingOptions,
     scenes: BTreeMap<Owner, Scene>,
     /// The scene of each camera.
@@ -73,7 +73,7 @@ pub(crate) enum Accepted {
     Dropped(DropReason),
 }
 
-impl Engine {
+impl Counter {
     pub(crate) fn new(options: CountingOptions, last_event: u64, totals: Totals) -> Self {
         Self {
             options,
@@ -177,7 +177,7 @@ impl Engine {
     pub(crate) fn accept(
         &mut self,
         event: u64,
-        report: &Report,
+        report: &ReceivedReport,
         definition: &Arc<CameraDefinition>,
         now: Now,
     ) -> Accepted {
@@ -192,7 +192,7 @@ impl Engine {
     fn count(
         &mut self,
         event: u64,
-        report: &Report,
+        report: &ReceivedReport,
         definition: &Arc<CameraDefinition>,
         now: Now,
     ) -> Result<Vec<NamedCrossing>, DropReason> {
@@ -266,7 +266,7 @@ impl Engine {
     }
 
     /// Logs once that reports are dated after the own clock.
-    fn warn_of_clock(&mut self, event: u64, report: &Report, now: Now) {
+    fn warn_of_clock(&mut self, event: u64, report: &ReceivedReport, now: Now) {
         let stored_ms = i64::try_from(event / 1000).unwrap_or(i64::MAX);
         let ahead_ms = stored_ms
             .max(report.at_ms(true))
