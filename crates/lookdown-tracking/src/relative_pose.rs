@@ -111,20 +111,16 @@ pub fn relative_pose(first: &[Walk], second: &[Walk]) -> Result<RelativePose, No
     };
     #[expect(clippy::cast_precision_loss, reason = "far below 2^52 steps")]
     let is_rival = |support: usize| support as f64 >= AMBIGUOUS * most as f64;
-    let mut motion = best;
-    let mut agreeing = agreeing(&pairs, &motion);
-    for _ in 0..ROUNDS {
-        motion = Motion::fitted(agreeing.iter().copied());
-        agreeing = self::agreeing(&pairs, &motion);
-        if agreeing.is_empty() {
-            return Err(NoPose::TooFew(0));
-        }
-    }
+    let (motion, agreeing) = refined(&pairs, best);
     if agreeing.len() < LEAST_PAIRS {
         return Err(NoPose::TooFew(agreeing.len()));
     }
+    // A pose of one short walk is rough, and may be the same as the best one.
     let rivals = poses.iter().filter(|(_, support)| is_rival(*support));
-    if rivals.into_iter().any(|(rival, _)| !rival.is_near(&motion)) {
+    let is_another = |(rival, _): &(Motion, usize)| {
+        !rival.is_near(&motion) && !refined(&pairs, *rival).0.is_near(&motion)
+    };
+    if rivals.into_iter().any(is_another) {
         return Err(NoPose::Ambiguous);
     }
     let scale = scale(&agreeing);
@@ -177,6 +173,19 @@ fn agreeing<'a>(pairs: &'a [Pair], motion: &Motion) -> Vec<&'a Pair> {
         .iter()
         .filter(|pair| pair.distance(motion) <= MAX_DISTANCE_M);
     near.collect()
+}
+
+/// A pose that is fitted to the pairs that agree with it, and these.
+fn refined(pairs: &[Pair], mut motion: Motion) -> (Motion, Vec<&Pair>) {
+    let mut near = agreeing(pairs, &motion);
+    for _ in 0..ROUNDS {
+        if near.is_empty() {
+            break;
+        }
+        motion = Motion::fitted(near.iter().copied());
+        near = agreeing(pairs, &motion);
+    }
+    (motion, near)
 }
 
 /// The ratio of the spreads of the first and the second places.
