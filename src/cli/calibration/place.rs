@@ -36,7 +36,7 @@ pub(in super::super) struct Arguments {
     /// The camera that is placed
     #[arg(value_name = "CAMERA")]
     camera: String,
-    /// How long the people of both cameras are followed
+    /// Time for which the people of both cameras are followed, minutes
     #[arg(long, value_name = "MINUTES", default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=240))]
     minutes: u64,
     #[command(flatten)]
@@ -97,7 +97,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
 }
 
 fn rounded(value: f64, steps: f64) -> f64 {
-    (value * steps).round() / steps
+    // Not -0.
+    (value * steps).round() / steps + 0.0
 }
 
 /// Follows the people of both cameras.

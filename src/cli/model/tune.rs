@@ -167,7 +167,7 @@ fn set(manifest: &mut DocumentMut, profile: Profile, tuning: &Tuning) -> anyhow:
         table.set_implicit(true);
         Item::Table(table)
     });
-    let tunings = tunings.as_table_mut().context("tuning is no table")?;
+    let tunings = tunings.as_table_mut().context("tuning is not a table")?;
     let mut table = Table::new();
     for (key, number) in [
         ("even_odds", even_odds),

@@ -1,0 +1,85 @@
+"""Two cameras over one floor: `lookdown run` follows the people of both, and `lookdown calibration place` places one.
+
+Both show the rendered walks. The second one hangs at the same place, turned by a quarter.
+"""
+
+import json
+import re
+import subprocess
+import tempfile
+import unittest
+import urllib.error
+from pathlib import Path
+
+from harness.places import LOOKDOWN
+from harness.processes import Server, free_ports, running
+from waiting import wait_until
+
+from cameras import http_camera
+
+CLIP = Path(__file__).resolve().parent / "walks"
+CAMERAS = {"hall": "null", "lobby": "transpose=1"}
+"""The cameras, and the filter of ffmpeg for their frames: the second one is turned clockwise."""
+YAW_DEG = -90
+RATE = 5
+
+
+def tracks(server: Server, name: str) -> list[dict]:
+    """The tracks of a camera; none before its first report."""
+    try:
+        return json.loads(server.get(f"/counts/{name}/tracks"))["tracks"]
+    except urllib.error.HTTPError:
+        return []
+
+
+class Place(unittest.TestCase):
+    """The place of the second camera on the floor of the first one."""
+
+    def setUp(self):
+        self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
+        calibration = json.loads((CLIP / "calibration.json").read_text(encoding="utf-8"))
+        (self.folder / "calibrations").mkdir()
+        for name, turned in CAMERAS.items():
+            own = {key: value for key, value in calibration.items() if key != "lines"} | {"id": name}
+            (self.folder / "calibrations" / f"{name}.json").write_text(json.dumps(own), encoding="utf-8")
+            (self.folder / name).mkdir()
+            frames = ["-vf", turned, "-q:v", "2", "-start_number", "0", self.folder / name / "%d.jpg"]
+            subprocess.run(["ffmpeg", "-v", "error", "-i", CLIP / "walks.mp4", *frames], check=True)
+
+    def camera(self, name: str) -> int:
+        """The port of a camera. Both show the same moment."""
+        count = len(list((self.folder / name).iterdir()))
+        frames = [(self.folder / name / f"{number}.jpg").read_bytes() for number in range(count)]
+        return self.enterContext(http_camera(frames, RATE))
+
+    def settings(self) -> Path:
+        """The settings of both cameras."""
+        cameras = [
+            f'[[cameras]]\nname = "{name}"\nurl = "http://127.0.0.1:{self.camera(name)}/stream"\n'
+            f'calibration = "{name}"\nprofile = "fast"\nevery = "400ms"\n'
+            for name in CAMERAS
+        ]
+        file = self.folder / "lookdown.toml"
+        file.write_text("".join(cameras), encoding="utf-8")
+        return file
+
+    def test_a_turned_camera_at_the_same_place_is_placed(self):
+        (port,) = free_ports(1)
+        variables = {
+            "LOOKDOWN__SERVER__LISTEN": f"127.0.0.1:{port}",
+            "LOOKDOWN__CALIBRATIONS__PATH": str(self.folder / "calibrations"),
+            "LOOKDOWN__COUNTS__PATH": str(self.folder / "counts.sqlite"),
+            "LOOKDOWN__STATE__PATH": str(self.folder / "state"),
+            "LOOKDOWN__SHUTDOWN__GRACE_MILLIS": "0",
+        }
+        server = f"http://127.0.0.1:{port}"
+        command = [str(LOOKDOWN), "run", str(self.settings())]
+        with running("place", command, port, "/readyz", variables) as process:
+            wait_until(lambda: all(tracks(process, name) for name in CAMERAS), "both cameras have tracks")
+            place = [LOOKDOWN, "calibration", "place", *CAMERAS, "--minutes", "1", "--server", server]
+            placed = subprocess.run(place, capture_output=True, text=True, timeout=120)
+        print(placed.stdout, placed.stderr, flush=True)
+        self.assertEqual(placed.returncode, 0, placed.stderr)
+        x, y, yaw = map(float, re.findall(r"-?\d+\.?\d*", placed.stdout))
+        self.assertLess(max(abs(x), abs(y)), 0.15)
+        self.assertLess(abs(yaw - YAW_DEG), 2)
