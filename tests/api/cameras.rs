@@ -19,7 +19,7 @@ use tokio::{
 use crate::service::{Bounds, Service};
 
 const CAMERA: &str = r#"{ "url": "rtsp://127.0.0.1:9/" }"#;
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_mins(1);
 /// Most requests that wait for the folder.
 const MAX_WAITING: usize = 32;
 
