@@ -259,17 +259,21 @@ async fn tracks_are_current_and_anonymous() {
     .await;
     with_companion(&server, quick(), folder.path(), async |companion| {
         let tracks = companion
-            .until("there are two tracks", async |companion: &Companion| {
-                let (status, body) = companion.get("/counts/hall/tracks").await;
-                let tracks: Value = serde_json::from_str(&body).unwrap();
-                let is_complete = tracks["tracks"]
-                    .as_array()
-                    .is_some_and(|list| list.len() == 2);
-                (status == 200 && is_complete).then_some(tracks)
-            })
+            .until(
+                "two tracks, one in the zone",
+                async |companion: &Companion| {
+                    let (status, body) = companion.get("/counts/hall/tracks").await;
+                    let tracks: Value = serde_json::from_str(&body).unwrap();
+                    let is_complete = tracks["tracks"]
+                        .as_array()
+                        .is_some_and(|list| list.len() == 2);
+                    // Entering takes a second.
+                    let is_in_zone = tracks["zones"][0]["persons"] == 1;
+                    (status == 200 && is_complete && is_in_zone).then_some(tracks)
+                },
+            )
             .await;
         assert_eq!(tracks["is_current"], true);
-        assert_eq!(tracks["zones"][0]["persons"], 1);
         let door = &tracks["lines"][0];
         assert_eq!(door["crossings"]["in"], 0);
         assert_eq!(door["outline_px"].as_array().unwrap().len(), 17);

@@ -13,6 +13,7 @@ mod priority;
 mod profile;
 mod score_calibration;
 mod tuning;
+mod tunings;
 
 pub use defaults::{DefaultSource, DefaultUsed, DetectDefaults};
 pub use detect_parameters::{DetectParameters, parse_profile};
@@ -22,4 +23,5 @@ pub use parameter_spec::{Interface, JsonType, ParameterDefault, ParameterKind, P
 pub use priority::Priority;
 pub use profile::Profile;
 pub(crate) use score_calibration::ScoreCalibration;
-pub use tuning::{Tuning, Tunings};
+pub use tuning::Tuning;
+pub use tunings::Tunings;

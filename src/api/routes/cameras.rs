@@ -212,8 +212,7 @@ pub(in crate::api) async fn put(
 
 /// Pause or resume a camera
 ///
-/// It stays so after a restart. Unlike the other changes, this one applies to cameras of the settings,
-/// too.
+/// It stays so after a restart. This change applies to cameras of the settings, too.
 #[utoipa::path(
     patch, path = "/cameras/{camera}", tag = "cameras", operation_id = "change_camera",
     params(("camera" = String, Path, description = "The name of the camera.", example = "hall")),
@@ -255,11 +254,8 @@ pub(in crate::api) async fn delete(
     Path(name): Path<String>,
 ) -> Result<StatusCode, Problem> {
     let deleted_name = name.clone();
-    if !using_files(&state, deadline, move |cameras| {
-        cameras.delete(&deleted_name)
-    })
-    .await?
-    {
+    let delete = move |cameras: &Cameras| cameras.delete(&deleted_name);
+    if !using_files(&state, deadline, delete).await? {
         return Err(unknown());
     }
     tracing::info!(camera = name, "the camera was deleted");

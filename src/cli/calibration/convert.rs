@@ -30,7 +30,7 @@ pub(in super::super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let path = arguments.source.file.display();
     let id = arguments.id.as_deref().map(str::parse).transpose();
-    let (native, notes) = arguments.source.read_native(id.context("--id")?)?;
+    let (native, notes) = arguments.source.read_native(id.context("--id")?.as_ref())?;
     let exported = arguments.to.write(&native)?;
     let notes = notes.iter().map(ToString::to_string);
     for note in notes.chain(exported.lost) {

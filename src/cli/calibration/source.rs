@@ -102,14 +102,14 @@ impl Source {
     /// this ID or its own one. Returns the notes of the reader, too.
     pub(super) fn read_native(
         &self,
-        id: Option<CalibrationId>,
+        id: Option<&CalibrationId>,
     ) -> anyhow::Result<(NativeCalibration, Vec<Warning>)> {
         let path = self.file.display();
         let (_, camera) = self.read_one()?;
         let calibration = camera.checked.with_context(|| path.to_string())?;
         let stated = camera.stated.camera.with_context(|| path.to_string())?;
         let (width, height) = calibration.image_size();
-        let id = id.as_ref().unwrap_or(calibration.id()).to_string();
+        let id = id.unwrap_or(calibration.id()).to_string();
         let native = stated.to_native(id, NativeImage { width, height });
         Ok((native, stated.notes))
     }
