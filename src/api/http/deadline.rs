@@ -156,7 +156,7 @@ mod tests {
     use std::sync::{Arc, mpsc::sync_channel};
 
     use parking_lot::Mutex;
-    use tokio::spawn;
+    use tokio::{spawn, time::timeout};
 
     use super::*;
 
@@ -176,9 +176,12 @@ mod tests {
                 }))
             })
             .collect();
-        while HANGING.free.available_permits() > 0 {
-            tokio::task::yield_now().await;
-        }
+        let all_wait = async {
+            while HANGING.free.available_permits() > 0 {
+                tokio::task::yield_now().await;
+            }
+        };
+        timeout(Duration::from_secs(20), all_wait).await.unwrap();
         let refused = deadline().using(&HANGING, || Ok::<_, Problem>(())).await;
         let refused = refused.unwrap_err();
         assert_eq!(refused.kind(), ProblemKind::Overloaded);
