@@ -1,5 +1,6 @@
 //! `lookdown model tune`
 
+mod manifest_entry;
 mod trial;
 
 use std::{
@@ -17,9 +18,12 @@ use lookdown_detect::{
     parameters::{Profile, Tuning},
 };
 use lookdown_eval::DataSet;
-use toml_edit::{DocumentMut, Item, Table, value};
+use toml_edit::DocumentMut;
 
-use self::trial::{Figures, Trial};
+use self::{
+    manifest_entry::set,
+    trial::{Figures, Trial},
+};
 use crate::cli::{
     eval::TruthFlags, output::UNWRITABLE, parameters::one_of, settings_file::SettingsFile,
 };
@@ -152,33 +156,6 @@ fn rounded(tuning: Tuning) -> Tuning {
         odds_power: round(tuning.odds_power).clamp(0.1, 20.0),
         ..tuning
     }
-}
-
-/// Enters the tuning of a profile. The rest of the manifest stays as it is, with its comments.
-fn set(manifest: &mut DocumentMut, profile: Profile, tuning: &Tuning) -> anyhow::Result<()> {
-    let Tuning {
-        even_odds,
-        odds_power,
-        crop_fill,
-        crop_vote,
-    } = *tuning;
-    let tunings = manifest.entry("tuning").or_insert_with(|| {
-        let mut table = Table::new();
-        table.set_implicit(true);
-        Item::Table(table)
-    });
-    let tunings = tunings.as_table_mut().context("tuning is not a table")?;
-    let mut table = Table::new();
-    for (key, number) in [
-        ("even_odds", even_odds),
-        ("odds_power", odds_power),
-        ("crop_fill", crop_fill),
-        ("crop_vote", crop_vote),
-    ] {
-        table.insert(key, value(number));
-    }
-    tunings.insert(profile.name(), Item::Table(table));
-    Ok(())
 }
 
 /// Replaces a file in one step.

@@ -37,10 +37,7 @@ pageTest(
     await assertAccessible(page);
     // The frame is read from the camera, because no image of it is kept.
     await card.getByRole("button", { name: "Calibrate" }).click();
-    const after = page.locator("#previews .after").first();
-    await after.waitFor();
-    await page.getByRole("slider", { name: /Before/ }).fill("20");
-    assert.match(await after.evaluate((canvas) => getComputedStyle(canvas).clipPath), /20%/);
+    await page.locator("#previews canvas").first().waitFor();
     assert.equal(await page.locator("#calibrate-id").inputValue(), "hall");
     await page.getByRole("button", { name: "Save", exact: true }).click();
     await page.getByText("hall is saved and in use.").waitFor();
@@ -83,7 +80,10 @@ pageTest(
     await assertAccessible(page);
     await suggestion.getByRole("button", { name: "Look" }).click();
     await page.locator("#found-values").getByText(/of \d+ follow the room/).waitFor();
-    await page.locator("#previews canvas").first().waitFor();
+    const after = page.locator("#previews .after").first();
+    await after.waitFor();
+    await page.getByRole("slider", { name: /Before/ }).fill("20");
+    assert.match(await after.evaluate((canvas) => getComputedStyle(canvas).clipPath), /20%/);
     assert.equal(await page.locator("#calibrate-id").inputValue(), "yard");
     assert.equal((await fetch(`${RUN}/calibrations/yard`)).status, 404);
     await page.getByRole("navigation").getByRole("link", { name: "Cameras" }).click();

@@ -11,6 +11,7 @@ use lookdown_eval::{DEFAULT_COUNT_THRESHOLD, DataSet, ScoreFit};
 use tempfile::TempDir;
 use toml_edit::{DocumentMut, value};
 
+use super::manifest_entry::set;
 use crate::{
     app::engine_for,
     cli::eval::{DEFAULT_SCORE_THRESHOLD, detect_group},
@@ -67,7 +68,7 @@ impl Trial {
         tuning: &Tuning,
     ) -> anyhow::Result<Figures> {
         let mut manifest = self.manifest.clone();
-        super::set(&mut manifest, profile, tuning)?;
+        set(&mut manifest, profile, tuning)?;
         let path = self.folder.path().join(MANIFEST);
         fs::write(&path, manifest.to_string())
             .with_context(|| format!("{} cannot be written", path.display()))?;
