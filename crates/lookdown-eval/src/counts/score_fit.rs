@@ -19,7 +19,7 @@ pub struct ScoreFit {
 
 impl Counts {
     /// Returns the change of scores after which [`DEFAULT_COUNT_THRESHOLD`] has the least count
-    /// error, and the scores from [`CALIBRATION_FLOOR`] are the most likely probabilities of being
+    /// error, and the scores from 0.05 on are the most likely probabilities of being
     /// right (Platt scaling with one free parameter). `None` if no detection is right or none is
     /// wrong.
     #[must_use]
