@@ -26,7 +26,8 @@ pub use guess::{GuessedHead, INPUTS, guess_head, guess_size};
 pub use head_output::{HeadOutput, ViewDetection};
 pub use heads::CandidateOptions;
 pub use manifest::{
-    FILE_NAME as MANIFEST, Layout, ManifestInput, ModelManifest, Upstream, name_from,
+    FILE_NAME as MANIFEST, Layout, MAX_BYTES as MANIFEST_MAX_BYTES, ManifestInput, ModelManifest,
+    Upstream, name_from,
 };
 pub use model::Model;
 pub use onnx::{ModelDescription, OnnxDetector, OnnxOptions, OnnxTensor, onnx_loader};

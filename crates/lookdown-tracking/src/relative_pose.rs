@@ -116,11 +116,11 @@ pub fn relative_pose(first: &[Walk], second: &[Walk]) -> Result<RelativePose, No
         return Err(NoPose::TooFew(agreeing.len()));
     }
     // A pose of one short walk is rough, and may be the same as the best one.
-    let rivals = poses.iter().filter(|(_, support)| is_rival(*support));
+    let mut rivals = poses.iter().filter(|(_, support)| is_rival(*support));
     let is_another = |(rival, _): &(Motion, usize)| {
         !rival.is_near(&motion) && !refined(&pairs, *rival).0.is_near(&motion)
     };
-    if rivals.into_iter().any(is_another) {
+    if rivals.any(is_another) {
         return Err(NoPose::Ambiguous);
     }
     let scale = scale(&agreeing);

@@ -14,9 +14,9 @@ use lookdown_common::{ServerClient, read_body};
 use lookdown_tracking::{RelativePose, Walk, relative_pose};
 use serde::Deserialize;
 use serde_json::json;
-use tokio::{runtime, time};
+use tokio::time;
 
-use crate::cli::{output::UNWRITABLE, server_flags::ServerFlags};
+use crate::cli::{async_runtime::of_this_thread, output::UNWRITABLE, server_flags::ServerFlags};
 
 /// Longest time for the tracks of a camera.
 const TIMEOUT: Duration = Duration::from_secs(10);
@@ -62,11 +62,7 @@ struct Walks(BTreeMap<u64, Walk>);
 
 /// Prints the fields `position_m` and `yaw_deg` of the camera's mount.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
-    let runtime = runtime::Builder::new_current_thread()
-        .enable_all()
-        .build()
-        .context("the operating system gives no runtime")?;
-    let (first, second) = runtime.block_on(follow(arguments))?;
+    let (first, second) = of_this_thread()?.block_on(follow(arguments))?;
     let Arguments {
         first: on, camera, ..
     } = arguments;

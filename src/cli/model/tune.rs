@@ -14,10 +14,11 @@ use anyhow::{Context, bail};
 use clap::Args;
 use lookdown_common::files;
 use lookdown_detect::{
-    inference::{MANIFEST, ModelManifest},
+    inference::{MANIFEST, MANIFEST_MAX_BYTES, ModelManifest},
     parameters::{Profile, Tuning},
 };
 use lookdown_eval::DataSet;
+use strum::VariantArray;
 use toml_edit::DocumentMut;
 
 use self::{
@@ -28,8 +29,6 @@ use crate::cli::{
     eval::TruthFlags, output::UNWRITABLE, parameters::one_of, settings_file::SettingsFile,
 };
 
-/// Profiles that are tuned without `--profile`.
-const PROFILES: [Profile; 3] = [Profile::Fast, Profile::Balanced, Profile::Quality];
 /// Shares of a crop's side that are compared, beside the profile's own.
 const CROP_FILLS: [f64; 3] = [0.2, 0.4, 0.5];
 /// Factors for scores from crops that are compared, beside the profile's own.
@@ -37,8 +36,6 @@ const CROP_VOTES: [f64; 4] = [0.5, 0.7, 0.85, 1.0];
 /// Average precision by which another value must be better than the profile's own. Smaller gains
 /// are within the uncertainty of sets of some hundred persons.
 const LEAST_GAIN: f64 = 0.005;
-/// Longest manifest, bytes.
-const MAX_MANIFEST_BYTES: u64 = 1 << 20;
 
 /// Arguments of `lookdown model tune`.
 #[derive(Debug, Args)]
@@ -61,7 +58,7 @@ pub(in super::super) struct Arguments {
 /// Runs the subcommand.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let path = arguments.model.join(MANIFEST);
-    let text = files::read_text(&path, MAX_MANIFEST_BYTES).with_context(|| {
+    let text = files::read_text(&path, MANIFEST_MAX_BYTES).with_context(|| {
         format!(
             "{} cannot be read: write it with `lookdown model check --write-manifest`",
             path.display()
@@ -78,11 +75,12 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         manifest.clone(),
     )?;
     let profiles = match &arguments.profile[..] {
-        [] => &PROFILES,
+        [] => Profile::VARIANTS,
         given => given,
     };
+    let is_asked = |profile: &Profile| !arguments.profile.is_empty() || profile.has_crops();
     let mut out = io::stdout().lock();
-    for &profile in profiles {
+    for profile in profiles.iter().copied().filter(is_asked) {
         let tuned = tune(&trial, &data_set, profile, &mut out)?;
         set(&mut manifest, profile, &tuned)?;
         if !arguments.dry_run {

@@ -20,7 +20,7 @@ pub use upstream::Upstream;
 /// The manifest's name in a model's folder.
 pub const FILE_NAME: &str = "model.toml";
 /// Longest manifest, bytes.
-const MAX_BYTES: u64 = 1 << 20;
+pub const MAX_BYTES: u64 = 1 << 20;
 /// Longest record of a sum, bytes.
 const MAX_RECORD_BYTES: u64 = 1 << 12;
 
