@@ -1,5 +1,5 @@
 //! The repository: its documentation, documented variables, layers, OpenAPI document, the libraries'
-//! API and the fuzzing corpus.
+//! API, the fuzzing corpus and the workflows.
 #![expect(clippy::unwrap_used, reason = "a panic fails the test")]
 
 mod documentation;
@@ -9,3 +9,4 @@ mod links;
 mod openapi;
 mod restricted_calls;
 mod variables;
+mod workflows;
