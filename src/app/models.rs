@@ -2,6 +2,7 @@
 
 use std::{path::Path, sync::Arc};
 
+use anyhow::anyhow;
 use lookdown_detect::{
     inference::{
         CandidateOptions, Int8Use, Model, ModelFolder, ModelLoader, ModelManifest, ModelRepository,
@@ -13,7 +14,9 @@ use lookdown_detect::{
     pipeline::DefaultModels,
 };
 
-use crate::settings::{InferenceSettings, RemoteSettings, Settings, SettingsError, is_installed};
+use crate::settings::{
+    InferenceSettings, RemoteSettings, Settings, SettingsError, explain, is_installed,
+};
 
 /// Opens the repository without loading a model. Also returns the default models.
 ///
@@ -30,7 +33,11 @@ pub(super) fn open(
         one = Some(path.join(model));
     }
     let elsewhere = match one {
-        Some(path) => Some((ModelManifest::locate(&path)?.name, path)),
+        Some(path) => {
+            let manifest =
+                ModelManifest::locate(&path).map_err(|error| anyhow!(explain(&error)))?;
+            Some((manifest.name, path))
+        }
         None => None,
     };
     let defaults = match &elsewhere {
@@ -46,11 +53,13 @@ pub(super) fn open(
             .into_iter()
             .map(ToOwned::to_owned)
             .collect(),
+        explain,
     };
     let repository = match remote {
         Some(remote) => {
             let remote = remote_options(remote, called);
-            let server = Arc::new(RemoteServer::new(remote, Arc::clone(metrics))?);
+            let server = RemoteServer::new(remote, Arc::clone(metrics));
+            let server = Arc::new(server.map_err(|error| anyhow!(explain(&error)))?);
             let loader = remote_loader(settings, Arc::clone(&server));
             ModelRepository::new(options, loader, Arc::clone(metrics)).on(server)
         }

@@ -21,6 +21,7 @@ use lookdown::{
     calibration_store::{Calibrations, FolderStore},
     metrics::Metrics,
     results::{MemoryResults, PicturesOf, ResultLimits, ResultStore},
+    settings::explain,
     telemetry::Tracer,
 };
 use lookdown_detect::{
@@ -170,6 +171,7 @@ pub(crate) fn assembly(gate: &Arc<Gate>) -> (Assembly, TempDir) {
             },
             warm_up_views: one_view,
             kept: vec!["eager".to_owned()],
+            explain,
         },
         Box::new(move |path| {
             if path.join("broken").exists() {

@@ -94,6 +94,7 @@ impl Detector {
                 },
                 warm_up_views: NonZeroUsize::MIN,
                 kept: Vec::new(),
+                explain: ToString::to_string,
             },
             onnx_loader(options.onnx_runtime.clone(), onnx, engine_options.sessions),
             Arc::clone(&metrics),

@@ -115,6 +115,7 @@ fn router() -> Router {
             },
             warm_up_views: one,
             kept: vec![MODEL.to_owned()],
+            explain: ToString::to_string,
         },
         Box::new(|_| Ok(Model::new(Box::new(Silent(NetworkInput::plain(16, 16)))))),
         Arc::clone(&metrics.detect),

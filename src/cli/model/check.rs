@@ -7,7 +7,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use anyhow::Context;
+use anyhow::{Context, anyhow};
 use clap::Args;
 use lookdown_detect::{
     imaging::ViewBatch,
@@ -19,7 +19,7 @@ use crate::{
     annotated_image::AnnotationOptions,
     app::onnx_options,
     cli::{annotate, output::UNWRITABLE, settings_file::SettingsFile},
-    settings::{Settings, find_installed},
+    settings::{Settings, explain, find_installed},
 };
 
 /// The default sample image: a fisheye frame.
@@ -69,7 +69,8 @@ pub(super) fn check_model(
 ) -> anyhow::Result<ExitCode> {
     let library = settings.inference.find_library()?;
     let loading = Instant::now();
-    let mut detector = OnnxDetector::load(&library, model, &onnx_options(&settings))?;
+    let mut detector = OnnxDetector::load(&library, model, &onnx_options(&settings))
+        .map_err(|error| anyhow!(explain(&error)))?;
     let loaded = loading.elapsed();
     let mut out = io::stdout().lock();
     write!(out, "{}", description::Lines(detector.description())).context(UNWRITABLE)?;

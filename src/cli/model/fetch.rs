@@ -6,16 +6,16 @@ use std::{
     process::ExitCode,
 };
 
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use lookdown_detect::inference::{
-    ModelManifest, ModelSource, Sha256Sum, fetch_upstream, fetch_weights, model_names,
+    FetchError, ModelManifest, ModelSource, Sha256Sum, fetch_upstream, fetch_weights, model_names,
 };
 
 use super::check::check_model;
 use crate::{
     cli::{complete, output::UNWRITABLE, settings_file::SettingsFile},
-    settings::Settings,
+    settings::{Settings, explain},
 };
 
 const MEBIBYTE: f64 = 1_048_576.0;
@@ -56,7 +56,7 @@ pub(super) fn list(settings_file: &SettingsFile) -> anyhow::Result<ExitCode> {
                 let size = size.as_deref().unwrap_or("missing");
                 format!("{size:>10}  {licence}{command}")
             }
-            Err(error) => format!("{:>10}  {error}", "invalid"),
+            Err(error) => format!("{:>10}  {}", "invalid", explain(error)),
         };
         writeln!(out, "{name:<40}{line}").context(UNWRITABLE)?;
     }
@@ -71,7 +71,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let (from, accepted) = (arguments.from.as_ref(), arguments.accept_sha256.as_ref());
     let installed = match (&manifest.upstream, from, accepted) {
         (Some(upstream), ..) => {
-            let installed = fetch_upstream(&manifest, upstream, from, accepted)?;
+            let installed = fetch_upstream(&manifest, upstream, from, accepted)
+                .map_err(|error| with_remedy(&error))?;
             let cut = if installed.is_cut { ", cut" } else { "" };
             let sum = installed.published_sha256;
             format!(
@@ -84,7 +85,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
              in that file"
         ),
         (None, Some(from), None) => {
-            format!("{} bytes in {file}", fetch_weights(&manifest, from)?)
+            let bytes = fetch_weights(&manifest, from).map_err(|error| with_remedy(&error))?;
+            format!("{bytes} bytes in {file}")
         }
         (None, None, None) => bail!(
             "the model.toml of {name} has no [upstream]: give a place of converted models with \
@@ -106,7 +108,27 @@ fn manifest(settings: &Settings, name: &str) -> anyhow::Result<ModelManifest> {
         let (folder, known) = (folder.display(), known.join(", "));
         bail!("there is no model {name:?} in {folder} (model.repository): use one of {known}");
     }
-    Ok(ModelManifest::locate(&folder.join(name))?)
+    ModelManifest::locate(&folder.join(name)).map_err(|error| anyhow!(explain(&error)))
+}
+
+/// Adds the remedy that the command line offers.
+fn with_remedy(error: &FetchError) -> anyhow::Error {
+    const CONVERT: &str = "`make models` makes the models without [upstream]";
+    match error {
+        FetchError::Unreadable { .. } => {
+            anyhow!("{error}: check the network and --from; {CONVERT}")
+        }
+        FetchError::WrongSum { .. } => anyhow!("{error}; {CONVERT}"),
+        FetchError::UnknownSum { found, .. } => {
+            anyhow!("{error}: if you trust this file, add --accept-sha256 {found}")
+        }
+        FetchError::NotAccepted { .. } => anyhow!("--accept-sha256: {error}"),
+        FetchError::TooLarge { .. } => anyhow!("{error}: check the address, or --from"),
+        FetchError::NoSum { .. }
+        | FetchError::Archive { .. }
+        | FetchError::Unusable { .. }
+        | FetchError::Unwritable { .. } => anyhow!("{error}"),
+    }
 }
 
 /// The size of a file. `None` if it is missing.

@@ -6,7 +6,7 @@ use std::{
     path::Path,
 };
 
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow, bail};
 use lookdown_detect::{
     inference::{GuessedHead, INPUTS, MANIFEST, OnnxDetector, guess_head, guess_size, name_from},
     parameters::DetectParameters,
@@ -16,7 +16,7 @@ use lookdown_eval::DataSet;
 use crate::{
     app::{engine_for, onnx_options},
     cli::{eval::DEFAULT_SCORE_THRESHOLD, output::UNWRITABLE},
-    settings::{Settings, find_installed},
+    settings::{Settings, explain, find_installed},
 };
 
 /// The data set that the inputs are compared on: frames with annotated persons.
@@ -56,7 +56,8 @@ pub(super) fn write(model: &Path, settings: &Settings) -> anyhow::Result<()> {
         );
     }
     let library = settings.inference.find_library()?;
-    let (inputs, outputs) = OnnxDetector::tensors(&library, model, &onnx_options(settings))?;
+    let (inputs, outputs) = OnnxDetector::tensors(&library, model, &onnx_options(settings))
+        .map_err(|error| anyhow!(explain(&error)))?;
     let (size, is_open) = guess_size(&inputs);
     let Some(head) = guess_head(&outputs, size) else {
         let shapes = outputs

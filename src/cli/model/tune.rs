@@ -10,7 +10,7 @@ use std::{
     process::ExitCode,
 };
 
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use lookdown_common::files;
 use lookdown_detect::{
@@ -25,8 +25,9 @@ use self::{
     manifest_entry::set,
     trial::{Figures, Trial},
 };
-use crate::cli::{
-    eval::TruthFlags, output::UNWRITABLE, parameters::one_of, settings_file::SettingsFile,
+use crate::{
+    cli::{eval::TruthFlags, output::UNWRITABLE, parameters::one_of, settings_file::SettingsFile},
+    settings::explain,
 };
 
 /// Shares of a crop's side that are compared, beside the profile's own.
@@ -67,7 +68,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let mut manifest: DocumentMut = text
         .parse()
         .with_context(|| format!("{} is not valid", path.display()))?;
-    let model = ModelManifest::locate(&arguments.model)?;
+    let model =
+        ModelManifest::locate(&arguments.model).map_err(|error| anyhow!(explain(&error)))?;
     let data_set = arguments.truth.open(&arguments.settings_file)?;
     let trial = Trial::new(
         arguments.settings_file.load()?,

@@ -10,10 +10,10 @@ use std::{
     thread,
 };
 
+use lookdown::settings::explain;
 use lookdown_detect::{
     inference::{
-        InferenceError, ModelFolder, ModelRepository, RepositoryError, RepositoryOptions,
-        RepositoryRow,
+        InferenceError, ModelFolder, ModelRepository, NotLoaded, RepositoryError, RepositoryOptions,
     },
     metrics::DetectMetrics,
 };
@@ -33,6 +33,7 @@ fn options_of(folder: &TempDir) -> RepositoryOptions {
         },
         warm_up_views: NonZeroUsize::new(3).unwrap(),
         kept: vec!["a".to_owned()],
+        explain,
     }
 }
 
@@ -67,9 +68,19 @@ impl Models {
         model.map(|model| model.revision().to_owned())
     }
 
-    fn row(&self, name: &str) -> RepositoryRow {
+    /// The reason why a model is not loaded, or why its last load failed.
+    fn reason(&self, name: &str) -> Option<NotLoaded> {
         let rows = self.repository.rows();
-        rows.into_iter().find(|row| row.name == name).unwrap()
+        let row = rows.into_iter().find(|row| row.name == name);
+        row.unwrap().reason
+    }
+
+    /// The error of the last load of a model.
+    fn failure(&self, name: &str) -> String {
+        match self.reason(name) {
+            Some(NotLoaded::Failed(error)) => error,
+            other => panic!("{other:?}"),
+        }
     }
 
     fn counts(&self) -> (u64, u64) {
@@ -161,7 +172,7 @@ fn a_model_that_fails_its_check_does_not_replace_the_old_one() {
         let error = models.repository.load("a").err().unwrap().to_string();
         assert!(error.contains(reason), "{error}");
         assert_eq!(models.revision("a"), before);
-        assert_eq!(models.row("a").reason, Some(error));
+        assert_eq!(models.failure("a"), error);
         // A refused model is not loaded again until its files change.
         models.repository.reload_changed();
         models.repository.reload_changed();
@@ -171,7 +182,7 @@ fn a_model_that_fails_its_check_does_not_replace_the_old_one() {
         models.repository.reload_changed();
         models.repository.reload_changed();
         assert_ne!(models.revision("a"), before);
-        assert_eq!(models.row("a").reason, None);
+        assert_eq!(models.reason("a"), None);
     }
 }
 
@@ -189,7 +200,7 @@ fn a_file_with_another_sum_is_refused_at_load_and_reload() {
     models.repository.reload_changed();
     models.repository.reload_changed();
     assert_eq!(models.revision("a"), before);
-    let reason = models.row("a").reason.unwrap();
+    let reason = models.failure("a");
     assert!(reason.contains("its SHA-256 is"), "{reason}");
     assert!(!reason.contains('\n'), "{reason}");
     let error = models.repository.load("a").err().unwrap().to_string();
@@ -216,7 +227,7 @@ fn an_invalid_manifest_is_reported_once_and_changes_nothing() {
         models.repository.reload_changed();
     }
     assert_eq!(models.counts(), (1, 1));
-    assert!(models.row("a").reason.unwrap().contains("line 1"));
+    assert!(models.failure("a").contains("line 1"));
 }
 
 #[test]
@@ -277,10 +288,10 @@ fn changed_files_are_retried_after_a_server_outage() {
 }
 
 #[test]
-fn a_missing_model_file_error_names_the_command_to_fetch_it() {
+fn a_missing_model_file_is_reported_with_the_command_to_fetch_it() {
     let models = Models::new();
     fs::remove_file(models.folder.path().join("b/model.onnx")).unwrap();
-    assert!(models.row("b").reason.unwrap().contains("make models"));
+    assert_eq!(models.reason("b"), Some(NotLoaded::NoFile));
     let error = models.repository.load("b").err().unwrap().to_string();
     assert!(error.contains("make models"), "{error}");
 }

@@ -23,6 +23,7 @@ use lookdown::{
     calibration_store::{Calibrations, FolderStore},
     metrics::Metrics,
     results::{MemoryResults, ResultLimits},
+    settings::explain,
 };
 use lookdown_detect::{
     inference::{ModelFolder, ModelRepository, RepositoryOptions},
@@ -49,6 +50,7 @@ fn service(folder: &Path) -> Router {
             },
             warm_up_views: two,
             kept: vec!["person".to_owned()],
+            explain,
         },
         Box::new(model_of_two_sessions),
         Arc::clone(&metrics.detect),

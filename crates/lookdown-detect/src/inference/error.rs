@@ -9,8 +9,7 @@ use super::Device;
 pub enum InferenceError {
     /// The ONNX Runtime library cannot be used.
     #[error(
-        "inference.library_path: ONNX Runtime cannot be loaded from {path}: {detail}; run `make \
-         setup`, or point it to libonnxruntime.so 1.24 or newer"
+        "ONNX Runtime cannot be loaded from {path}: {detail}; use libonnxruntime.so 1.24 or newer"
     )]
     Runtime {
         /// Path of the library.
@@ -20,8 +19,8 @@ pub enum InferenceError {
     },
     /// The library has no support for the device.
     #[error(
-        "inference.device: {device} needs a library that can use it, and {path} cannot; point \
-         inference.library_path to the libonnxruntime.so of the package onnxruntime-gpu, or use cpu"
+        "{device} needs a library that can use it, and {path} cannot; use the libonnxruntime.so \
+         of the package onnxruntime-gpu, or use cpu"
     )]
     NoProvider {
         /// The configured device.
@@ -31,8 +30,8 @@ pub enum InferenceError {
     },
     /// The device or its driver is missing.
     #[error(
-        "inference.device: {device} cannot be used: {detail}; check the GPU's number and its \
-         driver, CUDA and cuDNN libraries, or use cpu"
+        "{device} cannot be used: {detail}; check the GPU's number and its driver, CUDA and cuDNN \
+         libraries, or use cpu"
     )]
     NoDevice {
         /// The configured device.
@@ -41,10 +40,7 @@ pub enum InferenceError {
         detail: String,
     },
     /// The model file or its manifest cannot be read.
-    #[error(
-        "model: {path} cannot be read: {detail}; `make setup` fetches the default models, \
-         `make models` or `lookdown model fetch` the others"
-    )]
+    #[error("model: {path} cannot be read: {detail}")]
     Unreadable {
         /// Path of the file.
         path: PathBuf,
@@ -60,7 +56,7 @@ pub enum InferenceError {
         problem: String,
     },
     /// The model on the inference server is not supported.
-    #[error("model: {model} on the server of inference.url cannot be used: {problem}")]
+    #[error("the model {model} on the inference server cannot be used: {problem}")]
     RemoteModel {
         /// Name of the model on the server.
         model: String,
@@ -74,7 +70,7 @@ pub enum InferenceError {
         retry_after: Duration,
     },
     /// The inference server cannot be reached, or its response is invalid.
-    #[error("inference.url: the server at {url} cannot be used: {detail}")]
+    #[error("the inference server at {url} cannot be used: {detail}")]
     Remote {
         /// Address of the server.
         url: String,
@@ -83,8 +79,8 @@ pub enum InferenceError {
     },
     /// The inference server requires a token, or rejects this one.
     #[error(
-        "inference.bearer_token: the server at {url} rejects the request: {detail}; set the \
-         token that the server's operator issued"
+        "the inference server at {url} rejects the request: {detail}; use the token that the \
+         server's operator issued"
     )]
     RemoteDenied {
         /// Address of the server.

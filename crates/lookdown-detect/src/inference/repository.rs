@@ -32,6 +32,9 @@ pub struct RepositoryOptions {
     pub warm_up_views: NonZeroUsize,
     /// Models used by requests that do not name one. They cannot be unloaded.
     pub kept: Vec<String>,
+    /// Describes the error of a load to the users of the program: the text of the error, and what
+    /// the engine does not know, such as the setting to change.
+    pub explain: fn(&InferenceError) -> String,
 }
 
 /// The models of a folder, loaded or not.
@@ -64,7 +67,18 @@ pub struct RepositoryRow {
     /// Revision in service, if any.
     pub revision: Option<String>,
     /// Reason why it is not loaded, or error of its last load.
-    pub reason: Option<String>,
+    pub reason: Option<NotLoaded>,
+}
+
+/// The reason why a model is not loaded, or why its last load failed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum NotLoaded {
+    /// It was not asked for.
+    NotRequested,
+    /// Its ONNX file is missing.
+    NoFile,
+    /// The error of its last load.
+    Failed(String),
 }
 
 impl ModelRepository {
@@ -160,10 +174,11 @@ impl ModelRepository {
     pub fn rows(&self) -> Vec<RepositoryRow> {
         let mut rows: BTreeMap<String, RepositoryRow> = BTreeMap::new();
         let failures = self.lock().failures.clone();
-        let row = |name: &str, revision, reason: Option<String>| RepositoryRow {
+        let failure = |name: &str| failures.get(name).cloned().map(NotLoaded::Failed);
+        let row = |name: &str, revision, reason: Option<NotLoaded>| RepositoryRow {
             name: name.to_owned(),
             revision,
-            reason: failures.get(name).cloned().or(reason),
+            reason: failure(name).or(reason),
         };
         for name in self.options.folder.names() {
             let reason = self.options.folder.why_not_loaded(&name);
@@ -249,7 +264,11 @@ impl ModelRepository {
     }
 
     fn checked(&self, name: &str, path: &Path, stamp: &Stamp) -> Result<Model, RepositoryError> {
-        let model = (self.loader)(path)?;
+        let refused = |cause| RepositoryError::Refused {
+            text: (self.options.explain)(&cause),
+            cause,
+        };
+        let model = (self.loader)(path).map_err(refused)?;
         if model.name() != name {
             return Err(RepositoryError::OtherName {
                 name: name.to_owned(),
@@ -261,7 +280,7 @@ impl ModelRepository {
             path: path.to_owned(),
             stamp: stamp.clone(),
         });
-        model.warm_up(self.options.warm_up_views)?;
+        model.warm_up(self.options.warm_up_views).map_err(refused)?;
         Ok(model)
     }
 

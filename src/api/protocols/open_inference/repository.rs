@@ -7,7 +7,9 @@ use axum::{
     Json,
     extract::{Path, State},
 };
-use lookdown_detect::inference::{InferenceError, Model, RepositoryError, RepositoryRow};
+use lookdown_detect::inference::{
+    InferenceError, Model, NotLoaded, RepositoryError, RepositoryRow,
+};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -39,6 +41,16 @@ pub(in crate::api) struct RepositoryEntry {
 
 impl From<RepositoryRow> for RepositoryEntry {
     fn from(row: RepositoryRow) -> Self {
+        let name = &row.name;
+        let reason = row.reason.map(|reason| match reason {
+            NotLoaded::NotRequested => {
+                format!("it is not loaded: load it with POST /v2/repository/models/{name}/load")
+            }
+            NotLoaded::NoFile => format!(
+                "its ONNX file is missing: run `make models` or `lookdown model fetch {name}`"
+            ),
+            NotLoaded::Failed(error) => error,
+        });
         Self {
             state: if row.revision.is_some() {
                 "READY"
@@ -47,7 +59,7 @@ impl From<RepositoryRow> for RepositoryEntry {
             },
             name: row.name,
             version: row.revision,
-            reason: row.reason,
+            reason,
         }
     }
 }
@@ -153,16 +165,39 @@ impl From<RepositoryError> for Problem {
                 ProblemKind::UnknownModel
             }
             RepositoryError::Kept { .. } | RepositoryError::Full(_) => ProblemKind::ModelConflict,
-            RepositoryError::Busy | RepositoryError::Refused(InferenceError::RemoteBusy { .. }) => {
-                ProblemKind::ModelBusy
-            }
-            RepositoryError::Refused(
-                InferenceError::Remote { .. } | InferenceError::RemoteDenied { .. },
-            ) => ProblemKind::InferenceUnavailable,
-            RepositoryError::OtherName { .. } | RepositoryError::Refused(_) => {
-                ProblemKind::ModelRefused
-            }
+            RepositoryError::Busy => ProblemKind::ModelBusy,
+            RepositoryError::OtherName { .. } => ProblemKind::ModelRefused,
+            RepositoryError::Refused { cause, .. } => match cause {
+                InferenceError::RemoteBusy { .. } => ProblemKind::ModelBusy,
+                InferenceError::Remote { .. } | InferenceError::RemoteDenied { .. } => {
+                    ProblemKind::InferenceUnavailable
+                }
+                _ => ProblemKind::ModelRefused,
+            },
         };
         Self::new(kind, error.to_string())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_model_that_is_not_loaded_has_the_remedy() {
+        for (reason, remedy) in [
+            (NotLoaded::NotRequested, "POST /v2/repository/models/b/load"),
+            (NotLoaded::NoFile, "`lookdown model fetch b`"),
+            (NotLoaded::Failed("some error".to_owned()), "some error"),
+        ] {
+            let entry = RepositoryEntry::from(RepositoryRow {
+                name: "b".to_owned(),
+                revision: None,
+                reason: Some(reason),
+            });
+            assert_eq!(entry.state, "UNAVAILABLE");
+            let reason = entry.reason.unwrap();
+            assert!(reason.contains(remedy), "{reason}");
+        }
     }
 }

@@ -15,10 +15,7 @@ pub enum FetchError {
         name: String,
     },
     /// The source does not have the file.
-    #[error(
-        "{place} cannot be read ({problem}): check the network and --from; `make models` makes \
-         the models without [upstream]"
-    )]
+    #[error("{place} cannot be read ({problem})")]
     Unreadable {
         /// The file or address.
         place: String,
@@ -28,7 +25,7 @@ pub enum FetchError {
     /// The file is another one.
     #[error(
         "{place} has the SHA-256 {found}, not {wanted} as in the model's model.toml: fetch the \
-         file for this version of Lookdown; `make models` makes the models without [upstream]"
+         file for this version of Lookdown"
     )]
     WrongSum {
         /// The file or address.
@@ -40,8 +37,7 @@ pub enum FetchError {
     },
     /// No sum of the published file is known, and none was accepted.
     #[error(
-        "{place} has the SHA-256 {found}, and the model's model.toml has no sum to compare with: \
-         if you trust this file, add --accept-sha256 {found}"
+        "{place} has the SHA-256 {found}, and the model's model.toml has no sum to compare with"
     )]
     UnknownSum {
         /// The file or address.
@@ -50,7 +46,7 @@ pub enum FetchError {
         found: String,
     },
     /// The file is not the accepted one.
-    #[error("{place} has the SHA-256 {found}, not {accepted} as in --accept-sha256")]
+    #[error("{place} has the SHA-256 {found}, not the accepted {accepted}")]
     NotAccepted {
         /// The file or address.
         place: String,
@@ -78,7 +74,7 @@ pub enum FetchError {
         problem: String,
     },
     /// The file is too large.
-    #[error("{place} has more than {limit} bytes: check the address, or --from")]
+    #[error("{place} has more than {limit} bytes")]
     TooLarge {
         /// The file or address.
         place: String,

@@ -107,7 +107,7 @@ fn a_rejected_token_fails_at_the_start() {
     );
     let message = error.to_string();
     assert!(
-        message.contains("inference.bearer_token") && message.contains("401"),
+        message.contains("use the token") && message.contains("401"),
         "{message}"
     );
 }

@@ -49,8 +49,15 @@ pub enum RepositoryError {
     #[error(transparent)]
     Full(#[from] RegistryFull),
     /// It cannot be read, failed its check, or failed to run.
-    #[error(transparent)]
-    Refused(#[from] InferenceError),
+    #[error("{text}")]
+    Refused {
+        /// The cause.
+        cause: InferenceError,
+        /// The cause as [`RepositoryOptions::explain`] describes it.
+        ///
+        /// [`RepositoryOptions::explain`]: super::RepositoryOptions::explain
+        text: String,
+    },
 }
 
 impl RepositoryError {
@@ -60,7 +67,10 @@ impl RepositoryError {
         matches!(
             self,
             Self::Busy
-                | Self::Refused(InferenceError::Remote { .. } | InferenceError::RemoteBusy { .. })
+                | Self::Refused {
+                    cause: InferenceError::Remote { .. } | InferenceError::RemoteBusy { .. },
+                    ..
+                }
         )
     }
 
@@ -68,6 +78,13 @@ impl RepositoryError {
     /// change.
     #[must_use]
     pub fn is_of_model(&self) -> bool {
-        !self.is_passing() && !matches!(self, Self::Refused(InferenceError::RemoteDenied { .. }))
+        let is_denied = matches!(
+            self,
+            Self::Refused {
+                cause: InferenceError::RemoteDenied { .. },
+                ..
+            }
+        );
+        !self.is_passing() && !is_denied
     }
 }

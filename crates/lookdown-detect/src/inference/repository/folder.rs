@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::RepositoryError;
+use super::{NotLoaded, RepositoryError};
 use crate::inference::{
     ModelManifest,
     manifest::{FILE_NAME, is_name},
@@ -54,12 +54,12 @@ impl ModelFolder {
         names.into_iter().collect()
     }
 
-    /// Remedy for a model that is not loaded.
-    pub(super) fn why_not_loaded(&self, name: &str) -> String {
+    /// Reason why a model is not loaded that was not tried.
+    pub(super) fn why_not_loaded(&self, name: &str) -> NotLoaded {
         if self.find(name).is_ok_and(|path| is_fetched(&path)) {
-            format!("it is not loaded: load it with POST /v2/repository/models/{name}/load")
+            NotLoaded::NotRequested
         } else {
-            format!("its ONNX file is missing: run `make models` or `lookdown model fetch {name}`")
+            NotLoaded::NoFile
         }
     }
 }
