@@ -1,13 +1,13 @@
 //! The files of the state folder, which only this user can read.
 
 use std::{
-    fs, io,
-    io::Write,
-    os::unix::fs::{DirBuilderExt, OpenOptionsExt},
+    fs,
+    io::{self, Write},
+    os::unix::fs::DirBuilderExt,
     path::{Path, PathBuf},
 };
 
-use lookdown_common::{ConfigError, read_file};
+use lookdown_common::{ConfigError, Replacement, read_file};
 use serde::de::DeserializeOwned;
 
 use super::error::CameraError;
@@ -54,25 +54,17 @@ impl StateFolder {
         ConfigError::problem("state.path", &problem)
     }
 
-    /// Writes a file that only this user can read: beside the old one, synced and renamed.
+    /// Writes a file that only this user can read, in one step.
     pub(super) fn write(&self, path: &Path, content: &str) -> Result<(), CameraError> {
-        let unfinished = path.with_extension("part");
-        let written = || {
-            fs::DirBuilder::new()
-                .recursive(true)
-                .mode(0o700)
-                .create(self.0.join(PASSWORDS))?;
-            let mut file = fs::OpenOptions::new()
-                .create(true)
-                .write(true)
-                .truncate(true)
-                .mode(0o600)
-                .open(&unfinished)?;
-            writeln!(file, "{content}")?;
-            file.sync_all()?;
-            fs::rename(&unfinished, path)
-        };
-        written().map_err(|error| CameraError::Folder(path.to_owned(), error))
+        let unwritable = |error| CameraError::Folder(path.to_owned(), error);
+        fs::DirBuilder::new()
+            .recursive(true)
+            .mode(0o700)
+            .create(self.0.join(PASSWORDS))
+            .map_err(unwritable)?;
+        Replacement::of_secret(path).fill(unwritable, |file| {
+            writeln!(file, "{content}").map_err(unwritable)
+        })
     }
 
     /// Removes a file, if it exists.

@@ -19,17 +19,15 @@ const READS: [&str; 6] = [
     "tokio::fs",
 ];
 /// The files that may make them.
-const READERS: [&str; 6] = [
+const READERS: [&str; 5] = [
     "crates/lookdown-common/src/files.rs",
+    // Creates files that replace others, and syncs folders.
+    "crates/lookdown-common/src/replacement.rs",
     // Creates the file that locks the store.
     "crates/lookdown-count/src/store.rs",
-    // Writes a password.
-    "src/cameras/state_folder.rs",
     // Tests of generated documentation.
     "src/api/parameters/reference.rs",
     "src/settings/reference.rs",
-    // Syncs the folder itself.
-    "src/calibration_store/store/folder.rs",
 ];
 /// Calls that start processes, which only `child.rs` makes: it limits them.
 const STARTS: [&str; 2] = ["Command::new(", ".spawn()?"];

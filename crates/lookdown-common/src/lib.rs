@@ -24,6 +24,7 @@ mod log_once;
 pub mod plain_name;
 #[cfg(feature = "companion")]
 mod reload;
+mod replacement;
 #[cfg(feature = "report")]
 pub mod report;
 #[cfg(feature = "companion")]
@@ -34,6 +35,7 @@ mod stored_file;
 pub mod text;
 
 pub use log_once::LogOnce;
+pub use replacement::{Replacement, UNFINISHED, replace_file, sync_folder};
 pub use stored_file::StoredFile;
 
 #[cfg(feature = "companion")]

@@ -2,20 +2,17 @@
 //! `ConfigMap`, whose files change when a link is turned to another folder.
 
 use std::{
-    fs::{self, File},
-    io::{self, ErrorKind, Write},
+    fs,
+    io::{self, ErrorKind},
     os::unix::fs::MetadataExt,
     path::{Path, PathBuf},
     time::{Duration, SystemTime},
 };
 
-use lookdown_common::files;
-use uuid::Uuid;
+use lookdown_common::{UNFINISHED, files, replace_file, sync_folder};
 
 use super::{CalibrationStore, ListedFile, MAX_FILES, Replaces, StoreError};
 
-/// Files with this ending were about to take another's place when their writer was killed.
-const UNFINISHED: &str = "lookdown-unfinished";
 /// No writer takes this long for a file: an older unfinished one has no writer.
 const ABANDONED_AFTER: Duration = Duration::from_mins(10);
 
@@ -56,31 +53,12 @@ impl FolderStore {
         }
     }
 
-    /// Write, sync, rename, sync the folder.
     fn replace(&self, name: &str, content: &[u8]) -> io::Result<()> {
         if self.may_be_missing {
             fs::create_dir_all(&self.path)?;
         }
         self.remove_abandoned()?;
-        // Random: containers on one volume have the same process IDs.
-        let unfinished = format!(".{name}.{}.{UNFINISHED}", Uuid::new_v4().simple());
-        let unfinished = self.path.join(unfinished);
-        let written = File::create(&unfinished).and_then(|mut file| {
-            file.write_all(content)?;
-            file.sync_all()
-        });
-        let replaced = written.and_then(|()| fs::rename(&unfinished, self.path.join(name)));
-        if replaced.is_err() {
-            // The first failure is the one to report.
-            let _ = fs::remove_file(&unfinished);
-        }
-        replaced?;
-        self.sync()
-    }
-
-    /// A rename or removal lasts only once the folder itself is on the disk.
-    fn sync(&self) -> io::Result<()> {
-        File::open(&self.path)?.sync_all()
+        replace_file(&self.path.join(name), content)
     }
 
     /// Removes what killed writers left.
@@ -151,7 +129,7 @@ impl CalibrationStore for FolderStore {
     fn delete(&self, name: &str) -> Result<(), StoreError> {
         let removed = match fs::remove_file(self.path.join(name)) {
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
-            removed => removed.and_then(|()| self.sync()),
+            removed => removed.and_then(|()| sync_folder(&self.path)),
         };
         removed.map_err(|error| self.failed(&error))
     }

@@ -4,15 +4,14 @@ mod manifest_entry;
 mod trial;
 
 use std::{
-    fs,
     io::{self, Write},
-    path::{Path, PathBuf},
+    path::PathBuf,
     process::ExitCode,
 };
 
 use anyhow::{Context, anyhow, bail};
 use clap::Args;
-use lookdown_common::files;
+use lookdown_common::{files, replace_file};
 use lookdown_detect::{
     inference::{MANIFEST, MANIFEST_MAX_BYTES, ModelManifest},
     parameters::{Profile, Tuning},
@@ -86,7 +85,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         let tuned = tune(&trial, &data_set, profile, &mut out)?;
         set(&mut manifest, profile, &tuned)?;
         if !arguments.dry_run {
-            replace(&path, &manifest.to_string())?;
+            replace_file(&path, manifest.to_string().as_bytes())
+                .with_context(|| format!("{} cannot be written", path.display()))?;
             writeln!(out, "{profile}: written to {}", path.display()).context(UNWRITABLE)?;
         }
     }
@@ -148,19 +148,13 @@ fn better(best: Figures, other: Figures, own: f64) -> Figures {
     if gains { other } else { best }
 }
 
-/// Rounds to what a manifest shows.
+/// Rounds to what a manifest shows, within what it may have.
 fn rounded(tuning: Tuning) -> Tuning {
     let round = |value: f64| (value * 1000.0).round() / 1000.0;
-    Tuning {
-        even_odds: round(tuning.even_odds).clamp(0.001, 0.999),
-        odds_power: round(tuning.odds_power).clamp(0.1, 20.0),
+    let rounded = Tuning {
+        even_odds: round(tuning.even_odds),
+        odds_power: round(tuning.odds_power),
         ..tuning
-    }
-}
-
-/// Replaces a file in one step.
-fn replace(path: &Path, text: &str) -> anyhow::Result<()> {
-    let unfinished = path.with_extension("unfinished");
-    let written = fs::write(&unfinished, text).and_then(|()| fs::rename(&unfinished, path));
-    written.with_context(|| format!("{} cannot be written", path.display()))
+    };
+    rounded.clamped()
 }

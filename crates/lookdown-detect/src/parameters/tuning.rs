@@ -26,22 +26,57 @@ impl Tuning {
     /// # Errors
     /// One sentence that names the key, its value and the range.
     pub(crate) fn check(&self) -> Result<(), String> {
+        let mut values = *self;
+        for (key, value, min, max) in values.ranges() {
+            if !(min..=max).contains(value) {
+                return Err(format!("{key} is {value}: use {min} to {max}"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the nearest values that a manifest may have.
+    #[must_use]
+    pub fn clamped(mut self) -> Self {
+        for (_, value, min, max) in self.ranges() {
+            *value = value.clamp(min, max);
+        }
+        self
+    }
+
+    /// The values with their keys, least and greatest values.
+    fn ranges(&mut self) -> [(&'static str, &mut f64, f64, f64); 4] {
         let Self {
             even_odds,
             odds_power,
             crop_fill,
             crop_vote,
-        } = *self;
-        for (key, value, min, max) in [
+        } = self;
+        [
             ("even_odds", even_odds, 0.001, 0.999),
             ("odds_power", odds_power, 0.1, 20.0),
             ("crop_fill", crop_fill, 0.05, 0.9),
             ("crop_vote", crop_vote, 0.01, 1.0),
-        ] {
-            if !(min..=max).contains(&value) {
-                return Err(format!("{key} is {value}: use {min} to {max}"));
-            }
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Tuning;
+
+    #[test]
+    fn clamped_values_are_valid() {
+        for value in [-1.0, 0.0, 0.5, 1.0, 100.0] {
+            let tuning = Tuning {
+                even_odds: value,
+                odds_power: value,
+                crop_fill: value,
+                crop_vote: value,
+            };
+            assert_eq!(tuning.check().is_ok(), value == 0.5);
+            assert_eq!(tuning.clamped().check(), Ok(()));
+            assert_eq!(tuning.clamped() == tuning, value == 0.5);
         }
-        Ok(())
     }
 }

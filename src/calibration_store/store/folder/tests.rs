@@ -1,3 +1,5 @@
+use std::fs::File;
+
 use super::*;
 
 fn names(store: &FolderStore) -> Vec<String> {

@@ -1,12 +1,12 @@
 //! Fetching of converted weights, whose sum is in the manifest.
 
 use std::{
-    fs::{self, File},
-    io::{Read, Write},
+    fs::File,
+    io::{self, Read, Write},
     path::Path,
-    process,
 };
 
+use lookdown_common::Replacement;
 use sha2::{Digest, Sha256};
 
 use super::{
@@ -36,27 +36,20 @@ pub fn fetch_weights(model: &ModelManifest, source: &ModelSource) -> Result<u64,
         path: model.onnx.clone(),
         source,
     };
-    let unfinished = model.onnx.with_extension(format!("{}", process::id()));
-    let finished = copy(reader, &place, &unfinished, wanted);
-    let finished = finished.and_then(|bytes| {
-        fs::rename(&unfinished, &model.onnx).map_err(unwritable)?;
-        Ok(bytes)
-    });
-    if finished.is_err() {
-        // It may not exist.
-        let _ = fs::remove_file(&unfinished);
-    }
-    finished
+    Replacement::of(&model.onnx).fill(unwritable, |file| {
+        copy(reader, &place, file, wanted, unwritable)
+    })
 }
 
 /// Copies a file whose sum is `wanted`. Returns the number of bytes.
-fn copy(reader: impl Read, place: &str, to: &Path, wanted: &str) -> Result<u64, FetchError> {
-    let unwritable = |source| FetchError::Unwritable {
-        path: to.to_owned(),
-        source,
-    };
+fn copy(
+    reader: impl Read,
+    place: &str,
+    to: &mut File,
+    wanted: &str,
+    unwritable: impl Fn(io::Error) -> FetchError,
+) -> Result<u64, FetchError> {
     let place = || place.to_owned();
-    let mut file = File::create(to).map_err(unwritable)?;
     let mut reader = reader.take(MAX_BYTES + 1);
     let (mut sum, mut bytes, mut chunk) = (Sha256::new(), 0, vec![0; CHUNK]);
     loop {
@@ -70,7 +63,7 @@ fn copy(reader: impl Read, place: &str, to: &Path, wanted: &str) -> Result<u64, 
             break;
         }
         sum.update(&chunk[..read]);
-        file.write_all(&chunk[..read]).map_err(unwritable)?;
+        to.write_all(&chunk[..read]).map_err(&unwritable)?;
         bytes += read as u64;
     }
     if bytes > MAX_BYTES {
@@ -87,6 +80,5 @@ fn copy(reader: impl Read, place: &str, to: &Path, wanted: &str) -> Result<u64, 
             wanted: wanted.to_owned(),
         });
     }
-    file.sync_all().map_err(unwritable)?;
     Ok(bytes)
 }

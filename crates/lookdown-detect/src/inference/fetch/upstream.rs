@@ -1,13 +1,12 @@
 //! Installation of the file that the authors of a network publish.
 
 use std::{
-    fs::{self, File},
-    io::{Cursor, Read, Write},
+    io::{Cursor, Read},
     path::Path,
-    process,
     str::FromStr,
 };
 
+use lookdown_common::replace_file;
 use lookdown_lens::revision::sha256_of;
 use reqwest::redirect::Policy;
 use zip::ZipArchive;
@@ -176,20 +175,9 @@ fn install(onnx: &Path, bytes: &[u8]) -> Result<(), FetchError> {
     replace(onnx, bytes)
 }
 
-/// Replaces a file in one step.
 fn replace(path: &Path, content: &[u8]) -> Result<(), FetchError> {
-    let unfinished = path.with_extension(format!("{}", process::id()));
-    let written = File::create(&unfinished).and_then(|mut file| {
-        file.write_all(content)?;
-        file.sync_all()?;
-        fs::rename(&unfinished, path)
-    });
-    written.map_err(|source| {
-        // It may not exist.
-        let _ = fs::remove_file(&unfinished);
-        FetchError::Unwritable {
-            path: path.to_owned(),
-            source,
-        }
+    replace_file(path, content).map_err(|source| FetchError::Unwritable {
+        path: path.to_owned(),
+        source,
     })
 }
