@@ -22,9 +22,9 @@ use crate::{
         detect::upload::Upload,
         http::problem::{Problem, ProblemKind},
         openapi::RawBytes,
+        routes::found_lens::FoundLens,
     },
-    room_calibration::{room_calibration, tilt_deg},
-    rounding::{degrees, pixels, share},
+    room_calibration::room_calibration,
 };
 
 /// A fitted camera.
@@ -34,17 +34,8 @@ pub(in crate::api) struct FittedCamera {
     /// percent of the radius, of `center` in pixels, of `world_up` in degrees.
     #[schema(value_type = Object)]
     calibration: NativeCalibration,
-    /// Field of view of the lens circle, degrees.
-    #[schema(example = 183.2)]
-    field_of_view_deg: f64,
-    /// Angle between the axis of the camera and straight down, degrees.
-    #[schema(example = 4.1)]
-    tilt_deg: f64,
-    /// Number of edges in the frame.
-    edges: usize,
-    /// Share of the length of the edges along three orthogonal directions, 0 to 1.
-    #[schema(example = 0.71)]
-    explained: f64,
+    #[serde(flatten)]
+    lens: FoundLens,
 }
 
 /// Find the lens
@@ -104,9 +95,6 @@ fn fitted(
     let fit = fit.map_err(|error| refused(error.to_string()))?;
     Ok(FittedCamera {
         calibration: room_calibration(id, size, &fit),
-        field_of_view_deg: degrees(2.0 * fit.max_theta),
-        tilt_deg: pixels(tilt_deg(&fit)),
-        edges: fit.edges,
-        explained: share(fit.explained),
+        lens: FoundLens::from(&fit),
     })
 }

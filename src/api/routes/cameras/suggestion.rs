@@ -8,7 +8,7 @@ use axum::{
 };
 use lookdown_lens::{
     calibration::native::NativeCalibration,
-    self_calibration::{CameraHeight, FitRefusal, HeightRefusal, RoomFit},
+    self_calibration::{CameraHeight, FitRefusal, HeightRefusal},
 };
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -18,9 +18,9 @@ use crate::{
         ApiState,
         http::problem::{Problem, ProblemKind},
         require_scope::RequireRead,
+        routes::found_lens::FoundLens,
     },
-    room_calibration::tilt_deg,
-    rounding::{degrees, pixels, share},
+    rounding::pixels,
     suggestions::{FRAMES, Suggestion},
 };
 
@@ -45,22 +45,6 @@ struct Refusal {
     reason: &'static str,
     /// The reason with its remedy.
     detail: String,
-}
-
-/// The lens that was found.
-#[derive(Serialize, ToSchema)]
-struct FoundLens {
-    /// Field of view of the lens circle, degrees.
-    #[schema(example = 183.2)]
-    field_of_view_deg: f64,
-    /// Angle between the axis of the camera and straight down, degrees.
-    #[schema(example = 4.1)]
-    tilt_deg: f64,
-    /// Number of edges in the frames.
-    edges: usize,
-    /// Share of the length of the edges along three orthogonal directions, 0 to 1.
-    #[schema(example = 0.71)]
-    explained: f64,
 }
 
 /// The height that was found.
@@ -128,7 +112,7 @@ pub(in crate::api) async fn get(
 
 impl From<Suggestion> for SuggestedCalibration {
     fn from(found: Suggestion) -> Self {
-        let (lens, lens_refusal) = split(found.fit, FoundLens::from, Refusal::from);
+        let (lens, lens_refusal) = split(found.fit, |fit| FoundLens::from(&fit), Refusal::from);
         let (height, height_refusal) = split(found.height, FoundHeight::from, Refusal::from);
         let is_refused = lens_refusal.is_some() || (lens.is_none() && height_refusal.is_some());
         Self {
@@ -159,17 +143,6 @@ fn split<V, R, A, B>(
         Some(Ok(found)) => (Some(value(found)), None),
         Some(Err(refused)) => (None, Some(refusal(refused))),
         None => (None, None),
-    }
-}
-
-impl From<RoomFit> for FoundLens {
-    fn from(fit: RoomFit) -> Self {
-        Self {
-            field_of_view_deg: degrees(2.0 * fit.max_theta),
-            tilt_deg: pixels(tilt_deg(&fit)),
-            edges: fit.edges,
-            explained: share(fit.explained),
-        }
     }
 }
 
