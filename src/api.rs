@@ -51,7 +51,7 @@ use self::{
 
 pub use self::{
     companions::Companions,
-    detect::report::Report,
+    detect::report::to_report,
     http::{access::Access, rate_limit::RequestRate},
     in_process::in_process,
     openapi::Document,

@@ -40,7 +40,7 @@ use super::{
 use crate::cli::output::{UNWRITABLE, with_causes};
 use crate::{
     annotation_formats::{AnnotationFormat, BoxKind},
-    api::Report,
+    api::to_report,
     app::engine_for,
 };
 
@@ -284,6 +284,6 @@ fn detect(
 }
 
 fn print(detected: &DetectedFrame) -> anyhow::Result<()> {
-    let report = serde_json::to_string(&Report::from(&detected.report))?;
+    let report = serde_json::to_string(&to_report(&detected.report))?;
     writeln!(io::stdout(), "{report}").context(UNWRITABLE)
 }

@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use jiff::Timestamp;
-use lookdown::api::Report;
+use lookdown::api::to_report;
+use lookdown_common::report::Report;
 use lookdown_detect::{
     detection::{BBox, Refinement, RefinementParameters},
     parameters::Profile,
@@ -120,5 +121,16 @@ fn report() -> DetectionReport {
 
 #[test]
 fn a_report_has_these_fields_units_and_decimals() {
-    insta::assert_json_snapshot!("report", Report::from(&report()));
+    insta::assert_json_snapshot!("report", to_report(&report()));
+}
+
+#[test]
+fn a_report_is_read_as_it_was_written() {
+    let mut of_engine = report();
+    of_engine.margin = Some(of_engine.persons.clone());
+    for of_engine in [report(), of_engine] {
+        let written = to_report(&of_engine);
+        let json = serde_json::to_string(&written).unwrap();
+        assert_eq!(serde_json::from_str::<Report>(&json).unwrap(), written);
+    }
 }

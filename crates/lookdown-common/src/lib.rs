@@ -2,8 +2,8 @@
 //! that are logged once.
 //!
 //! With the feature `companion` also those of a client of the server: settings files, the server and
-//! its key, HTTP requests with limits, durations and backoff. With `report`, the parts of reports that
-//! several crates use.
+//! its key, HTTP requests with limits, durations and backoff. With `report`, the report of a frame,
+//! which the server writes.
 
 #[cfg(feature = "companion")]
 mod abort_on_drop;

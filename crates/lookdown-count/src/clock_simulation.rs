@@ -16,7 +16,10 @@ use crate::{
     counter::{Accepted, Counter, CountingOptions},
     definition::CameraDefinition,
     now::Now,
-    report::ReceivedReport,
+    report::{
+        ReceivedReport,
+        other_fields::{OF_PERSON, OF_REPORT},
+    },
     store::Store,
 };
 
@@ -189,7 +192,7 @@ impl World {
         };
         let persons = persons.iter().map(|x| {
             format!(
-                r#"{{"score": 0.95, "floor": {{"x_m": {x}, "y_m": 1.0}},
+                r#"{{{OF_PERSON}, "score": 0.95, "floor": {{"x_m": {x}, "y_m": 1.0}},
                 "bearing": {{"azimuth_deg": {}, "off_axis_deg": {}}},
                 "oriented_box": {{"cx": 100, "cy": 100, "width": 20, "height": 40, "angle_deg": 0}}}}"#,
                 1_f64.atan2(*x).to_degrees() + 90.0,
@@ -201,7 +204,8 @@ impl World {
         let json = format!(
             r#"{{"camera": "{name}", "received_at": "{received}", "captured_at": {captured},
             "calibration": {{"id": "x", "revision": "1", "assumed": true}},
-            "image": {{"width": 200, "height": 200}}, "persons": [{persons}]}}"#
+            "image": {{"width": 200, "height": 200}}, "persons": [{persons}],
+            {OF_REPORT}}}"#
         );
         self.sent.push(Sent {
             camera,

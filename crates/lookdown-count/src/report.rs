@@ -1,8 +1,8 @@
-//! The parts of a report of the server that are used.
+//! The reports of the server.
 
 use jiff::Timestamp;
 use lookdown_common::{
-    report::{ReportBearing, ReportCalibration, ReportFloor, ReportImage, ReportOrientedBox},
+    report::{Report, ReportCalibration, ReportImage, ReportOrientedBox, ReportPerson},
     text::is_camera_name,
 };
 use lookdown_lens::{calibration::CalibrationId, geometry::Pixel};
@@ -23,20 +23,19 @@ const MAX_BEHIND_ON_SITE_MS: i64 = 1_000;
 /// The server's limit of revisions.
 const MAX_REVISION_BYTES: usize = 128;
 
-/// A report of the server, with the fields that counting needs.
+/// The fields of a report that counting needs, with the times as numbers.
 #[derive(Debug, Clone, Deserialize)]
+#[serde(try_from = "Report")]
 pub(crate) struct ReceivedReport {
     /// The camera of the frame.
     pub(crate) camera: String,
     received_at: Timestamp,
-    #[serde(default)]
     captured_at: Option<Timestamp>,
     pub(crate) calibration: ReportCalibration,
     pub(crate) image: ReportImage,
-    pub(crate) persons: Vec<Person>,
+    pub(crate) persons: Vec<ReportPerson>,
     /// Persons in the margin around the areas of the calibration.
-    #[serde(default)]
-    margin: Vec<Person>,
+    margin: Vec<ReportPerson>,
 }
 
 /// The ID and the arrival of a report: the same for each time that the server sends it.
@@ -46,13 +45,20 @@ pub(crate) struct ReportKey {
     received_ms: i64,
 }
 
-/// One person.
-#[derive(Debug, Clone, Copy, Deserialize)]
-pub(crate) struct Person {
-    score: f64,
-    oriented_box: ReportOrientedBox,
-    bearing: Option<ReportBearing>,
-    floor: Option<ReportFloor>,
+impl TryFrom<Report> for ReceivedReport {
+    type Error = jiff::Error;
+
+    fn try_from(report: Report) -> Result<Self, Self::Error> {
+        Ok(Self {
+            camera: report.camera,
+            received_at: report.received_at.parse()?,
+            captured_at: report.captured_at.map(|time| time.parse()).transpose()?,
+            calibration: report.calibration,
+            image: report.image,
+            persons: report.persons,
+            margin: report.margin.unwrap_or_default(),
+        })
+    }
 }
 
 impl ReceivedReport {
@@ -128,7 +134,7 @@ impl ReceivedReport {
 }
 
 fn observation(
-    person: &Person,
+    person: &ReportPerson,
     is_in_margin: bool,
     definition: &CameraDefinition,
 ) -> Option<Observation> {
@@ -173,14 +179,20 @@ fn is_plausible(ahead_ms: i64, is_on_site: bool) -> bool {
 }
 
 #[cfg(test)]
+pub(crate) mod other_fields;
+
+#[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{
+        other_fields::{OF_PERSON, OF_REPORT},
+        *,
+    };
 
     fn report(captured_at: &str, person: &str) -> ReceivedReport {
         serde_json::from_str(&format!(
             r#"{{"camera": "hall", "received_at": "2026-11-22T10:00:00Z", "captured_at": {captured_at},
                  "calibration": {{"id": "hall", "revision": "1", "assumed": true}},
-                 "image": {{"width": 200, "height": 200}}, "persons": [{person}], "warnings": []}}"#
+                 "image": {{"width": 200, "height": 200}}, "persons": [{person}], {OF_REPORT}}}"#
         ))
         .unwrap()
     }
@@ -236,7 +248,7 @@ mod tests {
             (90.0, 50.0, 70.0),
         ] {
             let person = format!(
-                r#"{{"score": 0.8, "floor": null, "bearing": {{"azimuth_deg": 0, "off_axis_deg": 40}},
+                r#"{{{OF_PERSON}, "score": 0.8, "floor": null, "bearing": {{"azimuth_deg": 0, "off_axis_deg": 40}},
                     "oriented_box": {{"cx": {cx}, "cy": 100, "width": 20, "height": 40,
                                       "angle_deg": {angle_deg}}}}}"#
             );

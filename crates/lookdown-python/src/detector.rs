@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
 
-use lookdown::{api::Report, app::engine_for, settings};
+use lookdown::{api::to_report, app::engine_for, settings};
 use lookdown_detect::{
     parameters::DetectParameters,
     pipeline::{DetectJob, Engine, JobImage},
@@ -99,6 +99,6 @@ impl PyDetector {
         }
         let job = DetectJob::local(name, image, parameters, calibration);
         let detected = self.engine.detect(&job).map_err(python_error)?;
-        serde_json::to_string(&Report::from(&detected.report)).map_err(python_error)
+        serde_json::to_string(&to_report(&detected.report)).map_err(python_error)
     }
 }

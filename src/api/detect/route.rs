@@ -7,6 +7,7 @@ use axum::{
     http::{HeaderValue, header::CONTENT_TYPE},
     response::{AppendHeaders, IntoResponse},
 };
+use lookdown_common::report::Report;
 use lookdown_detect::pipeline::DetectJob;
 
 use crate::api::{
@@ -14,7 +15,6 @@ use crate::api::{
     detect::answer::{AnswerOptions, Content},
     detect::defaults::detect_parameters,
     detect::headers::report_headers,
-    detect::report::Report,
     detect::run::{AnswerInput, run_detection},
     detect::upload::Upload,
     http::{problem::Problem, query::pairs},

@@ -7,6 +7,7 @@ use std::{
 };
 
 use bytes::Bytes;
+use lookdown_common::report::Report;
 use lookdown_detect::{
     imaging::annotate::Concealment,
     pipeline::{DetectJob, DetectedFrame, DetectionReport, PipelineError, Timeline},
@@ -16,7 +17,7 @@ use crate::{
     annotated_image::StoredFrame,
     api::{
         ApiState,
-        detect::report::Report,
+        detect::report::to_report,
         http::{context::RequestContext, problem::Problem},
     },
     metrics::Metrics,
@@ -125,7 +126,7 @@ fn written<T>(
     detected: DetectedFrame,
     write: impl FnOnce(AnswerInput<'_>) -> Result<T, Problem>,
 ) -> Result<Written<T>, Problem> {
-    let report = Report::from(&detected.report);
+    let report = to_report(&detected.report);
     let json = serde_json::to_vec(&report).map_err(Problem::internal)?;
     let json = Bytes::from(json);
     let answer = write(AnswerInput {

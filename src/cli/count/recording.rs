@@ -26,7 +26,7 @@ use tokio::runtime::Runtime;
 
 use crate::{
     annotated_image::AnnotationOptions,
-    api::Report,
+    api::to_report,
     app::{engine_for, open_calibrations},
     cli::{
         SettingsFile, annotate,
@@ -226,7 +226,7 @@ impl Counting<'_> {
                 return Ok(end);
             }
             for (at, detected) in self.detect(&name, images)? {
-                let report = serde_json::to_vec(&Report::from(&detected.report))?;
+                let report = serde_json::to_vec(&to_report(&detected.report))?;
                 self.recording.count(at, &report)?;
                 if let Some((writer, path)) = &mut self.video {
                     let jpeg = annotate::jpeg(detected, &self.drawing)?;

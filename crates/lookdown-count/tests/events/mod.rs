@@ -15,6 +15,11 @@ use tokio::{
     time::sleep,
 };
 
+#[path = "../../src/report/other_fields.rs"]
+mod other_fields;
+
+use other_fields::{OF_PERSON, OF_REPORT};
+
 /// The calibration of the camera.
 pub const CALIBRATION: &str = r#"{
     "id": "hall", "image": {"width": 1000, "height": 1000},
@@ -150,9 +155,9 @@ pub fn event(camera: &str, at_ms: i64, persons: &[String]) -> (u64, String) {
     let time = jiff::Timestamp::from_millisecond(START_MS + at_ms).unwrap();
     let persons = persons.join(",");
     let data = format!(
-        r#"{{"request_id": "x", "camera": "{camera}", "received_at": "{time}", "captured_at": null,
+        r#"{{"camera": "{camera}", "received_at": "{time}", "captured_at": null,
         "calibration": {{"id": "hall", "revision": "1", "assumed": false}},
-        "image": {{"width": 1000, "height": 1000}}, "persons": [{persons}], "warnings": []}}"#
+        "image": {{"width": 1000, "height": 1000}}, "persons": [{persons}], {OF_REPORT}}}"#
     );
     let id = u64::try_from((START_MS + at_ms) * 1000).unwrap();
     (id, data.replace('\n', " "))
@@ -168,7 +173,7 @@ pub fn person(x: f64, y: f64) -> String {
         500.0 + radius * azimuth.to_radians().sin(),
     );
     format!(
-        r#"{{"box": {{}}, "score": 0.9, "views": 2,
+        r#"{{{OF_PERSON}, "score": 0.9,
         "oriented_box": {{"cx": {cx}, "cy": {cy}, "width": 60, "height": 120, "angle_deg": 0}},
         "bearing": {{"azimuth_deg": {azimuth}, "off_axis_deg": {}}},
         "floor": {{"x_m": {x}, "y_m": {y}}}}}"#,

@@ -1,12 +1,10 @@
 //! The responses that DeepStack's clients read.
 
+use lookdown_common::report::{Report, ReportPerson};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::{
-    api::detect::report::{Report, ReportPerson},
-    calibration_store::CalibrationRow,
-};
+use crate::calibration_store::CalibrationRow;
 
 const LABEL: &str = "person";
 const MILLIS_PER_SECOND: f64 = 1000.0;

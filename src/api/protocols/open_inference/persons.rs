@@ -5,6 +5,7 @@ use std::time::Instant;
 use axum::http::HeaderValue;
 use bytes::Bytes;
 use jiff::Timestamp;
+use lookdown_common::report::ReportPerson;
 use lookdown_detect::{
     open_inference::{Datatype, metadata::ModelMetadata},
     pipeline::DetectJob,
@@ -21,7 +22,6 @@ use crate::api::{
     ApiState,
     detect::defaults::detect_parameters,
     detect::headers::{PERSON_COUNT, report_headers},
-    detect::report::ReportPerson,
     detect::run::{AnswerInput, Answered, run_detection},
     http::{context::RequestContext, problem::Problem, query::pairs, rate_limit::RequestTokens},
 };

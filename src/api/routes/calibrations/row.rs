@@ -1,10 +1,11 @@
 //! A calibration in the list of calibrations.
 
+use lookdown_common::report::ReportWarning;
 use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::{
-    api::detect::report::ReportWarning,
+    api::detect::report::to_warning,
     calibration_store::{CalibrationEntry, CalibrationRow},
 };
 
@@ -49,8 +50,8 @@ impl From<&CalibrationEntry> for CalibrationInfo {
     fn from(entry: &CalibrationEntry) -> Self {
         let calibration = &entry.calibration;
         let (width, height) = calibration.image_size();
-        let mut warnings: Vec<_> = entry.notes.iter().map(Into::into).collect();
-        warnings.extend(calibration.warnings().iter().map(ReportWarning::from));
+        let mut warnings: Vec<_> = entry.notes.iter().map(to_warning).collect();
+        warnings.extend(calibration.warnings().iter().map(to_warning));
         Self {
             id: calibration.id().to_string(),
             revision: Some(calibration.revision().to_owned()),

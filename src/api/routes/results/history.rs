@@ -12,6 +12,7 @@ use axum::{
 };
 use bytes::{BufMut, Bytes, BytesMut};
 use jiff::Timestamp;
+use lookdown_common::report::Report;
 use lookdown_detect::parameters::{ParameterError, whole_number};
 use utoipa::ToSchema;
 
@@ -19,7 +20,6 @@ use super::{NO_CACHE, address::CameraAddress, unknown};
 use crate::{
     api::{
         ApiState,
-        detect::report::Report,
         http::{problem::Problem, query::parameters_named},
         require_scope::RequireRead,
     },

@@ -10,6 +10,7 @@ use axum::{
     },
     response::{IntoResponse, Response},
 };
+use lookdown_common::report::Report;
 use lookdown_detect::parameters::whole_number;
 use tokio::time::timeout_at;
 
@@ -17,7 +18,6 @@ use super::{NO_CACHE, address::CameraAddress, unknown};
 use crate::{
     api::{
         ApiState,
-        detect::report::Report,
         http::{
             caller::Caller,
             deadline::Deadline,

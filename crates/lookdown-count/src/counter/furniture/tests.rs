@@ -10,7 +10,10 @@ use crate::{
     counter::{Counter, CountingOptions},
     definition::CameraDefinition,
     now::Now,
-    report::ReceivedReport,
+    report::{
+        ReceivedReport,
+        other_fields::{OF_PERSON, OF_REPORT},
+    },
     store::Store,
     sums::Totals,
 };
@@ -50,10 +53,11 @@ fn report(second: i64, revision: u8) -> ReceivedReport {
         r#"{{"camera": "hall", "received_at": "{received}",
             "calibration": {{"id": "hall", "revision": "{revision}", "assumed": false}},
             "image": {{"width": 1000, "height": 1000}},
-            "persons": [{{"score": 0.97, "floor": {{"x_m": 2, "y_m": 1}},
+            "persons": [{{{OF_PERSON}, "score": 0.97, "floor": {{"x_m": 2, "y_m": 1}},
                 "bearing": {{"azimuth_deg": 26.6, "off_axis_deg": 36.7}},
                 "oriented_box": {{"cx": 680, "cy": 590, "width": 40, "height": 80,
-                                  "angle_deg": 63.4}}}}]}}"#
+                                  "angle_deg": 63.4}}}}],
+            {OF_REPORT}}}"#
     );
     serde_json::from_str(&text).unwrap()
 }
