@@ -23,7 +23,7 @@ struct SuggestedArea {
     floor_m: Vec<[f64; 2]>,
 }
 
-/// Suggest an area from the places where people walked
+/// Suggest an area from walks
 ///
 /// Covers whole days (UTC). `step` and `format` have no effect.
 #[utoipa::path(
