@@ -81,6 +81,26 @@ for (const [device, viewport, colorScheme] of [["wide", WIDE, "light"], ["phone"
 }
 
 pageTest(
+  "the area in which people walked is added and saved",
+  "#cameras",
+  async (page) => {
+    const card = page.getByRole("article", { name: "Camera hall" });
+    await card.getByRole("button", { name: "Zones" }).click();
+    await page.getByRole("button", { name: "Area from walks" }).click();
+    await page.getByRole("button", { name: /^Area 1 \d+ corners, on the floor/ }).waitFor();
+    await picture(page, "area-from-walks");
+    await page.getByRole("button", { name: "Save walks" }).click();
+    await page.getByText("walks is saved and in use.").waitFor();
+    const { areas } = await (await fetch(`${COUNTED}/calibrations/walks`)).json();
+    assert.equal(areas.length, 1);
+    // Five people walk around the middle of the room.
+    const reach = Math.max(...areas[0].floor_m.flat().map(Math.abs));
+    assert.ok(reach > 2 && reach < 8, JSON.stringify(areas));
+  },
+  { server: COUNTED },
+);
+
+pageTest(
   "counts that cannot be reached are one sentence, and the cards stay",
   "#cameras",
   async (page) => {
