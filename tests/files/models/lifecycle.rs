@@ -288,7 +288,7 @@ fn changed_files_are_retried_after_a_server_outage() {
 }
 
 #[test]
-fn a_missing_model_file_is_reported_with_the_command_to_fetch_it() {
+fn a_missing_model_file_is_reported_with_the_fetch_command() {
     let models = Models::new();
     fs::remove_file(models.folder.path().join("b/model.onnx")).unwrap();
     assert_eq!(models.reason("b"), Some(NotLoaded::NoFile));
