@@ -208,7 +208,10 @@ async fn steps_add_up_and_a_gap_is_unknown() {
         // Everyone walks along the same line: it is not an area.
         let path = format!("/counts/hall/suggested-area?{}", minutes(5, "5m"));
         let (status, problem) = companion.get(&path).await;
-        assert!(status == 404 && problem.contains("2 m² of floor"), "{problem}");
+        assert!(
+            status == 404 && problem.contains("2 m² of floor"),
+            "{problem}"
+        );
     })
     .await;
 }

@@ -75,7 +75,16 @@ fn hull(cells: &[Cell]) -> Vec<[f64; 2]> {
         let reach = AROUND_M + CELL_M / 2.0;
         let corner =
             [x + reach * cos, y + reach * sin].map(|value| (value * 100.0).round() / 100.0);
-        if corners.last() != Some(&corner) && corners.first() != Some(&corner) {
+        // Corners closer than a cell tell nothing and are hard to drag.
+        let is_far = |other: &[f64; 2]| {
+            let [x, y] = [0, 1].map(|axis| corner[axis] - other[axis]);
+            x.hypot(y) >= CELL_M
+        };
+        if [corners.first(), corners.last()]
+            .into_iter()
+            .flatten()
+            .all(is_far)
+        {
             corners.push(corner);
         }
     }
