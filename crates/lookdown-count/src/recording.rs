@@ -65,7 +65,11 @@ impl Recording {
             longest_gap_ms: i64::try_from(longest_gap.as_millis()).unwrap_or(i64::MAX),
             max_cameras: MAX_CAMERAS,
         };
-        let mut counter = Counter::new(counting, resumed.last_event, resumed.totals);
+        // Other cameras of the store have other recordings.
+        let mut states = resumed.scenes.iter();
+        let last_event = states.find_map(|state| state.last_event_of(camera));
+        let last_event = last_event.unwrap_or_default();
+        let mut counter = Counter::new(counting, last_event, resumed.totals);
         let others = Calibrations::resumed(resumed.calibrations);
         for state in resumed.scenes {
             counter.resume(state, |key| match &calibration {
@@ -86,7 +90,7 @@ impl Recording {
         })
     }
 
-    /// Returns the time of the last report that the store contains.
+    /// Returns the time of the last report of the camera that is counted.
     #[must_use]
     pub fn counted_until(&self) -> Option<Timestamp> {
         let micros = i64::try_from(self.counter.last_event()).ok();
@@ -143,6 +147,12 @@ impl Recording {
             self.counter.stored(&batch);
         }
         Ok(())
+    }
+
+    /// Returns true if this process has counted a report.
+    #[must_use]
+    pub fn has_counted(&self) -> bool {
+        self.first.is_some()
     }
 
     /// Returns the persons at the last report.

@@ -45,6 +45,13 @@ pub(crate) struct ReportKey {
     received_ms: i64,
 }
 
+impl ReportKey {
+    /// Returns the ID of the report.
+    pub(crate) fn event(self) -> u64 {
+        self.event
+    }
+}
+
 impl TryFrom<Report> for ReceivedReport {
     type Error = jiff::Error;
 

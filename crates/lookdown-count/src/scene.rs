@@ -38,6 +38,14 @@ pub(crate) struct SceneState {
     cameras: Vec<CameraState>,
 }
 
+impl SceneState {
+    /// Returns the ID of the last report of a camera, if it is in the scene.
+    pub(crate) fn last_event_of(&self, camera: &str) -> Option<u64> {
+        let mut cameras = self.cameras.iter();
+        cameras.find_map(|state| state.last_event_of(camera))
+    }
+}
+
 /// The time of a report.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ReportTime {

@@ -59,6 +59,14 @@ pub(crate) struct CameraState {
     last_report: Option<ReportKey>,
 }
 
+impl CameraState {
+    /// Returns the ID of the last report if this is the camera of this name.
+    pub(crate) fn last_event_of(&self, camera: &str) -> Option<u64> {
+        let report = self.last_report.filter(|_| self.name == camera)?;
+        Some(report.event())
+    }
+}
+
 /// A crossing with its names.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct NamedCrossing {

@@ -12,7 +12,8 @@ use std::{
 
 use events::{CALIBRATION, START_MS, Server, event, person, walks};
 use lookdown_common::{HttpClient, ServerEntry};
-use lookdown_count::{CountEntry, Snapshot, WebhookEntry, count};
+use lookdown_count::{CountEntry, Recording, Snapshot, WebhookEntry, count};
+use lookdown_lens::calibration::Calibration;
 use reqwest::RequestBuilder;
 use serde_json::{Value, json};
 use tokio::{
@@ -605,5 +606,33 @@ fn invalid_settings_name_field_value_and_remedy() {
     ] {
         let error = entry.check().unwrap_err().to_string();
         assert!(error.starts_with(expected), "{error}");
+    }
+}
+
+#[test]
+fn cameras_of_a_store_have_separate_recordings() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = folder.path().join("counts.sqlite");
+    let file = folder.path().join("hall.json");
+    std::fs::write(&file, CALIBRATION).unwrap();
+    let calibration = Arc::new(Calibration::read(&file).unwrap());
+    let reports = walks("hall", 30, 0..0);
+    let open = |camera| {
+        let gap = Duration::from_secs(10);
+        Recording::open(&store, gap, camera, Some(Arc::clone(&calibration))).unwrap()
+    };
+    let time = |id: u64| jiff::Timestamp::from_microsecond(id.try_into().unwrap()).unwrap();
+    let last = reports.last().unwrap().0;
+    for camera in ["hall", "yard"] {
+        let mut recording = open(camera);
+        assert_eq!(recording.counted_until(), None);
+        for (id, report) in &reports {
+            recording.count(time(*id), report.as_bytes()).unwrap();
+        }
+        recording.commit().unwrap();
+        let crossings = recording.lines().into_iter().map(|line| line.crossings);
+        assert_eq!(crossings.sum::<u64>(), 5, "{camera}");
+        drop(recording);
+        assert_eq!(open(camera).counted_until(), Some(time(last)));
     }
 }

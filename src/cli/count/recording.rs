@@ -142,18 +142,22 @@ pub(super) fn run(
         &camera,
         calibration.clone(),
     )?;
+    let every = flags.every.unwrap_or(DEFAULT_EVERY);
+    let counted_already = |until: Timestamp| {
+        anyhow::anyhow!(
+            "--store: {} has counts of {camera} up to {until}, the end of the recordings: they are \
+             counted already, or give another --store",
+            counts.path.display()
+        )
+    };
     let until = recording.counted_until();
-    if let Some(until) = until.filter(|until| *until >= first.start) {
-        if until >= last.start + last.duration.unwrap_or_default() {
-            bail!(
-                "--store: {} has counts up to {until}, after the end of the recordings: they are \
-                 counted already, or give another --store",
-                counts.path.display()
-            );
+    let until = until.filter(|until| *until >= first.start);
+    if let Some(until) = until {
+        if until + every >= last.start + last.duration.unwrap_or_default() {
+            return Err(counted_already(until));
         }
         tracing::info!("continuing after {until}: earlier frames are counted already");
     }
-    let every = flags.every.unwrap_or(DEFAULT_EVERY);
     let video = match &flags.annotate {
         Some(path) => Some((writer(path, every, &runtime)?, path.as_path())),
         None => None,
@@ -182,6 +186,9 @@ pub(super) fn run(
     }
     let span = (first.start, end);
     let recording = counting.finish()?;
+    if let Some(until) = until.filter(|_| !recording.has_counted()) {
+        return Err(counted_already(until));
+    }
     let step = flags.step_minutes.map_or(15, NonZeroU32::get);
     let csv = recording.csv(span, step)?;
     let csv = csv.context("--step-minutes: the CSV has too many values: give a longer step")?;
