@@ -128,13 +128,16 @@ export class AreaEditor {
     this.#done();
   }
 
+  #hasRoomFor(kind) {
+    const hasRoom = this.areas.filter((area) => area.kind === kind).length < MOST_OF_A_KIND;
+    if (!hasRoom) this.#done(`A calibration has at most ${MOST_OF_A_KIND} ${KINDS[kind].field}.`);
+    return hasRoom;
+  }
+
   /** Begins to draw; the cursor begins at `cursor`. */
   begin(kind, space, cursor) {
     this.draft = null;
-    if (this.areas.filter((area) => area.kind === kind).length >= MOST_OF_A_KIND) {
-      this.#done(`A calibration has at most ${MOST_OF_A_KIND} ${KINDS[kind].field}.`);
-      return;
-    }
+    if (!this.#hasRoomFor(kind)) return;
     this.selected = null;
     this.draft = { kind, space, corners: [], cursor };
     this.#done();
@@ -172,8 +175,13 @@ export class AreaEditor {
   finish() {
     const { kind, space, corners } = this.draft;
     const name = ["mask", "area"].includes(kind) ? "" : freeName(kind, this.areas);
-    const area = areaOf(kind, space, name, corners);
     this.draft = null;
+    this.add(areaOf(kind, space, name, corners));
+  }
+
+  /** Adds an area and selects it, unless there are too many of its kind. */
+  add(area) {
+    if (!this.#hasRoomFor(area.kind)) return;
     this.selected = { key: area.key, corner: null };
     this.#history.edit([...this.areas, area]);
     this.#done();

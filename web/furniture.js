@@ -44,8 +44,9 @@ function buttons(camera, { id, state }, message) {
       message.textContent = `Not saved: ${problem.message}`;
     }
   };
-  const button = (text, label, onclick) => element("button", { type: "button", class: "quiet", "aria-label": `${label} ${id} of ${camera}`, onclick }, text);
-  const confirm = button("Not a person", "Confirm as furniture: thing", decide("PUT", `${id} is furniture and is not counted.`));
-  const takeBack = button("Is a person", "Count thing", decide("DELETE", `${id} counts as a person.`));
+  // The label begins with the text, so that a voice can press the button.
+  const button = (text, onclick) => element("button", { type: "button", class: "quiet", "aria-label": `${text}: thing ${id} of ${camera}`, onclick }, text);
+  const confirm = button("Not a person", decide("PUT", `${id} is furniture and is not counted.`));
+  const takeBack = button("Is a person", decide("DELETE", `${id} counts as a person.`));
   return state === "confirmed" ? [takeBack] : [confirm, takeBack];
 }

@@ -5,11 +5,12 @@ import { AreaEditor } from "./area_editor.js";
 import { isDragging, startGestures } from "./area_gestures.js";
 import { scrollToRow, showList } from "./area_list.js";
 import { drawAreas } from "./area_shapes.js";
-import { areasOf, problemOf, titleOf, withAreas } from "./areas.js";
+import { areaOf, areasOf, problemOf, titleOf, withAreas } from "./areas.js";
+import { options } from "./camera_states.js";
 import { element, find, plural } from "./dom.js";
 import { isServing, loadCalibrations } from "./parameters.js";
 import { shown, showFailure, withProgress } from "./progress.js";
-import { ask } from "./server.js";
+import { ask, askJson } from "./server.js";
 import { shared, whenChanged } from "./shared.js";
 import { frameSurface, floorSurface } from "./zone_surfaces.js";
 
@@ -19,6 +20,8 @@ const documents = new Map();
 let shownDocument = null;
 let space = "frame_px";
 let surface = null;
+/** True if the server counts people, so that it knows where they walked. */
+let hasCounts = false;
 /** The area that the server refused: `{key, text, area}`. */
 let invalid = null;
 
@@ -51,6 +54,8 @@ async function show() {
   find("#zones-content").hidden = !isKnown;
   find("#zones-reason").textContent = reason();
   if (!isVisible || !isKnown) return;
+  ({ has_counts: hasCounts = false } = await options());
+  if (find("#calibration").value !== id) return;
   let opened = documents.get(id);
   if (!opened || (!opened.editor.isUnsaved && !opened.editor.draft && isOld(opened))) {
     const loaded = await withProgress(find("#zones-progress"), "Reading the calibration", () => read(id));
@@ -104,6 +109,7 @@ function draw() {
     button.setAttribute("aria-pressed", String(button.dataset.kind === draft?.kind));
     button.disabled = button.dataset.kind === "mask" && space === "floor_m";
   }
+  find("#suggest-area").hidden = !(hasCounts && shared.frame.camera && hasFloor()) || Boolean(draft);
   find("#undo").disabled = !editor.canUndo;
   find("#redo").disabled = !editor.canRedo;
   find("#draft").hidden = !draft;
@@ -214,6 +220,14 @@ function begin(kind) {
   if (editor.draft) drawing().focus({ preventScroll: true });
 }
 
+/** Adds the area in which people walked in the last day. */
+async function suggestArea() {
+  const { editor } = shownDocument;
+  const path = `counts/${encodeURIComponent(shared.frame.camera)}/suggested-area`;
+  const { floor_m: corners } = await withProgress(find("#zones-save-progress"), "Reading the walks", () => askJson(path));
+  editor.add(areaOf("area", "floor_m", "", corners));
+}
+
 function chooseSurface(chosen) {
   const { editor } = shownDocument;
   space = chosen;
@@ -255,6 +269,7 @@ export function start() {
   press("#redo", (editor) => editor.redo());
   press("#draft-finish", (editor) => editor.finish());
   press("#draft-cancel", (editor) => editor.cancelDraft());
+  find("#suggest-area").addEventListener("click", shown(suggestArea));
   find("#zones-save").addEventListener("click", shown(save));
   document.addEventListener("keydown", shortcut);
   window.addEventListener("beforeunload", (event) => {

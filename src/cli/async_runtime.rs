@@ -3,6 +3,7 @@
 use std::{process::ExitCode, time::Duration};
 
 use anyhow::Context;
+use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use tokio::runtime::{Builder, Runtime};
 
 /// Threads of `run`, `watch` and `count` for sockets, cameras, counts and JSON. Frames have separate
@@ -14,17 +15,32 @@ const LAST_TASKS: Duration = Duration::from_secs(1);
 
 const NO_THREAD: &str = "the operating system creates no thread";
 
-/// Runs work on a runtime with this number of threads, and ends the tasks that remain.
+/// Runs work on a runtime with this number of threads, and ends the tasks that remain. The process
+/// may open as many files as its hard limit permits.
 pub(super) fn run_async(
     threads: usize,
     work: impl Future<Output = anyhow::Result<()>>,
 ) -> anyhow::Result<ExitCode> {
+    raise_limit_of_open_files();
     let mut builder = Builder::new_multi_thread();
     let runtime = builder.worker_threads(threads).enable_all().build();
     let runtime = runtime.context(NO_THREAD)?;
     let outcome = runtime.block_on(work);
     end(runtime);
     outcome.map(|()| ExitCode::SUCCESS)
+}
+
+/// Raises the soft limit of open files, often 1024, to the hard one: every connection is a file. A
+/// system that refuses leaves the limit as it is.
+fn raise_limit_of_open_files() {
+    let limit = getrlimit(Resource::Nofile);
+    let _ = setrlimit(
+        Resource::Nofile,
+        Rlimit {
+            current: limit.maximum,
+            ..limit
+        },
+    );
 }
 
 /// Creates a runtime on the current thread.

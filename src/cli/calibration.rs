@@ -10,7 +10,6 @@ mod people;
 mod place;
 mod source;
 mod suggest_area;
-mod walked_area;
 
 use std::process::ExitCode;
 

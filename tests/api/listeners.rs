@@ -33,7 +33,7 @@ struct Listener {
 
 pub(crate) const KEY: &str = "0123456789abcdef";
 /// More connections than a companion serves at a time, and than those that wait beyond the limit.
-const SILENT: usize = 330;
+const SILENT: usize = 600;
 
 /// Longest wait for a connection, and for the end of an answer: longer than the timeouts of heads.
 const PATIENCE: Duration = Duration::from_secs(20);

@@ -21,6 +21,7 @@ from pathlib import Path
 from harness.places import LOOKDOWN
 from harness.processes import free_ports, running
 from rendered_room import rendered_room
+from support.exchange import ask
 from support.lookdown import lookdown
 from support.places import FIXTURES, ROOT, SAMPLES
 from test_count import Count
@@ -32,6 +33,8 @@ PICTURED = "gate,office,canteen,lounge"
 OFFICE = (SAMPLES / "office.jpg").read_bytes()
 ROOM = rendered_room()
 WALKS = HERE.parent / "walks"
+STILL_SECONDS = 2.0
+"""Interval of the frames in which everyone stands still."""
 ZONE = {"name": "middle", "floor_m": [[-2, -1], [2, -1], [2, 3], [-2, 3]]}
 
 
@@ -125,6 +128,9 @@ class Page(unittest.TestCase):
                 encoding="utf-8",
             )
             count = Count(settings, folder / "count.log", port)
+            ended = threading.Event()
+            shop = threading.Thread(target=self.stand_still, args=(server.address, frames / "1.jpg", ended))
+            shop.start()
             try:
                 yield {
                     "LOOKDOWN_COUNTED_URL": f"http://{server.address}",
@@ -133,7 +139,15 @@ class Page(unittest.TestCase):
                     "LOOKDOWN_WALK_TRUTH": str(WALKS / "truth.json"),
                 }
             finally:
+                ended.set()
+                shop.join()
                 count.stop(signal.SIGKILL)
+
+    def stand_still(self, address: str, frame: Path, ended: threading.Event) -> None:
+        """Sends the same frame as the camera `shop`, in which everyone stands still, until the tests end."""
+        query = "calibration=walks&camera=shop&profile=fast"
+        while not ended.wait(STILL_SECONDS):
+            ask(address, "POST", f"/detect?{query}", frame.read_bytes())
 
     @contextlib.contextmanager
     def with_a_camera(self, folder: Path) -> Iterator[dict[str, str]]:

@@ -8,6 +8,7 @@ mod furniture;
 mod heat_map;
 mod operation;
 mod shared;
+mod suggested_area;
 mod time;
 mod tracks;
 
@@ -51,6 +52,7 @@ fn routes() -> OpenApiRouter<Shared> {
         .routes(routes!(heat_map::json_of_camera))
         .routes(routes!(heat_map::png_of_camera))
         .routes(routes!(frame_heat_map::png))
+        .routes(routes!(suggested_area::get))
         .routes(routes!(counts::of_site))
         .routes(routes!(tracks::of_site))
         .routes(routes!(heat_map::json_of_site))

@@ -205,6 +205,13 @@ async fn steps_add_up_and_a_gap_is_unknown() {
         assert!(status == 200 && png.contains("PNG"));
         let (status, png) = companion.get("/counts/hall/heatmap-frame.png").await;
         assert!(status == 200 && png.contains("PNG"));
+        // Everyone walks along the same line: it is not an area.
+        let path = format!("/counts/hall/suggested-area?{}", minutes(5, "5m"));
+        let (status, problem) = companion.get(&path).await;
+        assert!(
+            status == 404 && problem.contains("2 m² of floor"),
+            "{problem}"
+        );
     })
     .await;
 }

@@ -25,6 +25,7 @@ mod test_walks;
 mod track;
 mod track_id;
 mod tracker;
+mod walked_area;
 pub mod zones;
 
 pub use candidates::MAX_PERSONS;
@@ -37,6 +38,7 @@ pub use site::CameraPose;
 pub use track::{MAX_TAIL_POINTS, PersonOfReport, TailPoint, Track};
 pub use track_id::TrackId;
 pub use tracker::{MAX_CAMERAS, RefusedReport, SiteError, Tracker};
+pub use walked_area::{LEAST_WALKED_M2, walked_area};
 
 #[cfg(test)]
 mod tests;

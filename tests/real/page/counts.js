@@ -81,6 +81,61 @@ for (const [device, viewport, colorScheme] of [["wide", WIDE, "light"], ["phone"
 }
 
 pageTest(
+  "a thing that stands still is taken out of the count and counted again",
+  "#camera/shop",
+  async (page) => {
+    const card = page.getByRole("article", { name: "Camera shop" });
+    const json = async (path) => (await fetch(`${COUNTED}/${path}`)).json();
+    const isFollowed = async ({ outline_px: outline }) => {
+      const [xs, ys] = [0, 1].map((axis) => outline.map((corner) => corner[axis]));
+      const isInside = ([x, y]) => x > Math.min(...xs) && x < Math.max(...xs) && y > Math.min(...ys) && y < Math.max(...ys);
+      return (await json("counts/shop/tracks")).tracks.some(({ frame_px: foot }) => isInside(foot));
+    };
+    // A track ends some seconds after its last box.
+    const untilFollowed = async (thing, is) => {
+      for (let attempt = 0; attempt < 200 && (await isFollowed(thing)) !== is; attempt += 1) await page.waitForTimeout(100);
+      assert.equal(await isFollowed(thing), is);
+    };
+    // The camera has sent the same frame since the tests began. Presence is real time.
+    await card.getByText("0 things not counted").click({ timeout: 120_000 });
+    const listed = (await json("cameras/shop/furniture"))[0];
+    await untilFollowed(listed, true);
+    const thing = card.getByRole("listitem").filter({ hasText: new RegExp(`^${listed.id}: counted, stands still for \\d min`) });
+    await assertAccessible(page);
+    await thing.waitFor();
+    await thing.getByRole("button", { name: `Not a person: thing ${listed.id} of shop` }).click();
+    await card.getByText(`${listed.id} is furniture and is not counted.`).waitFor();
+    await card.getByText("1 thing not counted").waitFor();
+    await card.locator(".count-furniture").waitFor();
+    await untilFollowed(listed, false);
+    await card.getByRole("button", { name: `Is a person: thing ${listed.id} of shop` }).click();
+    await card.getByText("0 things not counted").waitFor();
+    await untilFollowed(listed, true);
+  },
+  { server: COUNTED },
+);
+
+pageTest(
+  "the area in which people walked is added and saved",
+  "#cameras",
+  async (page) => {
+    const card = page.getByRole("article", { name: "Camera hall" });
+    await card.getByRole("button", { name: "Zones" }).click();
+    await page.getByRole("button", { name: "Area from walks" }).click();
+    await page.getByRole("button", { name: /^Area 1 \d+ corners, on the floor/ }).waitFor();
+    await picture(page, "area-from-walks");
+    await page.getByRole("button", { name: "Save walks" }).click();
+    await page.getByText("walks is saved and in use.").waitFor();
+    const { areas } = await (await fetch(`${COUNTED}/calibrations/walks`)).json();
+    assert.equal(areas.length, 1);
+    // Five people walk around the middle of the room.
+    const reach = Math.max(...areas[0].floor_m.flat().map(Math.abs));
+    assert.ok(reach > 2 && reach < 8, JSON.stringify(areas));
+  },
+  { server: COUNTED },
+);
+
+pageTest(
   "counts that cannot be reached are one sentence, and the cards stay",
   "#cameras",
   async (page) => {

@@ -9,8 +9,8 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio_util::sync::CancellationToken;
 
 /// Most connections beyond the limit at the same time. They are answered with 503, except for
-/// probes.
-const MAX_BEYOND_LIMIT: usize = 256;
+/// probes. When CPU time is short, those whose handshake waits for it are open as well.
+const MAX_BEYOND_LIMIT: usize = 512;
 
 /// Issues permits to connections.
 ///
