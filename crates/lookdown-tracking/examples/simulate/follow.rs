@@ -1,5 +1,7 @@
-//! Follows persons between searches of the whole frame as the server does with `follow`
-//! (crates/lookdown-detect/src/pipeline/follow.rs). Moving persons stand for the cells with motion.
+//! Follows persons between searches of the whole frame, as the server does with `follow`.
+//!
+//! crates/lookdown-detect/src/pipeline/follow.rs is the model. Moving persons stand for the cells with
+//! motion.
 
 use lookdown_lens::geometry::OrientedBox;
 use nalgebra::Vector2;
