@@ -179,6 +179,11 @@ impl App {
         if let Some(int8) = engine.default_models().int8() {
             tracing::info!("inference.precision: {}", int8.description());
         }
+        if settings.detect.follow() {
+            tracing::info!(
+                "detect.follow: persons are followed between searches of the whole frame"
+            );
+        }
         let to_load = models_to_load(engine.default_models(), &settings.model.also_load);
         let (workers, capacity) = (
             settings.threads.frame_workers,

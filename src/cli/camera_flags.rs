@@ -26,7 +26,7 @@ pub(super) struct CameraFlags {
     /// Skip views without motion [default: true]
     #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
     motion: Option<bool>,
-    /// Follow persons between searches of the whole frame, about once a second [default: that of the server]
+    /// Follow persons between searches of the whole frame, about once a second [default: true]
     #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
     follow: Option<bool>,
     /// The user name of the camera

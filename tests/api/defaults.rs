@@ -57,6 +57,31 @@ async fn request_precedes_calibration_and_calibration_the_server() {
 }
 
 #[tokio::test]
+async fn the_default_of_follow_is_in_v2() {
+    let follow = DetectDefaults::parse([("follow", "true")]).unwrap();
+    let service = Service::within(&Bounds {
+        detect_defaults: follow,
+        ..Bounds::default()
+    });
+    assert_eq!(service.get("/v2").await.json()["follow"], true);
+}
+
+#[tokio::test]
+async fn searches_of_frames_are_counted_from_zero() {
+    let service = Service::start();
+    let rows = |search: &str, count: u64| {
+        format!("lookdown_frame_searches_total{{search=\"{search}\"}} {count}\n")
+    };
+    let metrics = service.get("/metrics").await.text();
+    for search in ["full", "followed", "unchanged"] {
+        assert!(metrics.contains(&rows(search, 0)), "{search}: {metrics}");
+    }
+    service.post_raw("", frame()).await;
+    let metrics = service.get("/metrics").await.text();
+    assert!(metrics.contains(&rows("full", 1)), "{metrics}");
+}
+
+#[tokio::test]
 async fn a_camera_uses_the_calibration_of_the_same_name() {
     let service = service();
     let before = service.post_raw("camera=hall", frame()).await.json();

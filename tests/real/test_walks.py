@@ -2,8 +2,8 @@
 and the CPU time of each process.
 
 The clip is made of our own renders: `lab/training/make.py walks`. `WALKS_ROUNDS` repeats it, `WALKS_RATES="1 2 5 10"` are
-the frames per second of the CPU times, `WALKS_FOLLOW=true` follows persons between searches, and `WALKS_TRACKS` names a
-file that gets the tracks.
+the frames per second of the CPU times, `WALKS_FOLLOW=false` searches every frame, and `WALKS_TRACKS` names a file that
+gets the tracks.
 """
 
 import contextlib
@@ -32,7 +32,7 @@ TRUTH = json.loads((CLIP / "truth.json").read_text(encoding="utf-8"))
 CAMERA = "walks"
 ROUNDS = int(os.environ.get("WALKS_ROUNDS", "1"))
 RATES = [int(rate) for rate in os.environ.get("WALKS_RATES", "5").split()]
-FOLLOW = os.environ.get("WALKS_FOLLOW", "false")
+FOLLOW = os.environ.get("WALKS_FOLLOW", "true")
 MEASURED_SECONDS = float(os.environ.get("WALKS_SECONDS", "20"))
 WARM_SECONDS = 5.0
 STREAM_RATE = 10

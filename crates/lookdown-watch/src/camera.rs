@@ -23,6 +23,16 @@ pub struct Camera {
     pub video: VideoOptions,
 }
 
+impl Camera {
+    /// Returns the value of a parameter of `/detect`, if the camera has one.
+    #[must_use]
+    pub fn parameter(&self, name: &str) -> Option<&str> {
+        let mut parameters = self.parameters.iter();
+        let (_, value) = parameters.find(|(known, _)| known == name)?;
+        Some(value)
+    }
+}
+
 /// Options of `ffmpeg`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct VideoOptions {

@@ -105,7 +105,8 @@ impl Watcher {
         let metrics = self.metrics.add(&camera.name, camera.location.to_string());
         let slot = Arc::new(Slot::default());
         let span = tracing::info_span!("camera", camera = camera.name);
-        span.in_scope(|| tracing::info!("watching {}", camera.location));
+        let follow = camera.parameter("follow");
+        span.in_scope(|| tracing::info!(follow, "watching {}", camera.location));
         let (name, camera) = (camera.name.clone(), Arc::new(camera));
         let source = tokio::spawn({
             let (camera, client) = (Arc::clone(&camera), self.client.clone());

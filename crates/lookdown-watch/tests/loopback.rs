@@ -73,11 +73,9 @@ async fn snapshots_reach_the_server_with_their_parameters() {
     })
     .await;
     let request = server.request(0);
-    assert!(
-        request
-            .head
-            .starts_with("POST /detect?camera=hall&profile=fast&motion=true&captured_at=20")
-    );
+    assert!(request.head.starts_with(
+        "POST /detect?camera=hall&profile=fast&motion=true&follow=true&captured_at=20"
+    ));
     assert!(
         request.head.contains("content-type: image/jpeg"),
         "{}",

@@ -205,6 +205,7 @@ def main():
     parser.add_argument("--least-overlap", type=float, default=0.05, help="ByteTrack: least overlap")
     parser.add_argument("--consecutive", type=int, default=2, help="ByteTrack: frames before a track counts")
     parser.add_argument("--lost", type=int, default=60, help="ByteTrack: frames of 1/30 s before a track ends")
+    parser.add_argument("--follow", action="store_true", help="search the whole frame about once a second")
     parser.add_argument("--scenes", nargs="+", default=["camera", "site"])
     given = parser.parse_args()
     thresholds = {
@@ -214,7 +215,7 @@ def main():
         "minimum_consecutive_frames": given.consecutive,
         "lost_track_buffer": given.lost,
     }
-    options = {"persons": given.persons, "seconds": given.seconds, "settings": given.settings}
+    options = {"persons": given.persons, "seconds": given.seconds, "settings": given.settings, "follow": given.follow}
     header = ["scene", "detector", "frames/s", "tracks", "HOTA", "IDF1", "worst", "MOTA", "switches"]
     header += ["persons off", "more", "crossings", "% totals", "% each"]
     print("| " + " | ".join(header) + " |\n" + "|---" * len(header) + "|")

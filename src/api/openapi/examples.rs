@@ -88,7 +88,7 @@ fn responses() -> Vec<Row> {
             JSON,
             json!({
                 "name": "lookdown", "version": env!("CARGO_PKG_VERSION"),
-                "extensions": ["binary_tensor_data", "model_repository"]
+                "extensions": ["binary_tensor_data", "model_repository"], "follow": false
             }),
         ),
         ("get", "/v2/health/live", JSON, json!({"live": true})),

@@ -17,6 +17,7 @@ async fn the_server_and_its_models_describe_themselves() {
         server["extensions"],
         json!(["binary_tensor_data", "model_repository"])
     );
+    assert_eq!(server["follow"], false);
     assert_eq!(
         service.get("/v2/health/live").await.json(),
         json!({ "live": true })

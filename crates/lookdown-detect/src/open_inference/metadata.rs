@@ -22,6 +22,11 @@ pub struct ServerMetadata {
     /// `paper`, `direct`) or `all`. Omitted with a single model for all profiles.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub int8_models: Option<String>,
+    /// The default of the parameter `follow`: true if the persons of a camera are followed between
+    /// searches of the whole frame. A camera of `watch` or `run` has its own setting.
+    #[serde(default)]
+    #[schema(required)]
+    pub follow: bool,
 }
 
 /// The liveness of the server.

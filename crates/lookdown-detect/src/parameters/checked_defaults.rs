@@ -1,6 +1,8 @@
 //! The check of default values: by the table of the parameters.
 
-use super::{DetectDefaults, DetectParameters, Interface, ParameterError, ParameterSpec};
+use super::{
+    DefaultSource, DetectDefaults, DetectParameters, Interface, ParameterError, ParameterSpec,
+};
 
 /// Longest text of a value: reports repeat it.
 const MAX_CHARS: usize = 128;
@@ -35,6 +37,14 @@ impl DetectDefaults {
         Ok(Self::of(values))
     }
 
+    /// Returns the default of the parameter `follow` for a frame of a camera.
+    #[must_use]
+    pub fn follow(&self) -> bool {
+        let camera = [(DetectParameters::CAMERA, "camera")];
+        let parameters = DetectParameters::parse_with(camera, &[(DefaultSource::Server, self)]);
+        parameters.is_ok_and(|parameters| parameters.follow)
+    }
+
     /// Lists the parameters for which defaults can be set.
     pub fn offered() -> impl Iterator<Item = &'static ParameterSpec> {
         let table = DetectParameters::TABLE.iter();
@@ -45,7 +55,6 @@ impl DetectDefaults {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parameters::DefaultSource;
 
     fn defaults(pairs: &[(&str, &str)]) -> DetectDefaults {
         DetectDefaults::parse(pairs.iter().copied()).unwrap()

@@ -13,7 +13,7 @@ use lookdown_lens::{
     },
 };
 
-use super::mosaic::Mosaic;
+use super::mosaic::{Grid, Mosaic};
 use super::outline::{crop_outline, view_outline};
 use crate::{
     detection::{BBox, FramePixels, ViewPixels},
@@ -163,13 +163,14 @@ impl CameraRig {
     /// each input of the network.
     pub(super) fn with_mosaics(
         &self,
+        grid: Grid,
         crops: &[FrameCrop],
         frame_width: u32,
         frame_height: u32,
     ) -> Self {
         let mut rig = self.with_crops(crops, frame_width, frame_height);
         if let Views::Crops(crops) = rig.views {
-            rig.views = Views::Mosaics(Mosaic::of(&crops));
+            rig.views = Views::Mosaics(Mosaic::of(grid, &crops));
         }
         rig
     }

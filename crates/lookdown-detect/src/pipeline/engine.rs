@@ -17,12 +17,13 @@ use std::{
 
 use lookdown_lens::warning::{Warning, WarningCode};
 use rayon::{ThreadPool, ThreadPoolBuilder};
+use strum::VariantNames as _;
 
 pub use self::observation::Observation;
 use self::{first_pass::FirstPass, placed::Placed};
 use super::{
     BatchOptions, CalibrationLookup, DefaultModels, DetectJob, DetectedFrame, DetectionReport,
-    JobImage, Person, PipelineError, Stage, StageTimings,
+    JobImage, Person, PipelineError, Search, Stage, StageTimings,
     follow::FollowCache,
     inference_cache::{FrameKey, InferenceCache},
     merge,
@@ -38,7 +39,7 @@ use crate::{
         decode::{DecodeLimits, decode},
     },
     inference::{Model, ModelRegistry},
-    metrics::DetectMetrics,
+    metrics::{DetectMetrics, start_at_zero},
     parameters::{DetectParameters, Profile},
 };
 
@@ -129,6 +130,7 @@ impl Engine {
             .build()
             .map_err(std::io::Error::other)?;
         let remappers = Arc::new(remappers);
+        start_at_zero(&metrics.frame_searches, Search::VARIANTS);
         Ok(Self {
             models,
             network: Network::start(options.sessions, options.batches, &remappers)?,

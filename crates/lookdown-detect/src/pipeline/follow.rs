@@ -7,7 +7,10 @@
 
 mod target;
 
-use std::sync::{Arc, Weak};
+use std::{
+    sync::{Arc, Weak},
+    time::Duration,
+};
 
 use jiff::{SignedDuration, Timestamp};
 use lookdown_lens::geometry::{crop_placement::CropTarget, oriented_box::vertical_in_frame};
@@ -15,7 +18,7 @@ use nalgebra::Point2;
 use parking_lot::Mutex;
 
 use self::target::{SAME_IOU, Target, hull, overlap, targets_of, widened};
-use super::{Person, camera_cache::CameraCache, camera_rig::CameraRig};
+use super::{Person, camera_cache::CameraCache, camera_rig::CameraRig, motion_cache::MAX_AGE};
 use crate::{
     detection::{BBox, FramePixels, RefinementParameters},
     imaging::{Frame, FrameSignature, MovedCell},
@@ -31,6 +34,9 @@ const JOINED_CELLS: f64 = 2.0;
 /// Least change of a cell's mean by a person who was not there. Clothes differ from the floor by tens,
 /// parted ends of shadows by less than this.
 const NEW_LEVELS: u8 = 10;
+/// Most cells that noise of a video encoder changes, each by less than `NEW_LEVELS` and none beside
+/// another one.
+const MAX_NOISY_CELLS: usize = 8;
 /// If more than one of this many cells has moved, the light has changed: the frame is searched.
 const MOST_MOVED: usize = 4;
 /// Least score of boxes of crops, before they get the odds of their persons.
@@ -73,18 +79,23 @@ pub(super) struct FollowOrigin {
     rig: Weak<CameraRig>,
     model: Weak<Model>,
     refinement: RefinementParameters,
+    skips_still_frames: bool,
 }
 
 impl FollowOrigin {
+    /// With `skips_still_frames`, a frame without any motion since the search is not searched while
+    /// the motion cache would keep its views.
     pub(super) fn new(
         rig: &Arc<CameraRig>,
         model: &Arc<Model>,
         refinement: RefinementParameters,
+        skips_still_frames: bool,
     ) -> Self {
         Self {
             rig: Arc::downgrade(rig),
             model: Arc::downgrade(model),
             refinement,
+            skips_still_frames,
         }
     }
 
@@ -92,6 +103,7 @@ impl FollowOrigin {
         self.rig.ptr_eq(&other.rig)
             && self.model.ptr_eq(&other.model)
             && self.refinement == other.refinement
+            && self.skips_still_frames == other.skips_still_frames
     }
 }
 
@@ -110,10 +122,16 @@ struct Followed {
 impl Followed {
     /// Returns which persons have motion around them. `None` if the whole frame must be searched.
     fn moving(&self, signature: &FrameSignature, at: Timestamp) -> Option<Vec<bool>> {
-        if at < self.at || at.duration_since(self.searched_at) >= SEARCH_EVERY {
+        let age = at.duration_since(self.searched_at);
+        if at < self.at || Duration::try_from(age).is_ok_and(|age| age >= MAX_AGE) {
             return None;
         }
         let moved = signature.moved_since(&self.searched, &self.visible)?;
+        let moved = if is_noise(&moved) { Vec::new() } else { moved };
+        let is_still = moved.is_empty() && self.targets.iter().all(|target| target.is_seen);
+        if age >= SEARCH_EVERY && !(is_still && self.origin.skips_still_frames) {
+            return None;
+        }
         if moved.len() > self.visible.len() / MOST_MOVED || !self.explains(&moved, at) {
             return None;
         }
@@ -200,14 +218,14 @@ impl FollowedFrame {
                 let persons = found_by(&refinement);
                 let visible = before.as_ref().map(|before| Arc::clone(&before.visible));
                 let visible = visible.unwrap_or_else(|| visible_cells(&self.signature, rig));
-                let before = before.map_or_else(Vec::new, |before| before.targets);
+                let before = before.map(|before| before.targets);
                 let state = Followed {
                     origin: self.origin,
                     searched_at: self.at,
                     at: self.at,
                     searched: self.signature,
                     visible,
-                    targets: targets_of(&persons, self.at, &before),
+                    targets: targets_of(&persons, self.at, before.as_deref()),
                 };
                 (persons, state)
             }
@@ -240,27 +258,26 @@ impl Followed {
         }
         pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
         let mut is_used = vec![false; found.len()];
-        let mut is_confirmed: Vec<bool> = moving.iter().map(|is_moving| !is_moving).collect();
-        for (_, index, number) in &pairs {
-            if !is_confirmed[*index] && !is_used[*number] {
-                is_confirmed[*index] = true;
-                is_used[*number] = true;
-                self.targets[*index].confirm(&found[*number], at, rig);
+        let mut is_paired = vec![false; expected.len()];
+        for (_, index, number) in pairs {
+            if !is_paired[index] && !is_used[number] {
+                is_paired[index] = true;
+                is_used[number] = true;
+                // Persons without motion stay as they were.
+                if moving[index] {
+                    self.targets[index].confirm(&found[number], at, rig);
+                }
             }
         }
-        for (target, is_confirmed) in self.targets.iter_mut().zip(is_confirmed) {
-            target.is_seen = is_confirmed;
-        }
-        for (_, _, number) in pairs {
-            is_used[number] = true;
+        let states = moving.iter().zip(is_paired);
+        for (target, (is_moving, is_paired)) in self.targets.iter_mut().zip(states) {
+            target.is_seen = is_paired || !is_moving;
         }
         let threshold = self.origin.refinement.score_threshold;
         let others = found.into_iter().zip(is_used);
         let others = others.filter(|(other, is_used)| !is_used && other.score >= threshold);
-        let others: Vec<_> = others
-            .map(|(other, _)| Target::new(other, at, None))
-            .collect();
-        self.targets.extend(others);
+        self.targets
+            .extend(others.map(|(other, _)| Target::new(other, at, None)));
     }
 
     /// Returns the persons that are seen, highest score first.
@@ -276,10 +293,43 @@ impl Followed {
     }
 }
 
+/// Returns true if cells with motion are few, weak and apart from each other.
+fn is_noise(moved: &[MovedCell]) -> bool {
+    let touches = |index: usize, one: &MovedCell| {
+        let reach = widened(one.bounds, 1.0);
+        let mut others = moved.iter().skip(index + 1);
+        others.any(|other| overlap(&reach, &other.bounds))
+    };
+    moved.len() <= MAX_NOISY_CELLS
+        && moved.iter().all(|cell| cell.levels < NEW_LEVELS)
+        && !(moved.iter().enumerate()).any(|(index, one)| touches(index, one))
+}
+
 /// Returns the cells of a frame whose middle can show a person.
 fn visible_cells(signature: &FrameSignature, rig: &CameraRig) -> Arc<[bool]> {
     let middles = signature.cells().map(|[x_min, y_min, x_max, y_max]| {
         Point2::new(f64::midpoint(x_min, x_max), f64::midpoint(y_min, y_max))
     });
     middles.map(|middle| rig.shows(middle)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cell(x: f64, levels: u8) -> MovedCell {
+        MovedCell {
+            bounds: [x, 0.0, x + 15.0, 15.0],
+            levels,
+        }
+    }
+
+    #[test]
+    fn weak_cells_apart_from_each_other_are_noise() {
+        assert!(is_noise(&[cell(0.0, 4), cell(30.0, 5), cell(300.0, 4)]));
+        assert!(!is_noise(&[cell(0.0, 4), cell(15.0, 4)]));
+        assert!(!is_noise(&[cell(0.0, NEW_LEVELS)]));
+        let many = (0..9).map(|index| cell(f64::from(index) * 30.0, 4));
+        assert!(!is_noise(&many.collect::<Vec<_>>()));
+    }
 }

@@ -7,30 +7,54 @@ use crate::{
     imaging::{Frame, NetworkInput, RemapTable},
 };
 
-/// Tiles along each side of an input.
-pub(super) const TILES_PER_SIDE: u32 = 2;
-/// Tiles of an input.
-const TILES: usize = (TILES_PER_SIDE * TILES_PER_SIDE) as usize;
+/// The number of tiles along each side of a mosaic.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Grid {
+    /// Four tiles.
+    Two = 2,
+    /// Nine tiles.
+    Three = 3,
+}
 
-/// Up to four crops side by side, row by row.
+impl Grid {
+    /// Returns the number of tiles along each side.
+    pub(super) fn per_side(self) -> u32 {
+        self as u32
+    }
+
+    /// Returns the number of tiles.
+    pub(super) fn tiles(self) -> usize {
+        let per_side = self as usize;
+        per_side * per_side
+    }
+}
+
+/// Crops side by side, row by row, at most as many as its grid has tiles.
 #[derive(Debug)]
-pub(super) struct Mosaic(Vec<(FrameCrop, RemapTable)>);
+pub(super) struct Mosaic {
+    grid: Grid,
+    tiles: Vec<(FrameCrop, RemapTable)>,
+}
 
 impl Mosaic {
-    /// Distributes crops, whose sides are half of the input's, to as few inputs as possible.
-    pub(super) fn of(crops: &[(FrameCrop, RemapTable)]) -> Vec<Self> {
-        let mosaics = crops.chunks(TILES).map(|tiles| Self(tiles.to_vec()));
+    /// Distributes crops, whose sides are those of the grid's tiles, to as few inputs as possible.
+    pub(super) fn of(grid: Grid, crops: &[(FrameCrop, RemapTable)]) -> Vec<Self> {
+        let chunks = crops.chunks(grid.tiles());
+        let mosaics = chunks.map(|tiles| Self {
+            grid,
+            tiles: tiles.to_vec(),
+        });
         mosaics.collect()
     }
 
     /// Returns the crops.
     pub(super) fn crops(&self) -> impl Iterator<Item = &FrameCrop> {
-        self.0.iter().map(|(crop, _)| crop)
+        self.tiles.iter().map(|(crop, _)| crop)
     }
 
     /// Returns the remap tables.
     pub(super) fn tables(&self) -> impl Iterator<Item = &RemapTable> {
-        self.0.iter().map(|(_, table)| table)
+        self.tiles.iter().map(|(_, table)| table)
     }
 
     /// Renders the tiles into the slot `[3, height, width]` of the network's input. Places without a
@@ -40,7 +64,7 @@ impl Mosaic {
             plane.fill(offset);
         }
         let mut pixels = Vec::new();
-        for (index, (crop, table)) in self.0.iter().enumerate() {
+        for (index, (crop, table)) in self.tiles.iter().enumerate() {
             let tile = NetworkInput {
                 width: crop.width,
                 height: crop.height,
@@ -48,7 +72,7 @@ impl Mosaic {
             };
             pixels.resize(tile.view_len(), 0.0);
             table.render(frame, &tile, &mut pixels);
-            let [left, top] = corner(index, crop).map(|at| at as usize);
+            let [left, top] = self.corner(index, crop).map(|at| at as usize);
             let (wide, across) = (crop.width as usize, input.width as usize);
             let planes = slot.chunks_exact_mut(input.plane_len());
             for (plane, source) in planes.zip(pixels.chunks_exact(tile.plane_len())) {
@@ -64,30 +88,35 @@ impl Mosaic {
     /// tile. `None` where there is no tile.
     pub(super) fn tile_of(&self, bbox: &BBox<ViewPixels>) -> Option<(&FrameCrop, [f64; 4])> {
         let [x, y] = bbox.center();
-        self.0.iter().enumerate().find_map(|(index, (crop, _))| {
-            let [left, top] = corner(index, crop).map(f64::from);
-            let (width, height) = (f64::from(crop.width), f64::from(crop.height));
-            let is_within = (left..left + width).contains(&x) && (top..top + height).contains(&y);
-            let [x_min, y_min, x_max, y_max] = bbox.corners();
-            let local = [
-                (x_min - left).max(0.0),
-                (y_min - top).max(0.0),
-                (x_max - left).min(width),
-                (y_max - top).min(height),
-            ];
-            is_within.then_some((crop, local))
-        })
+        self.tiles
+            .iter()
+            .enumerate()
+            .find_map(|(index, (crop, _))| {
+                let [left, top] = self.corner(index, crop).map(f64::from);
+                let (width, height) = (f64::from(crop.width), f64::from(crop.height));
+                let is_within =
+                    (left..left + width).contains(&x) && (top..top + height).contains(&y);
+                let [x_min, y_min, x_max, y_max] = bbox.corners();
+                let local = [
+                    (x_min - left).max(0.0),
+                    (y_min - top).max(0.0),
+                    (x_max - left).min(width),
+                    (y_max - top).min(height),
+                ];
+                is_within.then_some((crop, local))
+            })
     }
-}
 
-/// The left upper corner of a tile in the input, pixels.
-fn corner(index: usize, crop: &FrameCrop) -> [u32; 2] {
-    // There are four tiles.
-    let index = u32::try_from(index).unwrap_or_default();
-    [
-        index % TILES_PER_SIDE * crop.width,
-        index / TILES_PER_SIDE * crop.height,
-    ]
+    /// Returns the left upper corner of a tile in the input, pixels.
+    fn corner(&self, index: usize, crop: &FrameCrop) -> [u32; 2] {
+        // There are nine tiles at most.
+        let index = u32::try_from(index).unwrap_or_default();
+        let per_side = self.grid.per_side();
+        [
+            index % per_side * crop.width,
+            index / per_side * crop.height,
+        ]
+    }
 }
 
 #[cfg(test)]
@@ -122,7 +151,7 @@ mod tests {
         let crops = crops.map(|[x, y]| crop(x, y));
         let tables = crops.map(|crop| RemapTable::of_crop(&crop, 200, 200));
         let crops: Vec<_> = crops.into_iter().zip(tables).collect();
-        let mosaics = Mosaic::of(&crops);
+        let mosaics = Mosaic::of(Grid::Two, &crops);
         assert_eq!(mosaics.len(), 2);
         let input = NetworkInput::plain(80, 80);
         let mut slot = vec![0.0; input.view_len()];
@@ -136,6 +165,11 @@ mod tests {
             let shown = [slot[index], slot[input.plane_len() + index]].map(f64::from);
             assert!((shown[0] - x).abs() < 0.6 && (shown[1] - y).abs() < 0.6);
         }
+        let wide = Mosaic::of(Grid::Three, &crops);
+        assert_eq!(wide.len(), 1);
+        let last = BBox::new([45.0, 45.0, 65.0, 65.0]).unwrap();
+        let (crop, _) = wide[0].tile_of(&last).unwrap();
+        assert_eq!(crop.center, Pixel::new(40.0, 40.0));
         let beside = BBox::new([50.0, 50.0, 60.0, 60.0]).unwrap();
         assert!(mosaics[1].tile_of(&beside).is_none());
     }

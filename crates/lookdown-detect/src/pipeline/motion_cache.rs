@@ -18,7 +18,7 @@ use crate::{
 };
 
 /// Maximum age of cached detections, with or without motion.
-const MAX_AGE: Duration = Duration::from_secs(10);
+pub(super) const MAX_AGE: Duration = Duration::from_secs(10);
 
 /// The latest detections of each camera.
 #[derive(Default)]

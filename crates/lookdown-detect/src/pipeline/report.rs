@@ -66,7 +66,7 @@ pub struct DetectionReport {
 }
 
 /// The origin of the persons of a frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, strum::IntoStaticStr)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, strum::IntoStaticStr, strum::VariantNames)]
 #[strum(serialize_all = "snake_case")]
 pub enum Search {
     /// The views of the profile, and crops around possible persons.

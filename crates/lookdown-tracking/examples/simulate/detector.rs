@@ -58,6 +58,14 @@ struct Errors {
     edges: [Slow; 4],
 }
 
+/// A box of the detector.
+#[derive(Clone, Copy)]
+pub struct Found {
+    pub oriented: OrientedBox,
+    /// The logit of its score; minus infinity if it is missed.
+    pub logit: f64,
+}
+
 /// A box that the lens shows.
 #[derive(Clone, Copy)]
 pub struct Shown {
@@ -135,8 +143,44 @@ impl Camera {
 
     /// The persons that the detector reports at `at_s`.
     pub fn detect(&mut self, at_s: f64, shown: &[Shown]) -> Vec<(Observation, OrientedBox)> {
+        let found = self.search(at_s, shown);
+        self.observed(&found)
+    }
+
+    /// The boxes from the score floor on.
+    pub fn observed(&self, found: &[Found]) -> Vec<(Observation, OrientedBox)> {
+        let observed = found.iter().filter_map(|found| self.observe(*found));
+        observed.collect()
+    }
+
+    /// The boxes in the whole frame.
+    pub fn search(&mut self, at_s: f64, shown: &[Shown]) -> Vec<Found> {
+        let mut found = self.boxes_of(at_s, shown, |_| true);
+        self.invent_at_fixed_places(at_s, |_| true, &mut found);
+        self.invent_anywhere(&mut found);
+        found
+    }
+
+    /// The boxes of the persons and fixed places that crops show.
+    pub fn search_crops(
+        &mut self,
+        at_s: f64,
+        shown: &[Shown],
+        is_in_crop: impl Fn(&OrientedBox) -> bool,
+    ) -> Vec<Found> {
+        let mut found = self.boxes_of(at_s, shown, &is_in_crop);
+        self.invent_at_fixed_places(at_s, is_in_crop, &mut found);
+        found
+    }
+
+    fn boxes_of(
+        &mut self,
+        at_s: f64,
+        shown: &[Shown],
+        is_searched: impl Fn(&OrientedBox) -> bool,
+    ) -> Vec<Found> {
         let mut found = Vec::new();
-        for person in shown {
+        for person in shown.iter().filter(|person| is_searched(&person.oriented)) {
             let hidden = self.is_hidden(person, shown);
             let mut errors = self.errors.get(&person.id).copied().unwrap_or_default();
             let slow = self.mixed(&mut errors.score, at_s);
@@ -147,20 +191,28 @@ impl Camera {
                 *edge = self.figures.edge * self.mixed(slow, at_s);
             }
             self.errors.insert(person.id, errors);
-            found.extend(self.observe(moved(&person.oriented, edges), logit));
+            found.push(Found {
+                oriented: moved(&person.oriented, edges),
+                logit,
+            });
             let Figures { parts, .. } = self.figures;
             for _ in 0..self.chance.count(parts.count) {
                 let shift = self.chance.uniform(-0.4, 0.4);
-                let part = moved(&person.oriented, [shift, shift, shift * 0.3, shift * 0.3]);
-                let logit = parts.logit_of(self.chance.normal());
-                found.extend(self.observe(part, logit));
+                found.push(Found {
+                    oriented: moved(&person.oriented, [shift, shift, shift * 0.3, shift * 0.3]),
+                    logit: parts.logit_of(self.chance.normal()),
+                });
             }
         }
-        self.invent(at_s, &mut found);
         found
     }
 
-    fn invent(&mut self, at_s: f64, found: &mut Vec<(Observation, OrientedBox)>) {
+    fn invent_at_fixed_places(
+        &mut self,
+        at_s: f64,
+        is_searched: impl Fn(&OrientedBox) -> bool,
+        found: &mut Vec<Found>,
+    ) {
         let Figures { background, .. } = self.figures;
         for index in 0..self.fixed.len() {
             let fixed = &mut self.fixed[index];
@@ -170,19 +222,26 @@ impl Camera {
             let value =
                 FIXED_BETWEEN.sqrt() * fixed.lasting + (1.0 - FIXED_BETWEEN).sqrt() * changing;
             let place = fixed.place;
-            if let Some(shown) = self.show(0, place, 1.7) {
-                found.extend(self.observe(shown.oriented, background.logit_of(value)));
-            }
+            let shown = self.show(0, place, 1.7);
+            let shown = shown.filter(|shown| is_searched(&shown.oriented));
+            found.extend(shown.map(|shown| Found {
+                oriented: shown.oriented,
+                logit: background.logit_of(value),
+            }));
         }
+    }
+
+    fn invent_anywhere(&mut self, found: &mut Vec<Found>) {
+        let Figures { background, .. } = self.figures;
         for _ in 0..self.chance.count(background.count * (1.0 - FIXED_SHARE)) {
             let reach = 6.0;
             let place = Vector2::new(
                 self.chance.uniform(-reach, reach),
                 self.chance.uniform(-reach, reach),
             );
-            if let Some(shown) = self.show(0, place, 1.7) {
+            if let Some(Shown { oriented, .. }) = self.show(0, place, 1.7) {
                 let logit = background.logit_of(self.chance.normal());
-                found.extend(self.observe(shown.oriented, logit));
+                found.push(Found { oriented, logit });
             }
         }
     }
@@ -218,7 +277,8 @@ impl Camera {
         })
     }
 
-    fn observe(&self, oriented: OrientedBox, logit: f64) -> Option<(Observation, OrientedBox)> {
+    fn observe(&self, found: Found) -> Option<(Observation, OrientedBox)> {
+        let Found { oriented, logit } = found;
         let score = 1.0 / (1.0 + (-logit).exp());
         let seen = bearing(oriented.center, &self.lens)?;
         let foot = oriented.foot();

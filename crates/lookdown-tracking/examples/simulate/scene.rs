@@ -17,6 +17,7 @@ use crate::{
     chance::Chance,
     detector::{Camera, FRAME_PX, Shown, bounds},
     figures::Figures,
+    follow::Follow,
     people::{Hall, People, STEP_S},
 };
 
@@ -43,6 +44,7 @@ pub struct Options {
     persons: usize,
     figures: Figures,
     is_site: bool,
+    follows: bool,
     settings: TrackerSettings,
 }
 
@@ -62,6 +64,7 @@ impl Options {
             persons: number(given.get("--persons"), 8),
             figures: Figures::of_name(detector).expect("--detector is a name of figures"),
             is_site: given.contains_key("--site"),
+            follows: given.contains_key("--follow"),
             settings: given
                 .get("--settings")
                 .map_or_else(TrackerSettings::default, |text| {
@@ -167,6 +170,8 @@ pub struct Scene {
     separate: Vec<Follower>,
     /// The same without the camera's height.
     bearing: Follower,
+    /// The followed persons of each camera, with `--follow`.
+    follows: Vec<Follow>,
     sides: BTreeMap<u64, Direction>,
     true_crossings: Vec<(Direction, f64)>,
 }
@@ -222,6 +227,11 @@ impl Scene {
                 frame_line(&cameras[0], hall.y),
                 &options.settings,
             ),
+            follows: if options.follows {
+                poses.iter().map(|_| Follow::default()).collect()
+            } else {
+                Vec::new()
+            },
             cameras,
             sides: BTreeMap::new(),
             true_crossings: Vec::new(),
@@ -260,7 +270,13 @@ impl Scene {
                 shown.push(seen);
             }
         }
-        let found = camera.detect(at_s, &shown);
+        let found = match self.follows.get_mut(number) {
+            Some(follow) => {
+                let found = follow.find(camera, at_s, &shown);
+                camera.observed(&found)
+            }
+            None => camera.detect(at_s, &shown),
+        };
         let persons: Vec<_> = found.iter().map(|(person, _)| *person).collect();
         self.site.update(number, at_s, &persons);
         self.separate[number].update(0, at_s, &persons);
@@ -333,6 +349,7 @@ impl Scene {
         let separate: Vec<_> = self.separate.iter().flat_map(Follower::crossings).collect();
         json!({
             "second_camera": self.second_camera(),
+            "searches": self.follows.iter().map(|follow| follow.searches).collect::<Vec<_>>(),
             "line_x_m": LINE_X_M,
             "band_m": DEFAULT_BAND_M,
             "truth": self.true_crossings,

@@ -192,11 +192,9 @@ impl CameraEntry {
         ] {
             parameters.extend(value.clone().map(|value| (key.to_owned(), value)));
         }
-        // An empty room then costs its decoding and a comparison.
-        let motion = self.motion.unwrap_or(true);
-        parameters.push(("motion".to_owned(), motion.to_string()));
-        if let Some(follow) = self.follow {
-            parameters.push(("follow".to_owned(), follow.to_string()));
+        // An empty room then costs its decoding and a comparison, and a walker one crop.
+        for (key, value) in [("motion", self.motion), ("follow", self.follow)] {
+            parameters.push((key.to_owned(), value.unwrap_or(true).to_string()));
         }
         for (key, value) in &self.parameters {
             if OWN_PARAMETERS.contains(&key.as_str()) {

@@ -5,7 +5,7 @@ use std::{sync::Arc, time::Instant};
 use lookdown_lens::geometry::crop_placement::place_crops;
 
 use super::{Engine, Observation, first_pass::FirstPass};
-use crate::pipeline::{DetectJob, Stage, follow::FollowOrigin, mosaic::TILES_PER_SIDE, pass::Pass};
+use crate::pipeline::{DetectJob, Stage, follow::FollowOrigin, mosaic::Grid, pass::Pass};
 
 impl Engine {
     /// Queues crops around followed persons, unless the frame must be searched.
@@ -18,7 +18,12 @@ impl Engine {
         };
         job.ticket.timeline.enter(Stage::Remap, Instant::now());
         let rig = Arc::clone(&observation.camera.rig);
-        let origin = FollowOrigin::new(&rig, &observation.model, parameters.refinement);
+        let origin = FollowOrigin::new(
+            &rig,
+            &observation.model,
+            parameters.refinement,
+            parameters.motion,
+        );
         let at = parameters.captured_at.unwrap_or(job.received_at);
         let frame = Arc::clone(&observation.frame);
         let follow = self.follow_cache.compare(camera, origin, &frame, at);
@@ -40,16 +45,21 @@ impl Engine {
         let side = model.input().width.min(model.input().height);
         let (width, height) = (frame.width(), frame.height());
         let fill = observation.tuning.crop_fill;
-        let crops = self.remappers.install(|| match targets.as_slice() {
-            [_] => {
+        let tiles = |grid: Grid| {
+            // Persons in tiles fill the same share, so that they are smaller with more tiles.
+            let fill = fill * f64::from(Grid::Two.per_side());
+            place_crops(&targets, targets.len(), fill, side / grid.per_side())
+        };
+        let crops = self.remappers.install(|| {
+            if targets.len() == 1 {
                 let crops = place_crops(&targets, 1, fill, side);
-                rig.with_crops(&crops, width, height)
+                return rig.with_crops(&crops, width, height);
             }
-            targets => {
-                let fill = fill * f64::from(TILES_PER_SIDE);
-                let crops = place_crops(targets, targets.len(), fill, side / TILES_PER_SIDE);
-                rig.with_mosaics(&crops, width, height)
+            let (mut grid, mut crops) = (Grid::Two, tiles(Grid::Two));
+            if crops.len() > grid.tiles() {
+                (grid, crops) = (Grid::Three, tiles(Grid::Three));
             }
+            rig.with_mosaics(grid, &crops, width, height)
         });
         if crops.view_count() == 0 {
             return FirstPass::Nothing;

@@ -18,12 +18,23 @@ impl FollowedCamera {
 
     /// Returns the report of a frame captured at `millis` with a disc of this center and radius.
     fn report(&self, millis: u64, disc: [f64; 2], radius: f64) -> DetectionReport {
+        self.report_with(millis, disc, radius, "false")
+    }
+
+    fn report_with(
+        &self,
+        millis: u64,
+        disc: [f64; 2],
+        radius: f64,
+        motion: &str,
+    ) -> DetectionReport {
         let at = Timestamp::UNIX_EPOCH + Duration::from_millis(millis);
         let at = at.to_string();
         let parameters = [
             ("calibration", "lobby"),
             ("profile", "fast"),
             ("follow", "true"),
+            ("motion", motion),
             ("captured_at", &*at),
         ];
         let image = frame_with_disc(600, disc, radius);
@@ -74,6 +85,21 @@ fn the_whole_frame_is_searched_every_second() {
 }
 
 #[test]
+fn with_motion_a_still_frame_is_not_searched_for_10_s() {
+    let camera = FollowedCamera::new();
+    // A search finds its views in the motion cache, whose clock is that of the server.
+    let views = [0, 200, 1200, 9800, 10_000, 10_200].map(|millis| {
+        let report = camera.report_with(millis, [420.0, 300.0], 20.0, "true");
+        (report.views.inferred > 0, report.views.unchanged > 0)
+    });
+    let (searched, skipped) = ((false, true), (false, false));
+    assert_eq!(views[0], (true, false));
+    assert_eq!(views[1..], [skipped, skipped, skipped, searched, skipped]);
+    let moved = camera.report_with(11_200, [412.0, 300.0], 20.0, "true");
+    assert_eq!(moved.search, Search::Full);
+}
+
+#[test]
 fn a_person_without_motion_stays_without_inference() {
     let camera = FollowedCamera::new();
     let first = camera.report(0, [420.0, 300.0], 20.0);
@@ -102,6 +128,38 @@ fn a_person_whom_no_crop_confirms_disappears() {
     assert_eq!((gone.search, gone.persons.len()), (Search::Followed, 0));
     let back = camera.report(400, [420.0, 300.0], 20.0);
     assert_eq!((back.search, back.persons.len()), (Search::Followed, 1));
+}
+
+#[test]
+fn a_walker_whom_a_search_misses_is_still_expected() {
+    let camera = FollowedCamera::new();
+    for (millis, x) in [
+        (0, 420.0),
+        (200, 412.0),
+        (400, 404.0),
+        (600, 396.0),
+        (800, 388.0),
+    ] {
+        camera.report(millis, [x, 300.0], 20.0);
+    }
+    let missed = camera.report(1000, [380.0, 300.0], 0.0);
+    assert_eq!((missed.search, missed.persons.len()), (Search::Full, 0));
+    let again = camera.report(1200, [372.0, 300.0], 20.0);
+    assert_eq!((again.search, again.persons.len()), (Search::Followed, 1));
+}
+
+#[test]
+fn a_score_of_one_search_counts_half_until_the_next() {
+    let camera = FollowedCamera::new();
+    camera.report(0, [420.0, 300.0], 0.0);
+    let score = |millis| camera.report(millis, [420.0, 300.0], 20.0).persons[0].score;
+    let (searched, once) = (score(200), score(400));
+    let (again, twice) = (score(1200), score(1400));
+    assert!((searched - again).abs() < 1e-9);
+    assert!(
+        once < twice && twice < searched,
+        "{once} {twice} {searched}"
+    );
 }
 
 #[test]

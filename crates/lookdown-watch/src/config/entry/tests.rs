@@ -51,7 +51,7 @@ fn defaults_apply_to_every_camera() {
         url = "rtsp://viewer:secret@10.0.0.9/s1"
         every = "2s"
         motion = false
-        follow = true
+        follow = false
         "#,
     )
     .unwrap();
@@ -67,11 +67,11 @@ fn defaults_apply_to_every_camera() {
     };
     assert_eq!(
         query(hall),
-        "camera=hall&calibration=ceiling&profile=fast&motion=true&score_threshold=0.4"
+        "camera=hall&calibration=ceiling&profile=fast&motion=true&follow=true&score_threshold=0.4"
     );
     assert_eq!(
         query(gate),
-        "camera=gate&profile=fast&motion=false&follow=true&score_threshold=0.4"
+        "camera=gate&profile=fast&motion=false&follow=false&score_threshold=0.4"
     );
     assert_eq!(gate.every.as_secs(), 2);
     assert!(matches!(&gate.location, Location::Rtsp(url) if url.username().is_empty()));
