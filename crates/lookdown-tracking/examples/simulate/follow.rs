@@ -160,11 +160,11 @@ impl State {
         if !self.explains(&moved, at_s) {
             return None;
         }
-        let moves = |target: &Target| {
+        let is_moving = |target: &Target| {
             let places = hull(target.trail, target.expected(at_s));
             !target.is_seen || moved.iter().any(|one| overlap(&places, one))
         };
-        Some(self.targets.iter().map(moves).collect())
+        Some(self.targets.iter().map(is_moving).collect())
     }
 
     /// The bounds of persons that have moved since the search, where they were and where they are.
