@@ -65,10 +65,14 @@ impl Recording {
             longest_gap_ms: i64::try_from(longest_gap.as_millis()).unwrap_or(i64::MAX),
             max_cameras: MAX_CAMERAS,
         };
-        // Other cameras of the store have other recordings.
+        // Other cameras of the store have other recordings. A store of an earlier version has no
+        // state of its cameras.
         let mut states = resumed.scenes.iter();
-        let last_event = states.find_map(|state| state.last_event_of(camera));
-        let last_event = last_event.unwrap_or_default();
+        let last_event = match states.find_map(|state| state.last_event_of(camera)) {
+            Some(own) => own,
+            None if resumed.scenes.is_empty() => resumed.last_event,
+            None => 0,
+        };
         let mut counter = Counter::new(counting, last_event, resumed.totals);
         let others = Calibrations::resumed(resumed.calibrations);
         for state in resumed.scenes {
