@@ -204,7 +204,7 @@ async fn provisional_responses_end_at_the_timeout() {
     .await
     .unwrap();
     // Three probes of 2 s and a request of 5 s. The peer keeps a core busy, which delays timers.
-    assert!(began.elapsed() < Duration::from_secs(60));
+    assert!(began.elapsed() < Duration::from_mins(1));
     assert!(resident_bytes() < before + (100 << 20));
 }
 

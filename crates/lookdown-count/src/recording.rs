@@ -1,6 +1,7 @@
 //! Counting of recordings: reports in order, with the times of the recording and without a server.
 
 use std::{
+    collections::BTreeSet,
     path::Path,
     sync::Arc,
     time::{Duration, Instant},
@@ -17,6 +18,7 @@ use crate::{
     http::{MAX_VALUES, table},
     now::Now,
     report::ReceivedReport,
+    scene::{Scene, seconds},
     snapshot::LineSnapshot,
     store::{Span, Store, StoreError},
     sums::{MINUTE_MS, Owner},
@@ -164,6 +166,17 @@ impl Recording {
     pub fn persons(&self) -> u64 {
         let scene = self.counter.scene_of(&self.camera);
         scene.map_or(0, |scene| scene.presence().persons)
+    }
+
+    /// Returns the indices of the persons in the report of this time, the last one, that are followed
+    /// and count.
+    #[must_use]
+    pub fn followed(&self, at: Timestamp) -> BTreeSet<usize> {
+        let at_s = seconds(at.as_millisecond());
+        let tracks = self.counter.scene_of(&self.camera).into_iter();
+        let tracks = tracks.flat_map(Scene::tracks);
+        let seen = tracks.filter(|track| track.seen_s().total_cmp(&at_s).is_eq());
+        seen.map(|track| track.last_person().person).collect()
     }
 
     /// Returns the crossings of the lines of the camera since the store was created.

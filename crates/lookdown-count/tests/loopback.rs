@@ -630,6 +630,8 @@ fn cameras_of_a_store_have_separate_recordings() {
             recording.count(time(*id), report.as_bytes()).unwrap();
         }
         recording.commit().unwrap();
+        assert_eq!(recording.followed(time(last)).into_iter().next(), Some(0));
+        assert!(recording.followed(time(reports[0].0)).is_empty());
         let crossings = recording.lines().into_iter().map(|line| line.crossings);
         assert_eq!(crossings.sum::<u64>(), 5, "{camera}");
         drop(recording);

@@ -209,7 +209,9 @@ impl Counting<'_> {
     /// Counts the frames of a recording, and returns the time of its end.
     fn count(&mut self, clip: &Clip) -> anyhow::Result<Timestamp> {
         let name = clip.path.display().to_string();
+        // The store has microseconds, the time of a file nanoseconds.
         let counted_until = self.recording.counted_until();
+        let counted_until = counted_until.map(Timestamp::as_microsecond);
         let options = VideoOptions::default();
         let frames = VideoFrames::open(&clip.path, self.every, &options);
         let mut frames = self.runtime.block_on(frames)?;
@@ -223,7 +225,7 @@ impl Counting<'_> {
                 };
                 let at = clip.start + position;
                 end = at + self.every;
-                if counted_until.is_some_and(|until| at <= until) {
+                if counted_until.is_some_and(|until| at.as_microsecond() <= until) {
                     self.progress.advance();
                 } else {
                     images.push((at, image));
@@ -232,10 +234,15 @@ impl Counting<'_> {
             if images.is_empty() {
                 return Ok(end);
             }
-            for (at, detected) in self.detect(&name, images)? {
+            for (at, mut detected) in self.detect(&name, images)? {
                 let report = serde_json::to_vec(&to_report(&detected.report))?;
                 self.recording.count(at, &report)?;
                 if let Some((writer, path)) = &mut self.video {
+                    // From 0.06 on, most persons are none. Those who are followed make the counts.
+                    let followed = self.recording.followed(at);
+                    let mut index = 0..;
+                    let persons = &mut detected.report.persons;
+                    persons.retain(|_| index.next().is_some_and(|index| followed.contains(&index)));
                     let jpeg = annotate::jpeg(detected, &self.drawing)?;
                     let written = self.runtime.block_on(writer.write(&jpeg));
                     written.with_context(|| unwritable(path))?;
