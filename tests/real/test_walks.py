@@ -18,6 +18,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from harness.places import LOOKDOWN
 from harness.processes import Server, free_ports
 from harness.usage import usage_of
 from support.lookdown import lookdown
@@ -106,6 +107,30 @@ class Walks(unittest.TestCase):
                 yield Chain(server, watch, count)
             except AssertionError as error:
                 raise AssertionError(f"{error}\n{watch.text}") from None
+
+    def test_recordings_of_two_cameras_share_a_store(self):
+        store, csv = self.folder / "counts.sqlite", self.folder / "counts.csv"
+        calibration = ["--calibration", CLIP / "calibration.json", "--start", "2026-11-22T09:00:00Z"]
+        clip = [LOOKDOWN, "count", CLIP / "walks.mp4", *calibration, "--profile", "fast"]
+
+        def counted(camera: str) -> subprocess.CompletedProcess:
+            own = ["--camera", camera, "--store", store, "--csv", csv, "--annotate", self.folder / f"{camera}.mp4"]
+            return subprocess.run([*clip, *own], capture_output=True, text=True, check=False)
+
+        for camera in ("hall", "yard"):
+            done = counted(camera)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            names, values = (line.split(",") for line in csv.read_text(encoding="utf-8").splitlines())
+            row = dict(zip(names, values, strict=True))
+            wrong = crossings = 0
+            for line, directions in TRUTH["crossings"].items():
+                for direction, true in directions.items():
+                    wrong += abs(true - int(row[f"line.{line}.{direction}"]))
+                    crossings += true
+            self.assertLessEqual(wrong, ERROR_SHARE * crossings, row)
+        again = counted("hall")
+        self.assertEqual(again.returncode, 1)
+        self.assertIn("counted already", again.stderr)
 
     def test_walks_through_rtsp_are_counted(self):
         rows = []
