@@ -446,6 +446,19 @@ fn a_second_signal_ends_the_server_at_once() {
 }
 
 #[test]
+fn the_process_may_open_as_many_files_as_its_hard_limit() {
+    let server = Server::start("ulimit -Sn 256; ulimit -Hn 600", &[NO_GRACE]);
+    let limits = fs::read_to_string(format!("/proc/{}/limits", server.process.id())).unwrap();
+    let limit = limits
+        .lines()
+        .find(|line| line.starts_with("Max open files"));
+    let numbers = limit.unwrap().split_whitespace().skip(3).take(2);
+    assert_eq!(numbers.collect::<Vec<_>>(), ["600", "600"]);
+    server.signal("TERM");
+    server.has_ended();
+}
+
+#[test]
 fn lack_of_file_descriptors_is_logged_once_and_recovered_from() {
     // With a single model, a ready server opens no more files.
     let model = ("LOOKDOWN__MODEL__PATH", "models/ssdlite_mobilenet_v2");
