@@ -1,13 +1,15 @@
 #![doc = include_str!("../README.md")]
 //!
 //! [`Tracker`] turns [`Observation`]s into tracks, [`lines`] counts crossings, [`zones`] occupancy and
-//! dwell times, [`heat_map`] seconds of presence. [`furniture`] is what never moves.
+//! dwell times, [`heat_map`] seconds of presence. [`furniture`] is what never moves. [`follow`] tells where to look for
+//! people between searches of a frame.
 
 mod assignment;
 mod camera;
 mod candidates;
 mod duplicates;
 mod evidence;
+pub mod follow;
 pub mod furniture;
 pub mod heat_map;
 mod kalman;

@@ -1,11 +1,8 @@
 //! Follows the persons of a camera between searches of the whole frame.
 //!
-//! After a search, the cells of the next frames are compared with those of the searched frame. Motion
-//! where no person was starts another search. Motion at a person has a crop placed where that person
-//! is expected; persons without motion stay as they were. A crop has one vote instead of those of all
-//! views, so that each person keeps the odds that the search gave it relative to its first crop.
-
-mod target;
+//! After a search, the cells of the next frames are compared with those of the searched frame.
+//! [`FollowedPeople`] tells from the cells with motion whom a crop must confirm, and when another
+//! search is needed.
 
 use std::{
     sync::{Arc, Weak},
@@ -13,14 +10,18 @@ use std::{
 };
 
 use jiff::{SignedDuration, Timestamp};
-use lookdown_lens::geometry::{crop_placement::CropTarget, oriented_box::vertical_in_frame};
+use lookdown_lens::geometry::{
+    OrientedBox, crop_placement::CropTarget, oriented_box::vertical_in_frame,
+};
+use lookdown_tracking::follow::{FollowedPeople, FoundPerson, overlap, widened};
 use nalgebra::Point2;
 use parking_lot::Mutex;
 
-use self::target::{SAME_IOU, Target, hull, overlap, targets_of, widened};
-use super::{Person, camera_cache::CameraCache, camera_rig::CameraRig, motion_cache::MAX_AGE};
+use super::{
+    Person, camera_cache::CameraCache, camera_rig::CameraRig, merge, motion_cache::MAX_AGE,
+};
 use crate::{
-    detection::{BBox, FramePixels, RefinementParameters},
+    detection::RefinementParameters,
     imaging::{Frame, FrameSignature, MovedCell},
     inference::Model,
 };
@@ -116,7 +117,7 @@ struct Followed {
     searched: FrameSignature,
     /// The cells of a frame that can show a person.
     visible: Arc<[bool]>,
-    targets: Vec<Target>,
+    people: FollowedPeople<Person>,
 }
 
 impl Followed {
@@ -128,36 +129,26 @@ impl Followed {
         }
         let moved = signature.moved_since(&self.searched, &self.visible)?;
         let moved = if is_noise(&moved) { Vec::new() } else { moved };
-        let is_still = moved.is_empty() && self.targets.iter().all(|target| target.is_seen);
+        let is_still = moved.is_empty() && self.people.are_all_seen();
         if age >= SEARCH_EVERY && !(is_still && self.origin.skips_still_frames) {
             return None;
         }
         if moved.len() > self.visible.len() / MOST_MOVED || !self.explains(&moved, at) {
             return None;
         }
-        let moving = self.targets.iter().map(|target| {
-            let places = hull(target.trail, target.expected(at));
-            !target.is_seen || moved.iter().any(|cell| overlap(&places, &cell.bounds))
-        });
-        let moving: Vec<bool> = moving.collect();
+        let moved: Vec<_> = moved.iter().map(|cell| cell.bounds).collect();
+        let moving = self.people.moving(&moved, seconds(at));
         let count = moving.iter().filter(|is_moving| **is_moving).count();
         (count <= MAX_MOVING).then_some(moving)
     }
 
     /// Returns true if all strong motion is joined to a person, as a shadow is.
     fn explains(&self, moved: &[MovedCell], at: Timestamp) -> bool {
-        let surroundings = self.targets.iter().map(|target| target.surroundings(at));
-        let surroundings: Vec<_> = surroundings.collect();
-        let is_near = |cell: &&MovedCell| surroundings.iter().any(|all| overlap(all, &cell.bounds));
-        let (mut joined, mut others): (Vec<&MovedCell>, Vec<_>) = moved.iter().partition(is_near);
-        while let Some(MovedCell { bounds, .. }) = joined.pop() {
-            let reach = widened(*bounds, JOINED_CELLS * (bounds[2] - bounds[0]));
-            let is_joined = |other: &&MovedCell| overlap(&reach, &other.bounds);
-            let (near, far): (Vec<_>, _) = others.into_iter().partition(is_joined);
-            joined.extend(near);
-            others = far;
-        }
-        others.iter().all(|other| other.levels < NEW_LEVELS)
+        let bounds: Vec<_> = moved.iter().map(|cell| cell.bounds).collect();
+        let cell_px = bounds.first().map_or(0.0, |bounds| bounds[2] - bounds[0]);
+        let reach_px = JOINED_CELLS * cell_px;
+        let others = self.people.unexplained(&bounds, reach_px, seconds(at));
+        others.iter().all(|&other| moved[other].levels < NEW_LEVELS)
     }
 }
 
@@ -176,19 +167,17 @@ impl FollowedFrame {
     /// Returns the places of the crops, best persons first; `None` if the whole frame is searched.
     pub(super) fn targets(&self, rig: &CameraRig) -> Option<Vec<CropTarget>> {
         let (before, moving) = (self.before.as_ref()?, self.moving.as_ref()?);
-        let moving = before.targets.iter().zip(moving);
-        let moving = moving.filter(|(_, is_moving)| **is_moving);
         let geometry = rig.geometry();
-        let mut targets: Vec<_> = moving
-            .map(|(target, _)| {
-                let bbox = target.expected(self.at);
+        let expected = before.people.expected(moving, seconds(self.at));
+        let mut targets: Vec<_> = expected
+            .map(|(person, bbox)| {
                 let center = Point2::new(
                     f64::midpoint(bbox[0], bbox[2]),
                     f64::midpoint(bbox[1], bbox[3]),
                 );
                 CropTarget {
                     bbox,
-                    score: target.person.score,
+                    score: person.score,
                     up: vertical_in_frame(center, &geometry.lens, &geometry.mount),
                 }
             })
@@ -218,14 +207,14 @@ impl FollowedFrame {
                 let persons = found_by(&refinement);
                 let visible = before.as_ref().map(|before| Arc::clone(&before.visible));
                 let visible = visible.unwrap_or_else(|| visible_cells(&self.signature, rig));
-                let before = before.map(|before| before.targets);
+                let before = before.map(|before| before.people);
                 let state = Followed {
                     origin: self.origin,
                     searched_at: self.at,
                     at: self.at,
                     searched: self.signature,
                     visible,
-                    targets: targets_of(&persons, self.at, before.as_deref()),
+                    people: FollowedPeople::of_search(&persons, seconds(self.at), before.as_ref()),
                 };
                 (persons, state)
             }
@@ -240,57 +229,46 @@ impl Followed {
     /// their own if their score suffices.
     fn confirm(&mut self, moving: &[bool], found: Vec<Person>, at: Timestamp, rig: &CameraRig) {
         self.at = at;
-        let expected: Vec<_> = self
-            .targets
-            .iter()
-            .map(|target| target.expected(at))
-            .collect();
-        let expected = expected.iter().map(|corners| BBox::new(*corners).ok());
-        let expected: Vec<Option<BBox<FramePixels>>> = expected.collect();
-        let mut pairs = Vec::new();
-        for (number, person) in found.iter().enumerate() {
-            for (index, expected) in expected.iter().enumerate() {
-                let iou = expected.as_ref().map_or(0.0, |bbox| bbox.iou(&person.bbox));
-                if iou >= SAME_IOU {
-                    pairs.push((iou, index, number));
-                }
-            }
-        }
-        pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let mut is_used = vec![false; found.len()];
-        let mut is_paired = vec![false; expected.len()];
-        for (_, index, number) in pairs {
-            if !is_paired[index] && !is_used[number] {
-                is_paired[index] = true;
-                is_used[number] = true;
-                // Persons without motion stay as they were.
-                if moving[index] {
-                    self.targets[index].confirm(&found[number], at, rig);
-                }
-            }
-        }
-        let states = moving.iter().zip(is_paired);
-        for (target, (is_moving, is_paired)) in self.targets.iter_mut().zip(states) {
-            target.is_seen = is_paired || !is_moving;
-        }
-        let threshold = self.origin.refinement.score_threshold;
-        let others = found.into_iter().zip(is_used);
-        let others = others.filter(|(other, is_used)| !is_used && other.score >= threshold);
-        self.targets
-            .extend(others.map(|(other, _)| Target::new(other, at, None)));
+        let least_score = self.origin.refinement.score_threshold;
+        let place = |found: &Person, score, oriented_box| {
+            merge::placed(found.bbox, score, oriented_box, found.views, rig)
+        };
+        self.people
+            .confirm(moving, found, seconds(at), least_score, place);
     }
 
     /// Returns the persons that are seen, highest score first.
     fn persons(&self, refinement: &RefinementParameters) -> Vec<Person> {
-        let seen = self.targets.iter().filter(|target| target.is_seen);
-        let persons = seen.map(|target| target.person.clone());
-        let mut persons: Vec<_> = persons
-            .filter(|person| person.score >= refinement.score_threshold)
-            .collect();
+        let seen = self.people.seen();
+        let seen = seen.filter(|person| person.score >= refinement.score_threshold);
+        let mut persons: Vec<_> = seen.cloned().collect();
         persons.sort_by(|a, b| b.score.total_cmp(&a.score));
         persons.truncate(refinement.max_detections);
         persons
     }
+}
+
+impl FoundPerson for Person {
+    fn bounds(&self) -> [f64; 4] {
+        self.bbox.corners()
+    }
+
+    fn oriented_box(&self) -> OrientedBox {
+        self.oriented_box
+    }
+
+    fn score(&self) -> f64 {
+        self.score
+    }
+
+    fn with_score(self, score: f64) -> Self {
+        Self { score, ..self }
+    }
+}
+
+/// Returns the seconds since the Unix epoch.
+fn seconds(at: Timestamp) -> f64 {
+    at.as_duration().as_secs_f64()
 }
 
 /// Returns true if cells with motion are few, weak and apart from each other.

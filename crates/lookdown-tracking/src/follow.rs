@@ -1,0 +1,154 @@
+//! Follows the people of a camera from one search of the frame to the next.
+//!
+//! After a search, motion where no person was needs another search. Motion at a person needs a crop
+//! where that person is expected; people without motion stay as they were. A crop has one vote
+//! instead of those of all views, so that each person keeps the odds that the search gave it relative
+//! to its first crop. The caller detects motion, places crops and finds people in them.
+
+mod boxes;
+mod score;
+mod target;
+
+use lookdown_lens::geometry::OrientedBox;
+
+use self::{
+    boxes::iou,
+    target::{SAME_IOU, Target, targets_of},
+};
+pub use self::{
+    boxes::{overlap, widened},
+    score::{from_logit, logit},
+};
+
+/// A person that was found in a frame.
+pub trait FoundPerson: Clone {
+    /// The box `[x_min, y_min, x_max, y_max]`, corner-origin frame pixels.
+    fn bounds(&self) -> [f64; 4];
+    /// The oriented box in the frame.
+    fn oriented_box(&self) -> OrientedBox;
+    /// The score, a probability.
+    fn score(&self) -> f64;
+    /// Returns the person with another score.
+    #[must_use]
+    fn with_score(self, score: f64) -> Self;
+}
+
+/// The people of a camera since the last search of its frame.
+#[derive(Debug, Clone)]
+pub struct FollowedPeople<P> {
+    targets: Vec<Target<P>>,
+}
+
+impl<P: FoundPerson> FollowedPeople<P> {
+    /// Takes the people of a search at `at_s` (seconds), with the motion of those before it. A person
+    /// in motion whom the search has missed is expected for a second.
+    #[must_use]
+    pub fn of_search(persons: &[P], at_s: f64, before: Option<&Self>) -> Self {
+        let before = before.map(|before| before.targets.as_slice());
+        Self {
+            targets: targets_of(persons, at_s, before),
+        }
+    }
+
+    /// Returns true if a crop or the search has confirmed everyone.
+    #[must_use]
+    pub fn are_all_seen(&self) -> bool {
+        self.targets.iter().all(|target| target.is_seen)
+    }
+
+    /// Returns for each person whether there is motion where it was or is expected at `at_s`
+    /// (seconds). `moved` are boxes with motion, frame pixels.
+    #[must_use]
+    pub fn moving(&self, moved: &[[f64; 4]], at_s: f64) -> Vec<bool> {
+        let moving = self.targets.iter().map(|target| {
+            let places = target.places(at_s);
+            !target.is_seen || moved.iter().any(|one| overlap(&places, one))
+        });
+        moving.collect()
+    }
+
+    /// Returns the indices of boxes with motion that are joined to no person, as shadows are. Boxes
+    /// are joined if at most `reach_px` pixels lie between them.
+    #[must_use]
+    pub fn unexplained(&self, moved: &[[f64; 4]], reach_px: f64, at_s: f64) -> Vec<usize> {
+        let surroundings = self.targets.iter().map(|target| target.surroundings(at_s));
+        let surroundings: Vec<_> = surroundings.collect();
+        let is_near = |index: &usize| {
+            let of_person = |all: &[f64; 4]| overlap(all, &moved[*index]);
+            surroundings.iter().any(of_person)
+        };
+        let (mut joined, mut others): (Vec<_>, Vec<_>) = (0..moved.len()).partition(is_near);
+        while let Some(index) = joined.pop() {
+            let reach = widened(moved[index], reach_px);
+            let is_joined = |other: &usize| overlap(&reach, &moved[*other]);
+            let (near, far): (Vec<_>, _) = others.into_iter().partition(is_joined);
+            joined.extend(near);
+            others = far;
+        }
+        others
+    }
+
+    /// Returns the people for whom `moving` holds, with their expected boxes at `at_s` (seconds).
+    pub fn expected<'a>(
+        &'a self,
+        moving: &'a [bool],
+        at_s: f64,
+    ) -> impl Iterator<Item = (&'a P, [f64; 4])> {
+        let targets = self.targets.iter().zip(moving);
+        let targets = targets.filter(|(_, is_moving)| **is_moving);
+        targets.map(move |(target, _)| (&target.person, target.expected(at_s)))
+    }
+
+    /// Confirms people in motion by those found in crops at `at_s` (seconds). Others that were found
+    /// become people of their own from `least_score` on. `place` returns a found person with another
+    /// score and another oriented box.
+    pub fn confirm(
+        &mut self,
+        moving: &[bool],
+        found: Vec<P>,
+        at_s: f64,
+        least_score: f64,
+        place: impl Fn(&P, f64, OrientedBox) -> P,
+    ) {
+        let expected: Vec<_> = self.targets.iter().map(|one| one.expected(at_s)).collect();
+        let mut pairs = Vec::new();
+        for (number, person) in found.iter().enumerate() {
+            for (index, expected) in expected.iter().enumerate() {
+                let iou = iou(expected, &person.bounds());
+                if iou >= SAME_IOU {
+                    pairs.push((iou, index, number));
+                }
+            }
+        }
+        pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut is_used = vec![false; found.len()];
+        let mut is_paired = vec![false; expected.len()];
+        for (_, index, number) in pairs {
+            if !is_paired[index] && !is_used[number] {
+                is_paired[index] = true;
+                is_used[number] = true;
+                // Persons without motion stay as they were.
+                if moving[index] {
+                    self.targets[index].confirm(&found[number], at_s, &place);
+                }
+            }
+        }
+        let states = moving.iter().zip(is_paired);
+        for (target, (is_moving, is_paired)) in self.targets.iter_mut().zip(states) {
+            target.is_seen = is_paired || !is_moving;
+        }
+        let others = found.into_iter().zip(is_used);
+        let others = others.filter(|(other, is_used)| !is_used && other.score() >= least_score);
+        self.targets
+            .extend(others.map(|(other, _)| Target::new(other, at_s, None)));
+    }
+
+    /// Returns the people that are seen.
+    pub fn seen(&self) -> impl Iterator<Item = &P> {
+        let seen = self.targets.iter().filter(|target| target.is_seen);
+        seen.map(|target| &target.person)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,172 @@
+//! A followed person: its expected place, and its confirmation by a crop.
+
+use lookdown_lens::geometry::OrientedBox;
+use nalgebra::Vector2;
+
+use super::{
+    FoundPerson,
+    boxes::{hull, iou, widened},
+    score::{from_logit, logit},
+};
+
+/// The margin around a person's box that belongs to the person, as a share of its larger side. It
+/// holds shadows and the next step.
+const MARGIN: f64 = 0.5;
+/// Most logit by which a score from a crop is moved toward that of the last search, which may have
+/// missed a person behind another one.
+const MAX_GAIN: f64 = 1.0;
+/// Longest time for which a person in motion whom a search has missed is still expected, seconds.
+const MISSED_S: f64 = 1.0;
+/// The score of a search that does not find a person who is there or was there.
+const MISSED_SCORE: f64 = 0.05;
+/// Least IoU of an expected box and a found one of the same person.
+pub(super) const SAME_IOU: f64 = 0.3;
+
+/// A followed person.
+#[derive(Debug, Clone)]
+pub(super) struct Target<P> {
+    /// The person at its last place.
+    pub(super) person: P,
+    /// False while no crop confirms the person.
+    pub(super) is_seen: bool,
+    /// Its motion, pixels per second.
+    velocity: Vector2<f64>,
+    /// The time of its last place, seconds.
+    at_s: f64,
+    /// The box around all its places since the last search.
+    trail: [f64; 4],
+    /// Its box and its score in the last search.
+    searched: (OrientedBox, f64),
+    /// The logit of its score in the last search, less that of its first crop, within bounds.
+    gain: Option<f64>,
+}
+
+impl<P: FoundPerson> Target<P> {
+    pub(super) fn new(person: P, at_s: f64, before: Option<&Self>) -> Self {
+        let mut target = Self {
+            is_seen: true,
+            velocity: Vector2::zeros(),
+            at_s,
+            trail: person.bounds(),
+            searched: (person.oriented_box(), person.score()),
+            gain: None,
+            person,
+        };
+        if let Some(before) = before {
+            target.velocity = before.velocity_to(&target.person.bounds(), at_s);
+        }
+        target
+    }
+
+    /// Returns the person, in motion and lost by a search, for crops at its expected place.
+    fn missed(&self, at_s: f64) -> Option<Self> {
+        let is_recent = at_s - self.at_s < MISSED_S;
+        let is_in_motion = self.gain.is_some();
+        (is_recent && is_in_motion).then(|| Self {
+            is_seen: false,
+            ..self.clone()
+        })
+    }
+
+    /// Returns the expected box at a time.
+    pub(super) fn expected(&self, at_s: f64) -> [f64; 4] {
+        let moved = self.velocity * (at_s - self.at_s);
+        let [x_min, y_min, x_max, y_max] = self.person.bounds();
+        [
+            x_min + moved.x,
+            y_min + moved.y,
+            x_max + moved.x,
+            y_max + moved.y,
+        ]
+    }
+
+    /// Returns the box around all places since the last search and the one expected at a time.
+    pub(super) fn places(&self, at_s: f64) -> [f64; 4] {
+        hull(self.trail, self.expected(at_s))
+    }
+
+    /// Returns the pixels whose motion belongs to the person at a time.
+    pub(super) fn surroundings(&self, at_s: f64) -> [f64; 4] {
+        let [x_min, y_min, x_max, y_max] = self.person.bounds();
+        let margin = MARGIN * (x_max - x_min).max(y_max - y_min);
+        widened(self.places(at_s), margin)
+    }
+
+    /// Returns the mean of the motion so far and that to a box.
+    fn velocity_to(&self, bounds: &[f64; 4], at_s: f64) -> Vector2<f64> {
+        let seconds = at_s - self.at_s;
+        if seconds <= 0.0 {
+            return self.velocity;
+        }
+        let moved = center(bounds) - center(&self.person.bounds());
+        (self.velocity + moved / seconds) / 2.0
+    }
+
+    /// Moves to a person found in a crop, with the odds and the proportions of the last search.
+    /// `place` returns a found person with another score and another oriented box.
+    pub(super) fn confirm(
+        &mut self,
+        found: &P,
+        at_s: f64,
+        place: impl FnOnce(&P, f64, OrientedBox) -> P,
+    ) {
+        let (searched, score) = self.searched;
+        let gain = logit(score) - logit(found.score());
+        let gain = *self.gain.get_or_insert(gain.clamp(-MAX_GAIN, MAX_GAIN));
+        let score = from_logit(logit(found.score()) + gain);
+        let oriented_box = OrientedBox {
+            width: searched.width,
+            height: searched.height,
+            ..found.oriented_box()
+        };
+        let bounds = found.bounds();
+        self.velocity = self.velocity_to(&bounds, at_s);
+        self.trail = hull(self.trail, bounds);
+        self.at_s = at_s;
+        self.is_seen = true;
+        self.person = place(found, score, oriented_box.fitted_to(bounds));
+    }
+}
+
+/// Returns the persons of a search as targets, with the motion of those that were there before, and
+/// persons in motion that the search has missed.
+///
+/// Until the next search, a person without motion has the mean of its score and of that before. If
+/// all frames were searched, a single lucky score would not be repeated.
+pub(super) fn targets_of<P: FoundPerson>(
+    persons: &[P],
+    at_s: f64,
+    before: Option<&[Target<P>]>,
+) -> Vec<Target<P>> {
+    let is_first = before.is_none();
+    let before = before.unwrap_or_default();
+    let mut is_found = vec![false; before.len()];
+    let expected: Vec<_> = before.iter().map(|target| target.expected(at_s)).collect();
+    let mut targets = Vec::with_capacity(persons.len());
+    for person in persons {
+        let bounds = person.bounds();
+        let overlaps = expected.iter().enumerate();
+        let overlaps = overlaps.map(|(index, expected)| (iou(expected, &bounds), index));
+        let same = overlaps.filter(|(iou, _)| *iou >= SAME_IOU);
+        let nearest = same.max_by(|a, b| a.0.total_cmp(&b.0));
+        let nearest = nearest.map(|(_, index)| {
+            is_found[index] = true;
+            &before[index]
+        });
+        let mut target = Target::new(person.clone(), at_s, nearest);
+        if !is_first {
+            let score = nearest.map_or(MISSED_SCORE, |target| target.person.score());
+            let mean = f64::midpoint(logit(score), logit(person.score()));
+            target.person = target.person.with_score(from_logit(mean));
+        }
+        targets.push(target);
+    }
+    let missed = before.iter().zip(is_found);
+    let missed = missed.filter(|(_, is_found)| !is_found);
+    targets.extend(missed.filter_map(|(target, _)| target.missed(at_s)));
+    targets
+}
+
+fn center([x_min, y_min, x_max, y_max]: &[f64; 4]) -> Vector2<f64> {
+    Vector2::new(f64::midpoint(*x_min, *x_max), f64::midpoint(*y_min, *y_max))
+}
