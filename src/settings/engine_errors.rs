@@ -17,6 +17,11 @@ pub fn explain(error: &InferenceError) -> String {
             "{error}; `make setup` fetches the default models, `make models` or `lookdown model \
              fetch` the others"
         ),
+        InferenceError::NoManifest { network, .. } => format!(
+            "{error}: write it with `lookdown model check --write-manifest {}`",
+            network.display()
+        ),
+        InferenceError::DamagedRecord { .. } => format!("{error} with `lookdown model fetch`"),
         InferenceError::Remote { .. } | InferenceError::RemoteModel { .. } => {
             format!("inference.url: {error}")
         }
@@ -73,6 +78,25 @@ mod tests {
                     detail: detail(),
                 },
                 ["model: /here ", "some reason; ", "`make models`"],
+            ),
+            (
+                InferenceError::NoManifest {
+                    path: path(),
+                    network: "/own/network.onnx".into(),
+                },
+                [
+                    "model: /here ",
+                    "/own/network.onnx: write it ",
+                    "`lookdown model check --write-manifest /own/network.onnx`",
+                ],
+            ),
+            (
+                InferenceError::DamagedRecord { path: path() },
+                [
+                    "model: /here ",
+                    "64 hexadecimal digits",
+                    "`lookdown model fetch`",
+                ],
             ),
             (
                 InferenceError::Remote {

@@ -55,6 +55,20 @@ pub enum InferenceError {
         /// The mismatch: what was found and what is needed.
         problem: String,
     },
+    /// A folder has a network without a manifest.
+    #[error("model: {path} does not exist; it describes {network}")]
+    NoManifest {
+        /// Path of the missing manifest.
+        path: PathBuf,
+        /// Path of the network.
+        network: PathBuf,
+    },
+    /// The record of an installed network's SHA-256 is damaged.
+    #[error("model: {path} does not begin with 64 hexadecimal digits; install the model again")]
+    DamagedRecord {
+        /// Path of the record.
+        path: PathBuf,
+    },
     /// The model on the inference server is not supported.
     #[error("the model {model} on the inference server cannot be used: {problem}")]
     RemoteModel {

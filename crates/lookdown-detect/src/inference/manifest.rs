@@ -105,11 +105,8 @@ impl ModelManifest {
             path: path.clone(),
             problem,
         };
-        if let (false, Some(file)) = (path.exists(), own_model(folder)) {
-            return Err(unusable(format!(
-                "there is no such file: write it with `lookdown model check --write-manifest {}`",
-                file.display()
-            )));
+        if let (false, Some(network)) = (path.exists(), own_model(folder)) {
+            return Err(InferenceError::NoManifest { path, network });
         }
         let text =
             files::read_text(&path, MAX_BYTES).map_err(|error| unreadable(error.to_string()))?;
@@ -194,12 +191,7 @@ fn recorded_sum(onnx: &Path) -> Result<Option<String>, InferenceError> {
     if is_sum(sum) {
         return Ok(Some(sum.to_owned()));
     }
-    Err(InferenceError::Unusable {
-        path,
-        problem: "it does not begin with 64 hexadecimal digits: install the model again with \
-                  `lookdown model fetch`"
-            .to_owned(),
-    })
+    Err(InferenceError::DamagedRecord { path })
 }
 
 /// Returns an ONNX file of a folder.
