@@ -36,8 +36,8 @@ pub enum Profile {
     /// frame; by models in INT8 where the CPU has instructions for them.
     #[default]
     Balanced,
-    /// 24 views and up to 16 upright crops of the frame; by models in INT8 where the CPU has
-    /// instructions for them.
+    /// The views and crops of [`Balanced`](Self::Balanced), and a mirrored copy of each crop, which
+    /// places boxes better.
     Quality,
     /// No views: the detector on the fisheye frame itself (the paper's "Omni" row).
     Direct,
@@ -56,8 +56,7 @@ impl Profile {
         match self {
             Self::Paper => Some(ViewPlan::paper(FieldOfViewReading::default())),
             Self::Fast => Some(ViewPlan::fast()),
-            Self::Balanced => Some(ViewPlan::balanced()),
-            Self::Quality => Some(ViewPlan::quality()),
+            Self::Balanced | Self::Quality => Some(ViewPlan::balanced()),
             Self::Direct => None,
         }
     }
@@ -73,10 +72,19 @@ impl Profile {
     pub(crate) fn max_crops(self) -> usize {
         match self {
             Self::Fast => 5,
-            Self::Balanced => 12,
-            Self::Quality => 16,
+            Self::Balanced | Self::Quality => 12,
             Self::Paper | Self::Direct => 0,
         }
+    }
+
+    /// Returns true if each crop has a mirrored copy, which shares its vote.
+    pub(crate) fn mirrors_crops(self) -> bool {
+        self == Self::Quality
+    }
+
+    /// Returns the maximum number of inputs of the network in the pass through upright crops.
+    pub(crate) fn max_crop_inputs(self) -> usize {
+        self.max_crops() * (1 + usize::from(self.mirrors_crops()))
     }
 
     /// Returns the method that projects boxes back to the frame.
@@ -93,8 +101,7 @@ impl Profile {
     pub fn tuning(self) -> Tuning {
         let (even_odds, crop_vote) = match self {
             Self::Fast => (0.26, 1.0),
-            Self::Balanced => (0.25, 0.7),
-            Self::Quality => (0.26, 0.7),
+            Self::Balanced | Self::Quality => (0.25, 0.7),
             Self::Paper | Self::Direct => (0.25, 1.0),
         };
         Tuning {

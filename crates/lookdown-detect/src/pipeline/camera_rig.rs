@@ -324,6 +324,19 @@ impl CameraRig {
         crops.chain(mosaics.iter().flat_map(Mosaic::crops))
     }
 
+    /// Returns the view whose vote a view shares: a mirrored crop shares that of its original, which
+    /// comes before it, and any other view has its own.
+    pub(super) fn voter(&self, view: usize) -> usize {
+        let Views::Crops(crops) = &self.views else {
+            return view;
+        };
+        let crop = crops[view].0;
+        let original = crops[..view].iter();
+        let mut original = original.map(|(other, _)| other);
+        let original = original.position(|other| crop.is_mirrored && *other == crop.mirrored());
+        original.unwrap_or(view)
+    }
+
     /// Returns true if a box of a view touches the border of the view, or of its tile.
     pub(super) fn cuts_off(
         &self,
@@ -346,7 +359,8 @@ impl CameraRig {
         matches!(self.views, Views::Crops(_) | Views::Mosaics(_))
     }
 
-    /// Returns the number of views that show the whole footprint. The whole frame always does.
+    /// Returns the number of views with a vote of their own ([`voter`](Self::voter)) that show the
+    /// whole footprint. The whole frame always does.
     pub(super) fn views_holding(&self, footprint: &Footprint) -> usize {
         match &self.views {
             Views::Virtual(views) => {
@@ -358,7 +372,8 @@ impl CameraRig {
                 let [x_min, y_min, x_max, y_max] = footprint.bounds();
                 let corners = [Pixel::new(x_min, y_min), Pixel::new(x_max, y_max)];
                 let holds = |crop: &&FrameCrop| corners.iter().all(|corner| crop.holds(corner));
-                self.crops().filter(holds).count()
+                let voters = self.crops().filter(|crop| !crop.is_mirrored);
+                voters.filter(holds).count()
             }
             Views::Direct(_) => 1,
         }

@@ -183,7 +183,7 @@ fn map(find: &PassDetection<'_>, back_projection: BackProjection) -> Option<Mapp
     let candidate = Candidate {
         bbox,
         score: found.score,
-        view: find.number,
+        view: find.vote,
         coordinate_weight: if cut_off { BORDER_WEIGHT } else { 1.0 },
         expected_views: 1.0,
     };

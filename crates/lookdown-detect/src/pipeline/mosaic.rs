@@ -128,6 +128,7 @@ mod tests {
     /// A crop of 40 × 40 pixels of the frame at its own scale.
     fn crop(x: f64, y: f64) -> FrameCrop {
         FrameCrop {
+            is_mirrored: false,
             turn: QuarterTurn::None,
             center: Pixel::new(x, y),
             scale: 1.0,

@@ -30,8 +30,8 @@ pub(super) struct PassDetection<'a> {
     pub(super) pass: &'a Pass,
     /// The index of the view in its rig.
     pub(super) view: usize,
-    /// The number of the view, unique over all passes.
-    pub(super) number: usize,
+    /// The number of the vote of the view, unique over all passes.
+    pub(super) vote: usize,
     pub(super) detection: &'a ViewDetection,
 }
 
@@ -48,15 +48,15 @@ pub(super) fn detections(passes: &[Pass]) -> impl Iterator<Item = PassDetection<
             found.iter().map(move |detection| PassDetection {
                 pass,
                 view,
-                number: first + view,
+                vote: first + pass.rig.voter(view),
                 detection,
             })
         })
     })
 }
 
-/// Returns the number of views over all passes in which a person with this footprint is wholly
-/// visible.
+/// Returns the number of votes of views over all passes in which a person with this footprint is
+/// wholly visible.
 pub(super) fn views_holding(passes: &[Pass], footprint: &Footprint) -> usize {
     let holding = passes.iter().map(|pass| pass.rig.views_holding(footprint));
     holding.sum()

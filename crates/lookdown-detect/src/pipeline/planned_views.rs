@@ -40,7 +40,7 @@ pub struct PlannedViews {
     pub mean_views: f64,
     /// The number of network inputs of the first pass over every frame.
     pub pictures: usize,
-    /// The maximum number of additional upright crops around possible persons.
+    /// The maximum number of additional upright crops around possible persons, with mirrored copies.
     pub crops_at_most: usize,
     /// The number of runs of the network in the first pass.
     pub batches: usize,
@@ -114,7 +114,7 @@ impl Engine {
             seen_share: coverage.map_or(1.0, |coverage| coverage.seen_share),
             mean_views: coverage.map_or(1.0, |coverage| coverage.mean_views),
             pictures,
-            crops_at_most: profile.max_crops(),
+            crops_at_most: profile.max_crop_inputs(),
             batches: pictures.div_ceil(options.batches.max_views.get()),
             pixels: pictures as u64 * u64::from(input.width) * u64::from(input.height),
             views: views

@@ -66,6 +66,7 @@ pub fn place_crops(targets: &[CropTarget], most: usize, fill: f64, side: u32) ->
 fn crop_around(first: &CropTarget, others: &[&CropTarget], fill: f64, side: u32) -> FrameCrop {
     let mut crop = FrameCrop {
         turn: QuarterTurn::nearest(first.up),
+        is_mirrored: false,
         center: first.center(),
         scale: (fill * f64::from(side) / first.extent()).min(MAX_SCALE),
         width: side,

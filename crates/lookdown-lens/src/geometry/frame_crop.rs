@@ -1,7 +1,9 @@
-//! Frame crops: upright cut-outs of the fisheye frame, turned by a multiple of 90° and scaled.
+//! Frame crops: upright cut-outs of the fisheye frame, turned by a multiple of 90°, scaled, and
+//! mirrored if wanted.
 //!
-//! A quarter turn maps axis-parallel boxes to axis-parallel boxes. The footprint of a box that was
-//! found in a crop is therefore exact; `docs/geometry.md` compares it with that of a virtual view.
+//! Quarter turns and mirroring map axis-parallel boxes to axis-parallel boxes. The footprint of a box
+//! that was found in a crop is therefore exact; `docs/geometry.md` compares it with that of a virtual
+//! view.
 
 use nalgebra::Vector2;
 
@@ -69,6 +71,8 @@ impl QuarterTurn {
 pub struct FrameCrop {
     /// The direction of up.
     pub turn: QuarterTurn,
+    /// True if left and right are exchanged in the crop.
+    pub is_mirrored: bool,
     /// The position in the frame of the middle of the crop.
     pub center: Pixel,
     /// Crop pixels per frame pixel.
@@ -83,14 +87,24 @@ impl FrameCrop {
     /// The position in the frame of a position in the crop.
     #[must_use]
     pub fn frame_from_crop(&self, position: &Pixel) -> Pixel {
-        self.center + self.turn.turned((position - self.middle()) / self.scale)
+        let offset = self.mirrored_back((position - self.middle()) / self.scale);
+        self.center + self.turn.turned(offset)
     }
 
     /// The position in the crop of a position in the frame.
     #[must_use]
     pub fn crop_from_frame(&self, position: &Pixel) -> Pixel {
         let offset = self.turn.inverse().turned(position - self.center);
-        self.middle() + offset * self.scale
+        self.middle() + self.mirrored_back(offset) * self.scale
+    }
+
+    /// The crop of the same part of the frame with left and right exchanged.
+    #[must_use]
+    pub fn mirrored(&self) -> Self {
+        Self {
+            is_mirrored: !self.is_mirrored,
+            ..*self
+        }
     }
 
     /// The box in the frame of a box in the crop, both `[x_min, y_min, x_max, y_max]`.
@@ -117,6 +131,15 @@ impl FrameCrop {
         let Pixel { coords } = self.crop_from_frame(position);
         (0.0..=f64::from(self.width)).contains(&coords.x)
             && (0.0..=f64::from(self.height)).contains(&coords.y)
+    }
+
+    /// A vector of the crop without the exchange of left and right. It is its own inverse.
+    fn mirrored_back(&self, vector: Vector2<f64>) -> Vector2<f64> {
+        if self.is_mirrored {
+            Vector2::new(-vector.x, vector.y)
+        } else {
+            vector
+        }
     }
 
     fn middle(&self) -> Pixel {

@@ -117,16 +117,6 @@ impl ViewPlan {
         ])
     }
 
-    /// 24 views from wide near the nadir to narrow at the rim.
-    #[must_use]
-    pub fn quality() -> Self {
-        Self::rings(&[
-            Ring::of_degrees(0.05, 2, 75.0),
-            Ring::of_degrees(0.8, 12, 90.0),
-            Ring::of_degrees(1.25, 10, 40.0),
-        ])
-    }
-
     /// The directions, in plan order.
     #[must_use]
     pub fn directions(&self) -> &[ViewDirection] {

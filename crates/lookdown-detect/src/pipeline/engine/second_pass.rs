@@ -73,7 +73,13 @@ impl Engine {
         let model = self.crop_model(&job.parameters, &observation.model);
         let side = model.input().width.min(model.input().height);
         let max_crops = observation.profile.max_crops();
-        let crops = place_crops(targets, max_crops, observation.tuning.crop_fill, side);
+        let mut crops = place_crops(targets, max_crops, observation.tuning.crop_fill, side);
+        if observation.profile.mirrors_crops() {
+            crops = crops
+                .iter()
+                .flat_map(|crop| [*crop, crop.mirrored()])
+                .collect();
+        }
         let (width, height) = (observation.frame.width(), observation.frame.height());
         let rig = &observation.camera.rig;
         let rig = self

@@ -161,6 +161,7 @@ proptest! {
         scale in 0.2..4.0_f64,
     ) {
         let crop = FrameCrop {
+            is_mirrored: false,
             turn,
             center: Pixel::new(300.0, 280.0),
             scale,

@@ -7,19 +7,23 @@ fn crops() -> impl Strategy<Value = FrameCrop> {
     let side = -500.0..3000.0_f64;
     (
         turn,
+        any::<bool>(),
         side.clone(),
         side,
         0.05..8.0_f64,
         1..1000_u32,
         1..1000_u32,
     )
-        .prop_map(|(turn, x, y, scale, width, height)| FrameCrop {
-            turn,
-            center: Pixel::new(x, y),
-            scale,
-            width,
-            height,
-        })
+        .prop_map(
+            |(turn, is_mirrored, x, y, scale, width, height)| FrameCrop {
+                is_mirrored,
+                turn,
+                center: Pixel::new(x, y),
+                scale,
+                width,
+                height,
+            },
+        )
 }
 
 fn boxes() -> impl Strategy<Value = [f64; 4]> {
@@ -78,8 +82,28 @@ fn quarter_turns_are_clockwise_and_have_inverses() {
 }
 
 #[test]
+fn a_mirrored_crop_exchanges_left_and_right_and_shows_the_same_part() {
+    let crop = FrameCrop {
+        turn: QuarterTurn::Right,
+        is_mirrored: false,
+        center: Pixel::new(100.0, 50.0),
+        scale: 2.0,
+        width: 40,
+        height: 20,
+    };
+    let mirrored = crop.mirrored();
+    assert_eq!(mirrored.bounds(), crop.bounds());
+    for (x, y) in [(0.0, 0.0), (3.0, 20.0), (31.0, 7.0)] {
+        let position = mirrored.frame_from_crop(&Pixel::new(x, y));
+        assert_eq!(position, crop.frame_from_crop(&Pixel::new(40.0 - x, y)));
+    }
+    assert_eq!(mirrored.mirrored(), crop);
+}
+
+#[test]
 fn a_crop_holds_what_lies_within_its_bounds() {
     let crop = FrameCrop {
+        is_mirrored: false,
         turn: QuarterTurn::Right,
         center: Pixel::new(100.0, 50.0),
         scale: 2.0,

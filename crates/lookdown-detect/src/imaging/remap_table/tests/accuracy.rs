@@ -68,7 +68,7 @@ impl Distances {
 #[test]
 fn tables_are_as_exact_as_they_say_for_every_lens_model() {
     for lens in every_lens() {
-        let in_default_plan = Distances::of(&lens, &ViewPlan::quality(), 416);
+        let in_default_plan = Distances::of(&lens, &ViewPlan::balanced(), 416);
         let wide = ViewPlan::paper(FieldOfViewReading::Literal);
         let in_widest_plan = Distances::of(&lens, &wide, 300);
         let (default_plan, widest_plan) = match lens.model() {
