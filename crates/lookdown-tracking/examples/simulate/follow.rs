@@ -77,10 +77,9 @@ impl Follow {
             crops.iter().any(|crop| overlap(crop, &[x, y, x, y]))
         });
         let found = found.into_iter().filter(|one| one.logit.is_finite());
-        let place = |found: &Found, score, oriented| Found {
+        let place = |_: &Found, score, oriented| Found {
             oriented,
             logit: logit(score),
-            ..*found
         };
         state
             .people
