@@ -74,10 +74,10 @@ def main() -> None:
         content = path.read_bytes()
         detections = tracker.update(detect(content, options.server, parameters))
         zone.trigger(detections)
-        picture = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR)
-        picture = heat.annotate(picture, detections)
+        image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR)
+        image = heat.annotate(image, detections)
     if options.heat_map:
-        cv2.imwrite(str(options.heat_map), picture)
+        cv2.imwrite(str(options.heat_map), image)
     print(json.dumps({"in": zone.in_count, "out": zone.out_count, "frames": len(options.frames)}))
 
 

@@ -15,10 +15,10 @@ ROOT = Path(__file__).resolve().parent.parent
 FUZZ = ROOT / "lab/fuzz"
 IMPORTERS = re.findall(r'^    \("(\w+)", Format::', (FUZZ / "src/importer.rs").read_text(), re.MULTILINE)
 # Seeds in addition to lab/fuzz/seeds/TARGET.
-SEEDS = {"picture": ["tests/fixtures/images"]} | {
+SEEDS = {"image_file": ["tests/fixtures/images"]} | {
     name: ["tests/fixtures/calibrations", "samples/calibrations"] for name in IMPORTERS
 }
-TARGETS = [*IMPORTERS, "picture", "request", "settings", "merge"]
+TARGETS = [*IMPORTERS, "image_file", "request", "settings", "merge"]
 MAX_SECONDS = 1
 MAX_MEBIBYTES = 256
 # All fields of each format fit into this size; longer inputs only take more time.

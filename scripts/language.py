@@ -1,7 +1,7 @@
 """Lists sentences and names that break the rules of CONTRIBUTING.md, "How we write": `language.py [PATH...]`.
 
-It reads the tracked Rust, Python, JavaScript and Markdown files below the given paths, everything by default, and
-prints one line per finding. What a machine can hold is held here; the rest is for reviewers.
+It reads the tracked Rust, Python, JavaScript and Markdown files below the given paths, everything by default, for one
+rule all text files, and prints one line per finding. What a machine can hold is held here; the rest is for reviewers.
 """
 
 import json
@@ -36,14 +36,17 @@ OTHER_WORDS = {
     "neighbour": "neighbor",
     "normalis": "normaliz",
     "optimis": "optimiz",
-    "picture": "image",
     "quantis": "quantiz",
     "recognis": "recogniz",
     "serialis": "serializ",
     "towards": "toward",
 }
-# Not in a name, such as `centre_px`, `calibrate-picture`, `results.pictures`, `"grey"` and `licence = "MIT"`.
+# Not in a name, such as `centre_px`, `model.colours`, `"grey"` and `licence = "MIT"`.
 OTHER_WORD = re.compile(rf"(?<![\w./#$'\"-])({'|'.join(OTHER_WORDS)})[a-z]*\b(?![-_./]\w|[\"'(]| ?=)", re.IGNORECASE)
+# "Image" in prose and in names: of items, files, settings, metrics, keys, and classes of the page.
+PICTURE = re.compile(r"[\w.:/#-]{0,40}picture[\w-]*", re.IGNORECASE)
+# Names that others gave: Home Assistant's attribute.
+NAMES_OF_OTHERS = {"entity_picture"}
 IS_NO = re.compile(r"(?<!there )\b(is|are) no (?!longer|more|farther|further|reason|\W)", re.IGNORECASE)
 # The prose of a line of code: its comment, and its strings that have a space.
 COMMENT = re.compile(r"(?:^|\s)(?://[/!]?|#|/\*+) (\D.*)")
@@ -72,6 +75,12 @@ def tracked_files(paths):
     return [name for name in listed.stdout.splitlines() if name not in EXEMPT]
 
 
+def text_lines(path):
+    """The lines of a text file; none of a binary file, or of one that is not there."""
+    content = path.read_bytes() if path.is_file() else b""
+    return [] if b"\0" in content else content.decode("utf-8", "replace").splitlines()
+
+
 def prose(name, line):
     """The prose of a line, without the names in it."""
     if not name.endswith(".md"):
@@ -89,6 +98,14 @@ def findings_in_text(name, lines):
             yield f"{name}:{number}: `{found.group().strip()}`: write `{found.group(1)} not`"
         if found := PERSONS.search(line):
             yield f"{name}:{number}: `{found.group()}`: name the client, the caller or the component"
+
+
+def findings_in_names(name, lines):
+    """The word "picture", also in names and in the name of the file."""
+    for number, line in enumerate([name, *lines]):
+        for found in PICTURE.finditer(line):
+            if found.group() not in NAMES_OF_OTHERS:
+                yield f"{name}:{number}: `{found.group()}`: write `image`, or `frame` for the image of a request"
 
 
 def findings_in_rust(name, lines):
@@ -162,11 +179,12 @@ def findings(paths):
     """All findings below the paths."""
     for name in tracked_files(paths):
         path = ROOT / name
+        lines = text_lines(path)
+        yield from findings_in_names(name, lines)
         if name.startswith("openapi/") and path.suffix == ".json":
             yield from findings_in_openapi(name, path.read_text("utf-8"))
-        if path.suffix not in SUFFIXES or not path.is_file():
+        if path.suffix not in SUFFIXES:
             continue
-        lines = path.read_text("utf-8").splitlines()
         yield from findings_in_text(name, lines)
         if path.suffix == ".rs":
             yield from findings_in_rust(name, lines)

@@ -66,25 +66,25 @@ fn drawn(
     options: &AnnotationOptions,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Vec<u8>, AnnotationError> {
-    let mut picture = if frame.width() > options.width {
+    let mut image = if frame.width() > options.width {
         narrowed(&frame, options.width)
     } else {
         Arc::unwrap_or_clone(frame)
     };
-    let drawing = sketch.drawing(picture.width(), &options.layers);
+    let drawing = sketch.drawing(image.width(), &options.layers);
     for (layer, concealment) in [
         (Layer::Blur, Concealment::Blur),
         (Layer::Silhouette, Concealment::Silhouette),
     ] {
         if options.layers.contains(&layer) {
-            let marks = sketch.concealed(picture.width());
-            conceal(&mut picture, &marks, concealment, is_cancelled)?;
+            let marks = sketch.concealed(image.width());
+            conceal(&mut image, &marks, concealment, is_cancelled)?;
         }
     }
-    annotate_unless(&mut picture, &drawing, is_cancelled)?;
+    annotate_unless(&mut image, &drawing, is_cancelled)?;
     let encoded = match format {
-        ImageFormat::Jpeg => encode_jpeg(&picture, options.quality),
-        ImageFormat::Png => encode_png(&picture),
+        ImageFormat::Jpeg => encode_jpeg(&image, options.quality),
+        ImageFormat::Png => encode_png(&image),
     };
     Ok(encoded?)
 }

@@ -200,7 +200,7 @@ impl App {
         };
         let publisher = settings.mqtt.clone().map(|mut options| {
             if options.image_every.is_some() {
-                options.discovery.images = settings.results.pictures_of.clone();
+                options.discovery.images = settings.results.images_of.clone();
             }
             Publisher::new(options, Arc::clone(&results), Arc::clone(&metrics))
         });
@@ -220,8 +220,8 @@ impl App {
             detect_defaults: settings.detect.clone(),
             zone_metrics: settings.calibrations.zone_metrics,
             camera_metrics: settings.results.camera_metrics,
-            pictures_of: Arc::new(settings.results.pictures_of.clone()),
-            conceal_pictures: settings.results.conceal_pictures,
+            images_of: Arc::new(settings.results.images_of.clone()),
+            conceal_images: settings.results.conceal_images,
             apply_suggested_calibrations: settings.calibrations.apply_suggested,
             metrics_elsewhere: settings.server.metrics_listen.is_some(),
             request_timeout: settings.server.request_timeout,

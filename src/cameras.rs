@@ -311,7 +311,7 @@ impl Cameras {
         if let Location::Http(_) | Location::Rtsp(_) = camera.location {
             return Ok(first_frame(camera, TEST_TIMEOUT).await?);
         }
-        let problem = "it is not a URL, so its frames cannot be read twice: set results.pictures to \
+        let problem = "it is not a URL, so its frames cannot be read twice: set results.images to \
                        keep its latest image";
         Err(ConfigError::problem("url", &problem).into())
     }

@@ -81,7 +81,7 @@ metric_set! {
     /// Memory of stored reports, bytes.
     results_bytes: IntGauge = "results_bytes" [];
     /// Cameras with a stored image.
-    results_pictures: IntGauge = "results_pictures" [];
+    results_images: IntGauge = "results_images" [];
     /// Reports of this server that were stored.
     results_stored: IntCounter = "results_stored_total" [];
     /// Reports of this server that wait to be stored.

@@ -39,11 +39,11 @@ function begin() {
   find("#calibrate-empty").hidden = Boolean(frame);
   find("#calibrate-content").hidden = !frame;
   if (!frame) return;
-  const picture = find("#calibrate-picture");
+  const image = find("#calibrate-frame");
   const { width, height } = frame;
-  const isNew = picture.src !== frame.url;
+  const isNew = image.src !== frame.url;
   if (isNew) {
-    Object.assign(picture, { src: frame.url, width, height });
+    Object.assign(image, { src: frame.url, width, height });
     [circle, opened, imported] = [null, null, null];
   }
   if (!circle) setCircle(assumedCircle(report ?? { image: { width, height } }));

@@ -28,7 +28,7 @@ export function addCard(camera, { onchange, reread }) {
   const manage = element("span", { class: "manage" });
   const node = element("article", { class: "card", "aria-label": `Camera ${camera}`, "data-camera": camera });
   const card = { camera, node, now, age, state, suggestion, day, strip, manage, onchange, reread, info: null, isSingle: false };
-  Object.assign(card, { id: "0", history: [], reportedAt: 0, report: null, drawn: 0, picture: null, suggestedAt: 0, suggested: "", hasPicture: true, isAsking: false, message: null });
+  Object.assign(card, { id: "0", history: [], reportedAt: 0, report: null, drawn: 0, image: null, suggestedAt: 0, suggested: "", hasImage: true, isAsking: false, message: null });
   const use = (section) => shown(() => withProgress(strip, "Reading the frame", () => useFrame(card, section)));
   const tools = TOOLS.map((name) => element("button", { type: "button", onclick: use(name.toLowerCase()) }, name));
   const group = element("div", { class: "use-frame", role: "group", "aria-label": `Use this frame of ${camera}` }, element("span", { class: "muted", "aria-hidden": "true" }, "Use this frame:"), ...tools);
@@ -38,7 +38,7 @@ export function addCard(camera, { onchange, reread }) {
 
 export function removeCard(card) {
   card.node.remove();
-  if (card.picture) URL.revokeObjectURL(card.picture.src);
+  if (card.image) URL.revokeObjectURL(card.image.src);
 }
 
 /** Draws the latest report of a card. */
@@ -54,34 +54,34 @@ export function drawCard(card, others) {
   const zones = report.zones?.map(({ name, persons }) => element("li", {}, `${name} `, element("b", {}, String(persons))));
   const focused = card.now.contains(document.activeElement) ? document.activeElement.dataset.box : undefined;
   card.now.replaceChildren(
-    element("div", { class: "sight" }, card.picture ?? sketch(report), element("p", { class: "big" }, element("b", {}, String(count)), count === 1 ? "person" : "persons")),
-    card.isSingle && !card.hasPicture ? imagesOff(card.camera) : "",
+    element("div", { class: "sight" }, card.image ?? sketch(report), element("p", { class: "big" }, element("b", {}, String(count)), count === 1 ? "person" : "persons")),
+    card.isSingle && !card.hasImage ? imagesOff(card.camera) : "",
     zones ? element("ul", { class: "zones" }, zones) : "",
     stepPlot(history, Date.now()),
   );
-  showPicture(card);
+  showImage(card);
   addCounts(card);
   showDay(card);
   if (card.message) find(".sight", card.node).after(card.message);
   addBoxes(card, others, focused);
 }
 
-const imagesOff = (camera) => element("p", { class: "muted images-off" }, "Images of this camera are not kept. The setting ", element("code", {}, `results.pictures = ["${camera}"]`), " shows them.");
+const imagesOff = (camera) => element("p", { class: "muted images-off" }, "Images of this camera are not kept. The setting ", element("code", {}, `results.images = ["${camera}"]`), " shows them.");
 
 /** Replaces the sketch by the image of the latest report, if the server stores images of this camera. */
-async function showPicture(card) {
-  if (!card.hasPicture || card.isAsking || card.node.hidden) return;
+async function showImage(card) {
+  if (!card.hasImage || card.isAsking || card.node.hidden) return;
   card.isAsking = true;
   const width = card.isSingle ? SINGLE_WIDTH : WIDTH;
   try {
     const answer = await ask(`results/${encodeURIComponent(card.camera)}/latest.jpg?draw=${layersBelow(card)}&width=${width}`);
-    const picture = element("img", { alt: `The latest frame of ${card.camera}`, src: URL.createObjectURL(await answer.blob()) });
-    await picture.decode();
-    find(".sight", card.node).firstChild.replaceWith(picture);
-    if (card.picture) URL.revokeObjectURL(card.picture.src);
-    card.picture = picture;
+    const image = element("img", { alt: `The latest frame of ${card.camera}`, src: URL.createObjectURL(await answer.blob()) });
+    await image.decode();
+    find(".sight", card.node).firstChild.replaceWith(image);
+    if (card.image) URL.revokeObjectURL(card.image.src);
+    card.image = image;
   } catch (problem) {
-    if (problem.status === 404) card.hasPicture = false;
+    if (problem.status === 404) card.hasImage = false;
   } finally {
     card.isAsking = false;
   }

@@ -84,12 +84,12 @@ async function test() {
 function showFrame(blob) {
   URL.revokeObjectURL(frame);
   frame = blob ? URL.createObjectURL(blob) : "";
-  const picture = find("#camera-frame");
-  picture.hidden = !blob;
+  const image = find("#camera-frame");
+  image.hidden = !blob;
   find("#camera-works").hidden = !blob;
   if (!blob) return;
-  picture.onload = () => (find("#camera-works").textContent = `It works: ${picture.naturalWidth} × ${picture.naturalHeight} pixels.`);
-  picture.src = frame;
+  image.onload = () => (find("#camera-works").textContent = `It works: ${image.naturalWidth} × ${image.naturalHeight} pixels.`);
+  image.src = frame;
 }
 
 async function save() {

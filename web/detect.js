@@ -31,11 +31,11 @@ const runSoon = afterPause(REST_MILLIS, runShown);
 
 function showFrame() {
   const { frame } = shared;
-  const picture = find("#picture");
-  picture.src = frame.url;
-  picture.width = frame.width;
-  picture.height = frame.height;
-  picture.alt = `The frame ${frame.name}`;
+  const image = find("#frame");
+  image.src = frame.url;
+  image.width = frame.width;
+  image.height = frame.height;
+  image.alt = `The frame ${frame.name}`;
   find("#stage").classList.remove("blank");
   find("#stage").style.aspectRatio = `${frame.width} / ${frame.height}`;
   runShown();

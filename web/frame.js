@@ -10,19 +10,19 @@ const MAX_SIDE = 1600;
 
 /** Reads an image and makes it the frame; `camera` is its camera, if it is known. */
 export async function show(blob, name, camera = "") {
-  let picture;
+  let bitmap;
   try {
-    picture = await createImageBitmap(blob);
+    bitmap = await createImageBitmap(blob);
   } catch {
     showFailure(find("#stage"), `${name} is not an image that this browser can read: use a JPEG, PNG or WebP file.`);
     return;
   }
   showFailure(find("#stage"), "");
-  const scale = Math.min(1, MAX_SIDE / Math.max(picture.width, picture.height));
-  const [width, height] = [picture.width, picture.height].map((side) => Math.round(side * scale));
+  const scale = Math.min(1, MAX_SIDE / Math.max(bitmap.width, bitmap.height));
+  const [width, height] = [bitmap.width, bitmap.height].map((side) => Math.round(side * scale));
   const canvas = new OffscreenCanvas(width, height);
   const context = canvas.getContext("2d", { willReadFrequently: true });
-  context.drawImage(picture, 0, 0, width, height);
+  context.drawImage(bitmap, 0, 0, width, height);
   if (shared.frame) URL.revokeObjectURL(shared.frame.url);
   change("report", null);
   change("person", null);
@@ -31,8 +31,8 @@ export async function show(blob, name, camera = "") {
     name,
     camera,
     url: URL.createObjectURL(blob),
-    width: picture.width,
-    height: picture.height,
+    width: bitmap.width,
+    height: bitmap.height,
     pixels: context.getImageData(0, 0, width, height),
   });
 }
@@ -43,7 +43,7 @@ function showOwn(file, name) {
   return show(file, name);
 }
 
-const pictureIn = (files) => [...(files ?? [])].find((file) => file.type.startsWith("image/"));
+const imageIn = (files) => [...(files ?? [])].find((file) => file.type.startsWith("image/"));
 
 export function start() {
   const input = find("#frame-file");
@@ -53,7 +53,7 @@ export function start() {
     if (file) showOwn(file, file.name);
   });
   document.addEventListener("paste", (event) => {
-    const file = pictureIn(event.clipboardData?.files);
+    const file = imageIn(event.clipboardData?.files);
     if (file) showOwn(file, "the pasted image");
   });
   document.addEventListener("dragover", (event) => {
@@ -65,7 +65,7 @@ export function start() {
   }
   document.addEventListener("drop", (event) => {
     event.preventDefault();
-    const file = pictureIn(event.dataTransfer.files);
+    const file = imageIn(event.dataTransfer.files);
     if (file) showOwn(file, file.name);
     else if (event.dataTransfer.files.length) showFailure(find("#stage"), "The dropped item is not an image.");
   });
@@ -80,6 +80,6 @@ function sample(name) {
     await chooseSample(name).catch(leaveSample);
     await show(await (await fetch(path)).blob(), `${name}.jpg`);
   };
-  const picture = element("img", { src: path, alt: "", width: 56, height: 56 });
-  return element("button", { type: "button", class: "sample", onclick: pick }, picture, element("span", {}, name));
+  const image = element("img", { src: path, alt: "", width: 56, height: 56 });
+  return element("button", { type: "button", class: "sample", onclick: pick }, image, element("span", {}, name));
 }

@@ -25,7 +25,7 @@ async function frameOf(camera, info) {
   }
   const { can_change: may } = await options();
   if (!info || !may) {
-    throw new Problem(404, `No image of ${camera} is kept: the setting results.pictures = ["${camera}"] keeps the latest one.`);
+    throw new Problem(404, `No image of ${camera} is kept: the setting results.images = ["${camera}"] keeps the latest one.`);
   }
   return (await ask(`cameras/${name}/frame.jpg`)).blob();
 }

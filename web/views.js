@@ -37,10 +37,10 @@ async function show() {
   const loaded = await withProgress(find("#views-progress"), "Straightening the views", () => planOf(report));
   if (report !== shared.report) return;
   [shownReport, plan, chosen] = [report, loaded, null];
-  const picture = find("#views-picture");
-  picture.src = frame.url;
-  picture.width = frame.width;
-  picture.height = frame.height;
+  const image = find("#views-frame");
+  image.src = frame.url;
+  image.width = frame.width;
+  image.height = frame.height;
   drawOutlines();
   drawMarks(find("#views-marks"), report);
   find("#people").replaceChildren(...report.persons.map(chip));

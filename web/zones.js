@@ -70,8 +70,8 @@ async function show() {
     find("#zones-saved").textContent = "";
     if (!hasFloor()) space = "frame_px";
   }
-  const picture = find("#zones-picture");
-  if (picture.src !== shared.frame.url) picture.src = shared.frame.url;
+  const image = find("#zones-frame");
+  if (image.src !== shared.frame.url) image.src = shared.frame.url;
   draw();
 }
 
@@ -132,7 +132,7 @@ function showStage() {
   const stage = find("#zones-stage");
   const isFloor = space === "floor_m";
   stage.classList.toggle("on-floor", isFloor);
-  find("#zones-picture").hidden = isFloor;
+  find("#zones-frame").hidden = isFloor;
   const [, , width, height] = surface.viewBox;
   stage.style.aspectRatio = `${width} / ${height}`;
   drawing().setAttribute("viewBox", surface.viewBox.join(" "));

@@ -37,16 +37,16 @@ def compare(folder: Path, side: int, rounds: int) -> dict:
         positions = np.fromfile(folder / "positions.f32", np.float32).reshape(views, side, side, 2)
         maps = [cv2.convertMaps(at[..., 0].copy(), at[..., 1].copy(), cv2.CV_16SC2) for at in positions]
         blob = np.empty((views, 3, side, side), np.float32)
-        picture = np.empty((side, side, 3), np.uint8)
+        rendered = np.empty((side, side, 3), np.uint8)
         times = []
         for view in list(range(views)) * rounds:
             ours.stdin.write(f"{view}\n")
             ours.stdin.flush()
             our_time = int(ours.stdout.readline()) / 1e9
             started = time.perf_counter()
-            cv2.remap(frame, *maps[view], cv2.INTER_LINEAR, dst=picture)
+            cv2.remap(frame, *maps[view], cv2.INTER_LINEAR, dst=rendered)
             remapped = time.perf_counter()
-            found = cv2.dnn.blobFromImages([picture], SCALE, (side, side), MEAN, swapRB=False)
+            found = cv2.dnn.blobFromImages([rendered], SCALE, (side, side), MEAN, swapRB=False)
             ended = time.perf_counter()
             blob[view] = found[0]
             times.append((our_time, ended - started, remapped - started))

@@ -15,9 +15,9 @@ import urllib.request
 import cv2
 import numpy as np
 import simplejpeg
+from harness.frames import frame
 from harness.free_network import free_network
 from harness.lookdown import detect, lookdown
-from harness.pictures import frame
 from harness.places import SAMPLES
 from harness.processes import Server
 

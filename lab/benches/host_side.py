@@ -11,10 +11,10 @@ import json
 import os
 import sys
 
+from harness.frames import frame
 from harness.free_network import free_network
 from harness.load import steady
 from harness.lookdown import ROOMY, detect, lookdown, report
-from harness.pictures import frame
 from parts.whole import stages_of
 
 PROFILES = ("fast", "balanced")
@@ -30,11 +30,11 @@ def main(seconds: float) -> None:
         network = {} if boxes is None else {"MODEL__PATH": str(free_network(boxes))}
         with lookdown(ROOMY | network) as server:
             for profile in PROFILES:
-                path, picture = detect(profile), frame()
+                path, jpeg = detect(profile), frame()
                 stages = stages_of(server, path, FRAMES)
-                answer = report(server, path, picture)
+                answer = report(server, path, jpeg)
                 loop = steady(
-                    server, [path], picture, clients=2 * CORES, seconds=seconds, frame_seconds=stages["total"] / 1000
+                    server, [path], jpeg, clients=2 * CORES, seconds=seconds, frame_seconds=stages["total"] / 1000
                 )
                 cpu_ms = loop["cpu_seconds_per_frame"] * 1000
                 line = {

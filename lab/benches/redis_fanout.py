@@ -74,8 +74,8 @@ class Replica:
     def store(self, camera: str) -> bytes:
         """The command that stores a report."""
         self._sent += 1
-        keys = [f"{TAG}:{name}" for name in ("earlier", "cameras", "latest", "totals", "pictures", "senders")]
-        places = (f"{TAG}:camera:", f"{TAG}:picture:", camera, channel(camera), f"{TAG}:0:all")
+        keys = [f"{TAG}:{name}" for name in ("earlier", "cameras", "latest", "totals", "images", "senders")]
+        places = (f"{TAG}:camera:", f"{TAG}:image:", camera, channel(camera), f"{TAG}:0:all")
         report = (self._sender, self._sent, "2026-11-23T03:00:00Z", 3, REPORT, "", "", len(REPORT) + 100)
         return command("EVALSHA", SHA, len(keys), *keys, *places, *report, *self._limits)
 

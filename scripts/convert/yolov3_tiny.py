@@ -32,7 +32,7 @@ def convert(cfg: Path, onnx_file: Path) -> None:
         onnx_file,
         boxes=boxes,
         scores=scores,
-        size=network.picture.width,
+        size=network.input_shape.width,
         anchors=candidates,
         description=DESCRIPTION,
     )

@@ -60,10 +60,10 @@ class Language(unittest.TestCase):
         for text in [f"{half}: {half}", f"{half}; {half}"]:
             self.assertEqual(len([*language.findings_in_markdown("a.md", [text])]), 1, text)
 
-    def test_british_words_and_pictures_are_found_in_prose(self):
+    def test_british_words_are_found_in_prose(self):
         for name, line in [
             ("a.md", "The colour of the text"),
-            ("a.md", "Two pictures, and a metre"),
+            ("a.md", "A box, and a metre"),
             ("a.md", "It is no error."),
             ("a.rs", "/// The centre of the box."),
             ("a.rs", '    bail!("{name} is no number of metres")'),
@@ -73,10 +73,25 @@ class Language(unittest.TestCase):
 
     def test_names_keep_their_spelling(self):
         for name, line in [
-            ("a.md", "The key `licence` and [images](page.md#pictures), results.pictures"),
+            ("a.md", "The key `licence` and [colors](page.md#colours), model.colours"),
             ("a.rs", "let centre = colour(grey);"),
             ("a.rs", 'format!("of {colour}: centre_px and licence = 3")'),
             ("a.py", 'values["colour"] * grey'),
             ("a.md", "There is no calibration, and it is no longer used."),
         ]:
             self.assertEqual([*language.findings_in_text(name, [line])], [], line)
+
+    def test_the_word_picture_is_found_in_prose_and_names(self):
+        for name, line in [
+            ("a.md", "Two pictures"),
+            ("a.rs", "struct StoredPicture;"),
+            ("a.py", "MOST_PICTURES = 2"),
+            ("a.lua", "redis.call('ZADD', pictures, micros, camera)"),
+            ("a.html", '<img id="views-picture" alt="">'),
+            ("a.toml", "max_pictures = 64"),
+            ("src/picture.rs", ""),
+        ]:
+            self.assertEqual(len([*language.findings_in_names(name, [line])]), 1, line)
+
+    def test_names_of_others_keep_the_word_picture(self):
+        self.assertEqual([*language.findings_in_names("a.py", ['state["entity_picture"]'])], [])

@@ -49,7 +49,7 @@ pub enum StoredFrameError {
     Encode(#[from] EncodeError),
     /// The image cannot be drawn.
     #[error(transparent)]
-    Picture(#[from] AnnotationError),
+    Annotation(#[from] AnnotationError),
     /// The frame is too large at every width.
     #[error("a frame takes more than {MAX_BYTES} bytes as a JPEG of {} pixels across", WIDTHS[2])]
     TooLarge,

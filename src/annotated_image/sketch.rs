@@ -54,8 +54,8 @@ impl Sketch {
 
     /// The marks of all people to be concealed, in pixels of an image of this width: also of those
     /// who are in no result.
-    pub(super) fn concealed(&self, picture_width: u32) -> Vec<Mark> {
-        let factor = f64::from(picture_width) / f64::from(self.frame_width.max(1));
+    pub(super) fn concealed(&self, image_width: u32) -> Vec<Mark> {
+        let factor = f64::from(image_width) / f64::from(self.frame_width.max(1));
         let others = self.others.iter().map(|&bbox| Mark {
             bbox,
             oriented: None,
@@ -67,8 +67,8 @@ impl Sketch {
     }
 
     /// The drawing of these layers, in pixels of an image of this width.
-    pub(super) fn drawing(&self, picture_width: u32, layers: &[Layer]) -> Drawing {
-        let factor = f64::from(picture_width) / f64::from(self.frame_width.max(1));
+    pub(super) fn drawing(&self, image_width: u32, layers: &[Layer]) -> Drawing {
+        let factor = f64::from(image_width) / f64::from(self.frame_width.max(1));
         let draws = |layer| layers.contains(&layer);
         let mut sketch = self.clone();
         for coordinate in sketch.lines().flatten().flatten() {

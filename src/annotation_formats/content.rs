@@ -48,9 +48,9 @@ impl AnnotatedImage {
     /// The axis-parallel boxes, `[left, top, right, bottom]`, clipped to the image. Those outside
     /// it are left out.
     pub(super) fn boxes(&self) -> impl Iterator<Item = ([f64; 4], &AnnotatedBox)> {
-        let picture = BBox::new([0.0, 0.0, self.width.into(), self.height.into()]).ok();
+        let image_box = BBox::new([0.0, 0.0, self.width.into(), self.height.into()]).ok();
         self.persons.iter().filter_map(move |person| {
-            let inside = person.bbox.clipped_to(picture.as_ref()?)?;
+            let inside = person.bbox.clipped_to(image_box.as_ref()?)?;
             Some((inside.corners().map(pixels), person))
         })
     }

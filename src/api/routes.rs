@@ -44,7 +44,7 @@ pub(super) fn of_clients() -> OpenApiRouter<ApiState> {
         .routes(routes!(results::delete::delete))
         .routes(routes!(results::followed::put))
         .routes(routes!(results::latest::get_latest))
-        .routes(routes!(results::picture::get_picture))
+        .routes(routes!(results::latest_image::get_latest_image))
         .routes(routes!(results::history::get_history))
         .routes(routes!(results::events::of_camera))
         .routes(routes!(results::events::of_all))

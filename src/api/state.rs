@@ -31,7 +31,7 @@ use super::{
 use crate::{
     calibration_store::Calibrations,
     metrics::Metrics,
-    results::{PicturesOf, ResultStore},
+    results::{ImagesOf, ResultStore},
     suggestions::Suggestions,
     telemetry::Tracer,
 };
@@ -58,9 +58,9 @@ pub struct ApiOptions {
     /// `true` if the number of persons of each camera is a metric.
     pub camera_metrics: bool,
     /// The cameras whose latest image is stored.
-    pub pictures_of: Arc<PicturesOf>,
+    pub images_of: Arc<ImagesOf>,
     /// The concealment of persons in these images.
-    pub conceal_pictures: Option<Concealment>,
+    pub conceal_images: Option<Concealment>,
     /// `true` if calibrations that are found for cameras without one are stored.
     pub apply_suggested_calibrations: bool,
     /// `true` if the metrics have a port of their own.
@@ -118,8 +118,8 @@ impl ApiOptions {
             detect_defaults: DetectDefaults::default(),
             zone_metrics: false,
             camera_metrics: false,
-            pictures_of: Arc::default(),
-            conceal_pictures: None,
+            images_of: Arc::default(),
+            conceal_images: None,
             apply_suggested_calibrations: false,
             metrics_elsewhere: false,
             request_timeout: Duration::from_secs(20),

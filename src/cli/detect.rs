@@ -1,7 +1,7 @@
 //! `lookdown detect`
 
+mod image_files;
 mod labels;
-mod pictures;
 pub(super) mod stream;
 
 use std::{
@@ -28,13 +28,13 @@ use lookdown_lens::calibration::{Calibration, CalibrationId};
 use strum::VariantArray;
 
 use self::{
+    image_files::{ImageFile, image_files},
     labels::Labels,
-    pictures::{Picture, pictures},
     stream::{Stream, StreamReader, interval},
 };
 use super::{
     SettingsFile, annotate,
-    parameters::{ParameterFlags, PictureFlags},
+    parameters::{AnnotationFlags, ParameterFlags},
     progress::Progress,
 };
 use crate::cli::output::{UNWRITABLE, with_causes};
@@ -66,7 +66,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "OUT.jpg|OUT.png|OUT.mp4")]
     annotate: Option<PathBuf>,
     #[command(flatten)]
-    picture: PictureFlags,
+    annotation: AnnotationFlags,
     /// Write annotations to be corrected in the usual tools, into the folder --out, instead of
     /// reports
     #[arg(long, value_name = "FORMAT", requires = "out", value_parser = annotation_format())]
@@ -99,8 +99,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     if arguments.every.is_some() {
         bail!("--every is the interval of a video: leave it out, or give a single video");
     }
-    let pictures = pictures(&arguments.images)?;
-    if arguments.annotate.is_some() && pictures.len() > 1 {
+    let image_files = image_files(&arguments.images)?;
+    if arguments.annotate.is_some() && image_files.len() > 1 {
         bail!("--annotate draws one image: give a single IMAGE, or leave it out");
     }
     arguments
@@ -109,18 +109,18 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         .map(annotate::format_of)
         .transpose()?;
     let (parameters, calibration) = parameters(arguments)?;
-    let options = arguments.picture.check()?;
-    let mut labels = labels(arguments, &pictures)?;
+    let options = arguments.annotation.check()?;
+    let mut labels = labels(arguments, &image_files)?;
     let settings = arguments.settings_file.load()?;
     let max_bytes = settings.server.max_body_bytes as u64;
     let engine = engine_for(&settings, std::slice::from_ref(&parameters))?;
     // Reports show by themselves how far it is.
     let progress = labels
         .as_ref()
-        .map(|_| Progress::start(parameters.profile.name(), pictures.len()));
+        .map(|_| Progress::start(parameters.profile.name(), image_files.len()));
     let mut code = ExitCode::SUCCESS;
-    for picture in &pictures {
-        let path = &picture.path;
+    for image_file in &image_files {
+        let path = &image_file.path;
         let found = read(path, max_bytes).and_then(|image| {
             let name = path.display().to_string();
             detect(&engine, name, image, &parameters, calibration.clone())
@@ -128,7 +128,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         match found {
             Ok(detected) => {
                 match &mut labels {
-                    Some(labels) => labels.add(picture, &detected.report),
+                    Some(labels) => labels.add(image_file, &detected.report),
                     None => print(&detected)?,
                 }
                 if let Some(path) = &arguments.annotate {
@@ -164,7 +164,7 @@ fn run_stream(arguments: &Arguments, stream: &Stream) -> anyhow::Result<ExitCode
         bail!("--every is the interval of a video: leave it out for standard input");
     }
     let (parameters, calibration) = parameters(arguments)?;
-    let options = arguments.picture.check()?;
+    let options = arguments.annotation.check()?;
     let settings = arguments.settings_file.load()?;
     let engine = engine_for(&settings, std::slice::from_ref(&parameters))?;
     let mut reader = StreamReader::open(stream, arguments.every)?;
@@ -221,7 +221,7 @@ fn run_stream(arguments: &Arguments, stream: &Stream) -> anyhow::Result<ExitCode
 }
 
 /// Returns the label output requested by `--format`, `--out` and `--oriented`.
-fn labels(arguments: &Arguments, pictures: &[Picture]) -> anyhow::Result<Option<Labels>> {
+fn labels(arguments: &Arguments, image_files: &[ImageFile]) -> anyhow::Result<Option<Labels>> {
     let (Some(format), Some(folder)) = (arguments.format, &arguments.out) else {
         return Ok(None);
     };
@@ -233,7 +233,7 @@ fn labels(arguments: &Arguments, pictures: &[Picture]) -> anyhow::Result<Option<
             AnnotationFormat::names_with_oriented_boxes()
         ),
     };
-    Labels::start(format, boxes, folder, pictures).map(Some)
+    Labels::start(format, boxes, folder, image_files).map(Some)
 }
 
 /// The checked parameters, with the calibration when `--calibration` names a file.

@@ -23,7 +23,7 @@ pub(super) struct ParameterFlags(Given);
 
 /// The parameters of the annotated image that `--annotate` writes.
 #[derive(Debug)]
-pub(super) struct PictureFlags(Given);
+pub(super) struct AnnotationFlags(Given);
 
 /// Names and values of parameters.
 type Given = Vec<(&'static str, String)>;
@@ -63,7 +63,7 @@ impl ParameterFlags {
     }
 }
 
-impl PictureFlags {
+impl AnnotationFlags {
     /// Checks the parameters.
     ///
     /// # Errors
@@ -94,7 +94,7 @@ impl FromArgMatches for ParameterFlags {
     }
 }
 
-impl Args for PictureFlags {
+impl Args for AnnotationFlags {
     fn augment_args(command: Command) -> Command {
         let flags = offered(AnnotationOptions::TABLE).map(flag);
         command.args(flags.map(|flag| flag.requires(ANNOTATE)))
@@ -105,7 +105,7 @@ impl Args for PictureFlags {
     }
 }
 
-impl FromArgMatches for PictureFlags {
+impl FromArgMatches for AnnotationFlags {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
         Ok(Self(given(AnnotationOptions::TABLE, matches)))
     }
@@ -223,7 +223,7 @@ mod tests {
 
         let (mut flags, expected) = words(AnnotationOptions::TABLE);
         flags.extend(["--annotate", "out.jpg"].map(ToOwned::to_owned));
-        let read = parsed::<PictureFlags>(&flags).unwrap();
+        let read = parsed::<AnnotationFlags>(&flags).unwrap();
         assert_eq!(read.0, expected);
         assert!(read.check().is_ok());
     }
@@ -241,7 +241,7 @@ mod tests {
     #[test]
     fn layers_are_given_as_one_comma_separated_value() {
         let words = ["--draw", "boxes,views", "--annotate", "out.jpg"].map(ToOwned::to_owned);
-        let read = parsed::<PictureFlags>(&words).unwrap();
+        let read = parsed::<AnnotationFlags>(&words).unwrap();
         assert_eq!(read.0, [("draw", "boxes,views".to_owned())]);
     }
 }

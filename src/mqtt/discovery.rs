@@ -12,7 +12,7 @@ use super::{
     occupancy::{OFF, ON},
     topics::{Topics, level},
 };
-use crate::results::PicturesOf;
+use crate::results::ImagesOf;
 
 /// The status while the server is connected or a camera sends frames, and the one when it is not.
 pub(super) const ONLINE: &str = "online";
@@ -32,7 +32,7 @@ pub struct Discovery {
     /// The address at which users of this installation get help.
     pub support_url: Option<Url>,
     /// The cameras whose images are published.
-    pub images: PicturesOf,
+    pub images: ImagesOf,
 }
 
 /// An entity: component, ID within the device, and configuration.
@@ -262,7 +262,7 @@ mod tests {
             expire_after: Some(Duration::from_mins(10)),
             configuration_url: Some(url("http://lookdown.local:8080/")),
             support_url: Some(url("https://help.example/")),
-            images: PicturesOf::default(),
+            images: ImagesOf::default(),
         };
         for message in discovery.announcements(&topics(), "lobby", ["till"]) {
             let config = config(&message);
@@ -276,7 +276,7 @@ mod tests {
     #[test]
     fn withdrawals_have_the_topics_of_announcements() {
         let discovery = Discovery {
-            images: PicturesOf::All,
+            images: ImagesOf::All,
             ..Discovery::default()
         };
         let announced = discovery.announcements(&topics(), "lobby", ["till"]);
@@ -294,7 +294,7 @@ mod tests {
     #[test]
     fn images_are_announced_for_cameras_that_have_them() {
         let discovery = Discovery {
-            images: PicturesOf::Some(["lobby".to_owned()].into()),
+            images: ImagesOf::Some(["lobby".to_owned()].into()),
             expire_after: Some(Duration::from_mins(1)),
             ..Discovery::default()
         };

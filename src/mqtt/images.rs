@@ -12,7 +12,7 @@ use tokio::{
 
 use crate::{
     annotated_image::{AnnotationOptions, Layer, StoredFrame},
-    results::{PicturesOf, ReportId, ResultStore, StoredPicture},
+    results::{ImagesOf, ReportId, ResultStore, StoredImage},
 };
 
 /// The widest image, pixels.
@@ -30,7 +30,7 @@ pub(super) struct CameraImage {
 /// The images that are published.
 pub(super) struct Images {
     pub(super) results: Arc<dyn ResultStore>,
-    pub(super) of: PicturesOf,
+    pub(super) of: ImagesOf,
     /// Shortest time between two images of a camera.
     pub(super) every: Duration,
 }
@@ -53,7 +53,7 @@ impl Images {
                 if !self.of.include(&camera) {
                     continue;
                 }
-                let Ok(Some(stored)) = self.results.picture(&camera).await else {
+                let Ok(Some(stored)) = self.results.image(&camera).await else {
                     continue;
                 };
                 let before = drawn.insert(camera.clone(), stored.id);
@@ -73,10 +73,10 @@ impl Images {
 }
 
 /// Returns the image that is published, if it is small enough.
-fn image(stored: &StoredPicture) -> Option<Bytes> {
+fn image(stored: &StoredImage) -> Option<Bytes> {
     let frame = StoredFrame {
-        jpeg: stored.picture.frame.clone(),
-        sketch: stored.picture.sketch.clone(),
+        jpeg: stored.image.frame.clone(),
+        sketch: stored.image.sketch.clone(),
     };
     let options = AnnotationOptions {
         layers: vec![Layer::Oriented, Layer::Scores],

@@ -1,7 +1,7 @@
 //! Reports in the memory of this process.
 
+mod images;
 mod kept;
-mod pictures;
 
 use std::{collections::BTreeMap, num::NonZeroUsize, sync::Arc};
 
@@ -12,8 +12,8 @@ use parking_lot::{Mutex, MutexGuard};
 
 use self::kept::Kept;
 use super::{
-    Cameras, FollowedNumber, ListenError, Listeners, Listening, NewPicture, NewReport, ReportId,
-    ResultLimits, ResultStore, ResultUse, StoreHealth, StoredPicture, StoredReport, Unreachable,
+    Cameras, FollowedNumber, ListenError, Listeners, Listening, NewImage, NewReport, ReportId,
+    ResultLimits, ResultStore, ResultUse, StoreHealth, StoredImage, StoredReport, Unreachable,
 };
 use crate::metrics::Metrics;
 
@@ -41,11 +41,11 @@ impl MemoryResults {
     }
 
     /// Keeps a report, possibly with its image, and publishes it to the listeners.
-    pub fn store(&self, report: NewReport, picture: Option<NewPicture>) -> Arc<StoredReport> {
+    pub fn store(&self, report: NewReport, image: Option<NewImage>) -> Arc<StoredReport> {
         // Published while the lock is held: listeners rely on the order.
         let mut kept = self.kept();
         let before = kept.removed_cameras();
-        let stored = kept.add(report, picture, Timestamp::now());
+        let stored = kept.add(report, image, Timestamp::now());
         self.metrics.results_stored.inc();
         self.listeners.tell(&stored);
         self.note_removals(&kept, before);
@@ -75,8 +75,8 @@ impl MemoryResults {
 
 #[async_trait]
 impl ResultStore for MemoryResults {
-    fn publish(&self, report: NewReport, picture: Option<NewPicture>) {
-        self.store(report, picture);
+    fn publish(&self, report: NewReport, image: Option<NewImage>) {
+        self.store(report, image);
     }
 
     async fn latest(&self, camera: &str) -> Result<Option<Arc<StoredReport>>, Unreachable> {
@@ -113,8 +113,8 @@ impl ResultStore for MemoryResults {
         Ok(self.kept().since(cameras, after, most.get()))
     }
 
-    async fn picture(&self, camera: &str) -> Result<Option<Arc<StoredPicture>>, Unreachable> {
-        Ok(self.kept().picture(camera))
+    async fn image(&self, camera: &str) -> Result<Option<Arc<StoredImage>>, Unreachable> {
+        Ok(self.kept().image(camera))
     }
 
     async fn follow(&self, camera: &str, number: FollowedNumber) -> Result<bool, Unreachable> {

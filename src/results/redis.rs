@@ -44,8 +44,8 @@ use self::{
     shared::Shared,
 };
 use super::{
-    Cameras, FollowedNumber, ListenError, Listeners, Listening, NewPicture, NewReport, ReportId,
-    ResultLimits, ResultStore, ResultUse, StoreHealth, StoredPicture, StoredReport, Unreachable,
+    Cameras, FollowedNumber, ListenError, Listeners, Listening, NewImage, NewReport, ReportId,
+    ResultLimits, ResultStore, ResultUse, StoreHealth, StoredImage, StoredReport, Unreachable,
 };
 use crate::{metrics::Metrics, tls::TlsError};
 
@@ -119,8 +119,8 @@ fn max_reply_bytes(limits: &ResultLimits) -> u64 {
 
 #[async_trait]
 impl ResultStore for RedisResults {
-    fn publish(&self, report: NewReport, picture: Option<NewPicture>) {
-        self.shared.outbox.push(report, picture);
+    fn publish(&self, report: NewReport, image: Option<NewImage>) {
+        self.shared.outbox.push(report, image);
     }
 
     async fn latest(&self, camera: &str) -> Result<Option<Arc<StoredReport>>, Unreachable> {
@@ -159,8 +159,8 @@ impl ResultStore for RedisResults {
             .await
     }
 
-    async fn picture(&self, camera: &str) -> Result<Option<Arc<StoredPicture>>, Unreachable> {
-        self.ask(async |mut reader| reader.picture(camera).await)
+    async fn image(&self, camera: &str) -> Result<Option<Arc<StoredImage>>, Unreachable> {
+        self.ask(async |mut reader| reader.image(camera).await)
             .await
     }
 

@@ -6,8 +6,8 @@ use async_trait::async_trait;
 use lookdown_detect::fairness::Client;
 
 use super::{
-    Cameras, FollowedNumber, ListenError, Listeners, Listening, NewPicture, NewReport, ReportId,
-    StoredPicture, StoredReport, Unreachable,
+    Cameras, FollowedNumber, ListenError, Listeners, Listening, NewImage, NewReport, ReportId,
+    StoredImage, StoredReport, Unreachable,
 };
 
 /// A result store. Its return values are shared, not copied.
@@ -16,7 +16,7 @@ pub trait ResultStore: Send + Sync {
     /// Stores a report under the next ID and publishes it to the listeners, in the order of the
     /// IDs. The caller does not wait: a remote store has the report a little later. The image
     /// replaces the camera's previous one. A report without an image removes that.
-    fn publish(&self, report: NewReport, picture: Option<NewPicture>);
+    fn publish(&self, report: NewReport, image: Option<NewImage>);
 
     /// The latest report of a camera, if it has one.
     ///
@@ -58,7 +58,7 @@ pub trait ResultStore: Send + Sync {
     ///
     /// # Errors
     /// [`Unreachable`].
-    async fn picture(&self, camera: &str) -> Result<Option<Arc<StoredPicture>>, Unreachable>;
+    async fn image(&self, camera: &str) -> Result<Option<Arc<StoredImage>>, Unreachable>;
 
     /// Stores the followed number of a camera. Returns false for a camera without a report.
     ///
@@ -112,7 +112,7 @@ pub struct ResultLimits {
     /// Longest time for which a report is stored.
     pub max_age: Duration,
     /// Most cameras with an image. The one that has been silent for longest loses its image first.
-    pub max_pictures: NonZeroUsize,
+    pub max_images: NonZeroUsize,
     /// Most listeners at the same time.
     pub max_listeners: NonZeroUsize,
 }
@@ -128,7 +128,7 @@ impl Default for ResultLimits {
             max_reports: count(10_000),
             max_bytes: 64 << 20,
             max_age: Duration::from_hours(24),
-            max_pictures: count(64),
+            max_images: count(64),
             max_listeners: count(256),
         }
     }
@@ -144,7 +144,7 @@ pub struct ResultUse {
     /// The memory that the reports take, bytes.
     pub bytes: usize,
     /// The number of cameras with an image.
-    pub pictures: usize,
+    pub images: usize,
 }
 
 /// The health of a store.

@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     mqtt::{Broker, BrokerError, Discovery, MqttOptions},
-    results::PicturesOf,
+    results::ImagesOf,
 };
 
 /// Most bytes of a prefix: a topic has 65,535.
@@ -49,7 +49,7 @@ settings! {
         /// change nothing. 0: each frame counts.
         hold as "hold_seconds": Duration = Duration::from_secs(5) => seconds(0..=3600);
         /// The shortest time between two images of a camera that are published, for cameras in
-        /// `results.pictures`. Images show persons, unless `results.conceal_pictures` conceals them.
+        /// `results.images`. Images show persons, unless `results.conceal_images` conceals them.
         /// 0: no images.
         image_every as "image_every_seconds": Option<Duration> = None
             => zero_is_none(seconds(0..=86_400));
@@ -96,8 +96,8 @@ impl MqttKeys {
                 expire_after: self.expire_after,
                 configuration_url: self.configuration_url,
                 support_url: self.support_url,
-                // `results.pictures` says which, where all settings are known.
-                images: PicturesOf::default(),
+                // `results.images` says which, where all settings are known.
+                images: ImagesOf::default(),
             },
         }))
     }

@@ -10,7 +10,7 @@ use super::{
     declare::settings,
     form::{Form, MAX_BYTES, choice, count, flag, list, seconds, secret, text, whole},
 };
-use crate::results::{PicturesOf, RedisAddress, RedisAddressError, RedisOptions, ResultLimits};
+use crate::results::{ImagesOf, RedisAddress, RedisAddressError, RedisOptions, ResultLimits};
 
 /// 8 MiB: enough for any single report.
 const MIN_BYTES: u64 = 8 << 20;
@@ -23,9 +23,9 @@ pub struct ResultSettings {
     /// The Redis that servers share; `None` for the memory of this process.
     pub redis: Option<RedisOptions>,
     /// The cameras whose latest image is kept as well.
-    pub pictures_of: PicturesOf,
+    pub images_of: ImagesOf,
     /// The concealment of persons in these images.
-    pub conceal_pictures: Option<Concealment>,
+    pub conceal_images: Option<Concealment>,
     /// True if the persons of each camera are a metric.
     pub camera_metrics: bool,
     /// The limits of the store.
@@ -45,10 +45,10 @@ settings! {
         key_prefix: String = "lookdown".to_owned() => key_prefix();
         /// The cameras whose latest image is kept for `/results/{camera}/latest.jpg`, by name;
         /// `"*"` is all. Images show persons. Each takes 4 MiB at most.
-        pictures: PicturesOf = PicturesOf::default() => pictures();
+        images: ImagesOf = ImagesOf::default() => images();
         /// The concealment of the persons of the report in these images before they are stored:
         /// `none`, `blur` or `silhouette`.
-        conceal_pictures: Option<Concealment> = None => choice(&[
+        conceal_images: Option<Concealment> = None => choice(&[
             ("none", None),
             ("blur", Some(Concealment::Blur)),
             ("silhouette", Some(Concealment::Silhouette)),
@@ -74,7 +74,7 @@ settings! {
         max_age as "max_age_seconds" => seconds(AGES);
         /// The most cameras whose latest image is kept. The one without reports for longest goes
         /// first.
-        max_pictures => count();
+        max_images => count();
         /// The most event streams and requests that wait for a newer report. Further ones are
         /// answered with 429. One of several clients may have half of them.
         max_listeners => count();
@@ -95,8 +95,8 @@ impl ResultKeys {
                 address,
                 key_prefix: self.key_prefix,
             }),
-            pictures_of: self.pictures,
-            conceal_pictures: self.conceal_pictures,
+            images_of: self.images,
+            conceal_images: self.conceal_images,
             camera_metrics: self.camera_metrics,
             limits,
         })
@@ -111,19 +111,19 @@ fn key_prefix() -> Form<String> {
 }
 
 /// `*` is every camera.
-fn pictures() -> Form<PicturesOf> {
+fn images() -> Form<ImagesOf> {
     list(
         "names of cameras",
         |cameras| {
             Ok(if cameras.contains(&"*") {
-                PicturesOf::All
+                ImagesOf::All
             } else {
-                PicturesOf::Some(cameras.iter().map(|&camera| camera.to_owned()).collect())
+                ImagesOf::Some(cameras.iter().map(|&camera| camera.to_owned()).collect())
             })
         },
-        |pictures| match pictures {
-            PicturesOf::All => vec!["*".to_owned()],
-            PicturesOf::Some(cameras) => BTreeSet::clone(cameras).into_iter().collect(),
+        |images| match images {
+            ImagesOf::All => vec!["*".to_owned()],
+            ImagesOf::Some(cameras) => BTreeSet::clone(cameras).into_iter().collect(),
         },
     )
 }

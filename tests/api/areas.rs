@@ -136,7 +136,7 @@ async fn masked_views_are_counted_and_not_in_the_plan() {
     assert!(masked > 0, "{views}");
     let plan = service.get("/calibrations/lobby/views").await.json();
     let [planned, crops] =
-        ["pictures", "crops_at_most"].map(|count| plan["cost"][count].as_u64().unwrap());
+        ["images", "crops_at_most"].map(|count| plan["cost"][count].as_u64().unwrap());
     let inferred = views["inferred"].as_u64().unwrap();
     assert!(
         (planned..=planned + crops).contains(&inferred),

@@ -160,7 +160,7 @@ async fn the_view_plan_has_every_view_of_the_model() {
         let plan = service.get(&path).await.json();
         let told = plan["views"].as_array().unwrap();
         assert_eq!(
-            (told.len(), &plan["cost"]["pictures"]),
+            (told.len(), &plan["cost"]["images"]),
             (views, &json!(views)),
             "{query}"
         );
@@ -237,7 +237,7 @@ async fn direct_plans_have_no_views_and_invalid_queries_are_refused() {
         .await
         .json();
     assert_eq!(
-        (&plan["views"], &plan["cost"]["pictures"]),
+        (&plan["views"], &plan["cost"]["images"]),
         (&json!([]), &json!(1))
     );
     for (query, status, kind) in [

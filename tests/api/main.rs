@@ -2,6 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a panic fails the test")]
 
 mod access;
+mod annotated_image;
 mod areas;
 mod calibration_changes;
 mod calibrations;
@@ -17,7 +18,6 @@ mod drain_body;
 mod ending;
 mod extremes;
 mod fairness;
-mod kept_pictures;
 mod listeners;
 mod load;
 mod log;
@@ -25,7 +25,6 @@ mod matrix;
 mod metrics_table;
 mod operation;
 mod peers;
-mod picture;
 mod problems;
 mod rate_limit;
 mod readiness;
@@ -42,6 +41,7 @@ mod serve;
 mod server;
 mod service;
 mod slow;
+mod stored_images;
 mod suggestions;
 mod tls;
 mod traces;

@@ -285,12 +285,12 @@ fn zones_and_masks_are_listed_and_drawn_in_the_preview() {
         assert!(report.contains(line), "{report}");
     }
     let limits = lookdown_detect::imaging::decode::DecodeLimits::default();
-    let picture = lookdown_detect::imaging::decode::decode(&std::fs::read(out).unwrap(), &limits);
-    let picture = picture.unwrap().frame;
+    let preview = lookdown_detect::imaging::decode::decode(&std::fs::read(out).unwrap(), &limits);
+    let preview = preview.unwrap().frame;
     // Between the rings and lines of the drawing the frame is black.
     let black = (0..240)
         .flat_map(|y| (0..960).map(move |x| (x, y)))
-        .filter(|&(x, y)| picture.pixel(x, y).iter().all(|&value| value < 30));
+        .filter(|&(x, y)| preview.pixel(x, y).iter().all(|&value| value < 30));
     assert!(black.count() > 100_000);
 }
 

@@ -47,7 +47,7 @@ fn corners(person: &Value) -> [f64; 4] {
 }
 
 /// The row that `lookdown eval` prints for a folder with the sample and these files.
-fn evaluated(picture: &str, files: &[(&str, String)]) -> Value {
+fn evaluated(image_name: &str, files: &[(&str, String)]) -> Value {
     let folder = tempfile::tempdir().unwrap();
     let place = |name: &str| {
         let path = folder.path().join(name);
@@ -55,7 +55,7 @@ fn evaluated(picture: &str, files: &[(&str, String)]) -> Value {
         path
     };
     let sample = Path::new(env!("CARGO_MANIFEST_DIR")).join("samples/office.jpg");
-    std::fs::copy(sample, place(picture)).unwrap();
+    std::fs::copy(sample, place(image_name)).unwrap();
     for (name, content) in files {
         std::fs::write(place(name), content).unwrap();
     }

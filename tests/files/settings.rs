@@ -163,13 +163,13 @@ fn an_empty_keys_file_is_refused_wherever_it_is_given() {
 fn lists_are_arrays_in_the_file() {
     let settings = from_file(
         "[access]\ncors_origins = [\"https://a.example\", \"http://localhost:3000\"]\n\
-         [model]\nalso_load = [\"a\", \"b\"]\n[results]\npictures = [\"hall\"]\n",
+         [model]\nalso_load = [\"a\", \"b\"]\n[results]\nimages = [\"hall\"]\n",
     )
     .unwrap();
     let origins = ["https://a.example", "http://localhost:3000"];
     assert_eq!(settings.access.cors_origins, origins);
     assert_eq!(settings.model.also_load, ["a", "b"]);
-    assert!(settings.results.pictures_of.include("hall"));
+    assert!(settings.results.images_of.include("hall"));
 }
 
 #[test]
@@ -178,7 +178,7 @@ fn a_list_in_one_string_of_the_file_is_refused() {
         ("[access]\ncors_origins", "\"https://a.example\""),
         ("[access]\nkeys", "\"do-not-show-me\""),
         ("[model]\nalso_load", "\"a,b\""),
-        ("[results]\npictures", "[1, 2]"),
+        ("[results]\nimages", "[1, 2]"),
     ] {
         let message = refusal(from_file(&format!("{key} = {value}\n")));
         let (_, key) = key.split_once('\n').unwrap();
@@ -224,9 +224,9 @@ fn images_are_stored_for_the_named_cameras_only() {
         ("*", true, true),
         ("hall,*", true, true),
     ] {
-        let settings = from_environment("LOOKDOWN__RESULTS__PICTURES", named).unwrap();
-        let pictures_of = settings.results.pictures_of;
-        let kept = ["hall", "stairs"].map(|camera| pictures_of.include(camera));
+        let settings = from_environment("LOOKDOWN__RESULTS__IMAGES", named).unwrap();
+        let images_of = settings.results.images_of;
+        let kept = ["hall", "stairs"].map(|camera| images_of.include(camera));
         assert_eq!(kept, [hall, stairs], "{named:?}");
     }
 }

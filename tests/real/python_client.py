@@ -27,12 +27,12 @@ def main(address: str, key: str, image: str) -> None:
     client = AuthenticatedClient(f"http://{address}", token=key, raise_on_unexpected_status=True)
     taken = datetime.datetime(2026, 11, 21, 9, 30, tzinfo=datetime.UTC)
 
-    def picture() -> File:
+    def frame() -> File:
         return File(Path(image).open("rb"), "office.jpg")
 
     by_arguments = detect_persons.sync(
         client=client,
-        body=DetectForm(img=picture()),
+        body=DetectForm(img=frame()),
         calibration="office",
         profile=Profile.FAST,
         captured_at=taken,
@@ -40,12 +40,12 @@ def main(address: str, key: str, image: str) -> None:
     )
     assert isinstance(by_arguments, Report), by_arguments
     assert by_arguments.captured_at == taken
-    form = DetectForm(img=picture(), calibration="office", profile=Profile.FAST, score_threshold=0.3)
+    form = DetectForm(img=frame(), calibration="office", profile=Profile.FAST, score_threshold=0.3)
     by_form = detect_persons.sync(client=client, body=form)
     assert isinstance(by_form, Report), by_form
-    alone = detect_persons.sync(client=client, body=picture(), calibration="office", profile=Profile.FAST)
+    alone = detect_persons.sync(client=client, body=frame(), calibration="office", profile=Profile.FAST)
     assert isinstance(alone, Report), alone
-    refused = detect_persons.sync(client=client, body=DetectForm(img=picture()), calibration="unknown-id")
+    refused = detect_persons.sync(client=client, body=DetectForm(img=frame()), calibration="unknown-id")
     assert isinstance(refused, Problem), refused
 
     rows = list_calibrations.sync(client=client)
@@ -59,7 +59,7 @@ def main(address: str, key: str, image: str) -> None:
     assert isinstance(latest, Report)
     assert latest.request_id == alone.request_id
     deepstack = detect_as_deepstack_with.sync(
-        "copy", client=client, body=DeepStackForm(image=picture(), min_confidence=0.3)
+        "copy", client=client, body=DeepStackForm(image=frame(), min_confidence=0.3)
     )
     assert isinstance(deepstack, DeepStackAnswer), deepstack
     answer = {

@@ -19,7 +19,7 @@ BLOCK, HEIGHT = 32, 384
 BLACK, WHITE, GREY = 16, 235, 128
 
 
-def picture(milliseconds: int, bits: int) -> bytes:
+def frame(milliseconds: int, bits: int) -> bytes:
     """An image in I420 with the lowest bits of a time."""
     shown = [milliseconds >> bit & 1 for bit in reversed(range(bits))]
     row = b"".join(bytes([WHITE if bit else BLACK]) * BLOCK for bit in shown)
@@ -32,7 +32,7 @@ def feed(media: GstRtspServer.RTSPMedia, rate: int, bits: int) -> None:
     source = media.get_element().get_child_by_name("source")
     due = time.monotonic()
     push = lambda data: source.emit("push-buffer", Gst.Buffer.new_wrapped(data))
-    while push(picture(time.time_ns() // 1_000_000, bits)) == Gst.FlowReturn.OK:
+    while push(frame(time.time_ns() // 1_000_000, bits)) == Gst.FlowReturn.OK:
         due += 1 / rate
         time.sleep(max(0.0, due - time.monotonic()))
 

@@ -107,7 +107,7 @@ class CountedCamera(unittest.TestCase):
         self.broker = self.enterContext(broker(self.folder))
         (self.port,) = free_ports(1)
         server = {"MODEL__PATH": "", "MQTT__URL": self.broker.url, "RESULTS__CAMERA_METRICS": "true"}
-        server |= {"RESULTS__PICTURES": "office", "COUNTS__URL": f"http://127.0.0.1:{self.port}"}
+        server |= {"RESULTS__IMAGES": "office", "COUNTS__URL": f"http://127.0.0.1:{self.port}"}
         self.server = self.enterContext(lookdown(server, calibrations=calibrations))
         password = self.folder / "password"
         password.write_text(PASSWORD + "\n", encoding="utf-8")

@@ -216,7 +216,7 @@ class RunEntities(unittest.TestCase):
             "COUNTS__PATH": str(self.folder / "counts.sqlite"),
             "MQTT__URL": self.broker.url,
             "MQTT__IMAGE_EVERY_SECONDS": "1",
-            "RESULTS__PICTURES": "gate",
+            "RESULTS__IMAGES": "gate",
             "CALIBRATIONS__PATH": str(SAMPLES / "calibrations"),
         }
         environment = {f"LOOKDOWN__{name}": value for name, value in settings.items()}

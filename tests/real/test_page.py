@@ -1,6 +1,6 @@
 """The web page in Debian's Chromium, driven by Playwright, and its calculations in Node.
 
-`LOOKDOWN_PAGE_PICTURES=docs/images make real PARTS=page` updates the screenshots in docs/images.
+`LOOKDOWN_PAGE_IMAGES=docs/images make real PARTS=page` updates the screenshots in docs/images.
 """
 
 import base64
@@ -28,7 +28,7 @@ from test_count import Count
 
 HERE = Path(__file__).resolve().parent / "page"
 KEY = "a key that only this test knows"
-PICTURED = "gate,office,canteen,lounge"
+CAMERAS_WITH_IMAGES = "gate,office,canteen,lounge"
 """Cameras whose images are kept."""
 OFFICE = (SAMPLES / "office.jpg").read_bytes()
 ROOM = rendered_room()
@@ -85,7 +85,7 @@ class Page(unittest.TestCase):
             keys.write_text(
                 f'page = {{ scopes = ["detect", "read", "admin"], sha256 = "{digest}" }}\n', encoding="utf-8"
             )
-            with lookdown({"RESULTS__PICTURES": PICTURED}, calibrations=calibrations) as server:
+            with lookdown({"RESULTS__IMAGES": CAMERAS_WITH_IMAGES}, calibrations=calibrations) as server:
                 with (
                     lookdown({"ACCESS__KEYS_FILE": str(keys)}) as keyed,
                     self.counted(Path(folder)) as counted,
@@ -120,7 +120,7 @@ class Page(unittest.TestCase):
         port, closed_port = free_ports(2)
         settings = folder / "count.toml"
         uncounted_settings = {"COUNTS__URL": f"http://127.0.0.1:{closed_port}"}
-        server_settings = {"COUNTS__URL": f"http://127.0.0.1:{port}", "RESULTS__PICTURES": "hall"}
+        server_settings = {"COUNTS__URL": f"http://127.0.0.1:{port}", "RESULTS__IMAGES": "hall"}
         with lookdown(server_settings, calibrations=calibrations) as server, lookdown(uncounted_settings) as uncounted:
             settings.write_text(
                 f'[upstream]\nurl = "http://{server.address}"\n[counts]\nlisten = "127.0.0.1:{port}"\n'
@@ -192,9 +192,9 @@ class Page(unittest.TestCase):
 
     def run_node(self, tests: str, settings: dict[str, str]) -> None:
         """Runs tests that are written in JavaScript."""
-        pictures = os.environ.get("LOOKDOWN_PAGE_PICTURES")
-        if pictures:
-            settings = settings | {"LOOKDOWN_PAGE_PICTURES": str(ROOT / pictures)}
+        screenshots = os.environ.get("LOOKDOWN_PAGE_IMAGES")
+        if screenshots:
+            settings = settings | {"LOOKDOWN_PAGE_IMAGES": str(ROOT / screenshots)}
         done = subprocess.run(["node", "--test", tests], cwd=HERE, env=os.environ | settings, check=False)
         self.assertEqual(done.returncode, 0, f"{tests}: see above")
 

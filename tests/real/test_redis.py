@@ -24,11 +24,11 @@ from waiting import PATIENCE_SECONDS, wait_until
 
 from metrics import metric
 
-PICTURE = OFFICE.read_bytes()
+FRAME = OFFICE.read_bytes()
 SCRIPTS = ROOT / "src" / "results" / "redis"
 RECORD = "".join((SCRIPTS / name).read_text(encoding="utf-8") for name in ("forget.lua", "record.lua"))
 """The script that stores a report."""
-MOST_PICTURES = 2
+MOST_IMAGES = 2
 
 
 @contextlib.contextmanager
@@ -70,7 +70,7 @@ def get(server: Server, path: str, **headers: str) -> Answer:
 def detect(server: Server, camera: str) -> Answer:
     """The answer to a frame."""
     path = f"/detect?calibration=office&profile=fast&camera={camera}"
-    return ask(server.address, "POST", path, PICTURE, {"Content-Type": "image/jpeg"})
+    return ask(server.address, "POST", path, FRAME, {"Content-Type": "image/jpeg"})
 
 
 class Stream:
@@ -400,24 +400,24 @@ class Bounds(unittest.TestCase):
         """Equal on every server, with its ETag. None for cameras that are not named."""
         with (
             RedisServer() as redis,
-            replica("redis-camera", redis.url, RESULTS__PICTURES="hall") as one,
+            replica("redis-camera", redis.url, RESULTS__IMAGES="hall") as one,
             replica("redis-viewer", redis.url) as other,
         ):
             for camera in ("hall", "hall", "stairs"):
                 detect(one, camera)
             path = "/results/hall/latest.jpg?draw=boxes,scores,views,timestamp&width=640"
             wait_until(lambda: metric(one, "results_waiting") == 0.0, "all is stored")
-            pictures = [get(server, path) for server in (one, other)]
-            self.assertEqual([picture.status for picture in pictures], [200, 200])
-            self.assertTrue(pictures[0].body.startswith(b"\xff\xd8\xff"))
-            self.assertEqual(pictures[0].body, pictures[1].body)
+            images = [get(server, path) for server in (one, other)]
+            self.assertEqual([image.status for image in images], [200, 200])
+            self.assertTrue(images[0].body.startswith(b"\xff\xd8\xff"))
+            self.assertEqual(images[0].body, images[1].body)
             latest = get(other, "/results/hall/latest").headers["etag"]
-            self.assertEqual([picture.headers["etag"] for picture in pictures], [latest, latest])
+            self.assertEqual([image.headers["etag"] for image in images], [latest, latest])
             self.assertEqual(get(other, path, If_None_Match=latest).status, 304)
             problem = get(other, "/results/stairs/latest.jpg").json()
-            self.assertEqual(problem["type"], "/problems/picture-not-kept")
-            self.assertIn(redis.ask("TTL", "{lookdown}:picture:hall"), range(80_000, 86_401))
-            self.assertLess(redis.ask("MEMORY", "USAGE", "{lookdown}:picture:hall"), 4 << 20)
+            self.assertEqual(problem["type"], "/problems/image-not-kept")
+            self.assertIn(redis.ask("TTL", "{lookdown}:image:hall"), range(80_000, 86_401))
+            self.assertLess(redis.ask("MEMORY", "USAGE", "{lookdown}:image:hall"), 4 << 20)
             # A report from a server that keeps no images removes the previous one.
             detect(other, "hall")
             wait_until(lambda: get(one, path).status == 404, "the image is gone")
@@ -445,16 +445,18 @@ class Bounds(unittest.TestCase):
                 redis.ask("FLUSHALL")
                 limits = [chance.randrange(1, most) for most in (6, 6, 20, 4000)]
                 kept: list[tuple[str, int, int]] = []
-                pictured: list[str] = []
+                with_image: list[str] = []
                 for number in range(1, 60):
                     report = (str(chance.randrange(8)), number, chance.randrange(200, 800))
                     # A sender without an answer sends the report again.
                     redis.ask_all([record(report, limits)] * chance.choice((1, 1, 2)))
                     kept = room_for(kept, report, limits)
-                    pictured = [camera for camera in pictured if camera != report[0]] + [report[0]] * has_picture(
+                    with_image = [camera for camera in with_image if camera != report[0]] + [report[0]] * has_image(
                         number
                     )
-                    pictured = [camera for camera in pictured if any(one[0] == camera for one in kept)][-MOST_PICTURES:]
+                    with_image = [camera for camera in with_image if any(one[0] == camera for one in kept)][
+                        -MOST_IMAGES:
+                    ]
                     entries = _entries(redis)
                     self.assertEqual([entry[1:] for entry in entries], [_fields(one) for one in kept])
                     ids = {
@@ -467,11 +469,11 @@ class Bounds(unittest.TestCase):
                 self.assertEqual(redis.ask("ZCARD", "t:earlier"), len(kept) - len(latest))
                 self.assertEqual(int(redis.ask("HGET", "t:totals", "bytes")), sum(one[2] for one in kept))
                 self.assertEqual(len(redis.ask("KEYS", "t:camera:*")), len(latest))
-                self.assertEqual(redis.ask("ZRANGE", "t:pictures", 0, -1), [camera.encode() for camera in pictured])
-                self.assertEqual(len(redis.ask("KEYS", "t:picture:*")), len(pictured))
+                self.assertEqual(redis.ask("ZRANGE", "t:images", 0, -1), [camera.encode() for camera in with_image])
+                self.assertEqual(len(redis.ask("KEYS", "t:image:*")), len(with_image))
 
 
-def has_picture(number: int) -> bool:
+def has_image(number: int) -> bool:
     """Returns true if the report of this number has an image."""
     return number % 3 != 0
 
@@ -479,10 +481,10 @@ def has_picture(number: int) -> bool:
 def record(report: tuple[str, int, int], limits: list[int]) -> tuple:
     """The command that stores a report of a camera, with its number and its size."""
     camera, number, size = report
-    keys = [f"t:{name}" for name in ("earlier", "cameras", "latest", "totals", "pictures", "senders")]
-    picture = ("frame", "sketch") if has_picture(number) else ("", "")
-    told = (camera, "t:on", "t:all", "sender", number, "then", number, "{}", *picture, size)
-    return ("EVAL", RECORD, len(keys), *keys, "t:camera:", "t:picture:", *told, *limits, MOST_PICTURES, 3600)
+    keys = [f"t:{name}" for name in ("earlier", "cameras", "latest", "totals", "images", "senders")]
+    image = ("frame", "sketch") if has_image(number) else ("", "")
+    told = (camera, "t:on", "t:all", "sender", number, "then", number, "{}", *image, size)
+    return ("EVAL", RECORD, len(keys), *keys, "t:camera:", "t:image:", *told, *limits, MOST_IMAGES, 3600)
 
 
 def room_for(

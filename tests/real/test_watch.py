@@ -303,7 +303,7 @@ class Cameras(unittest.TestCase):
         ages = []
         with (
             rtsp_clock(STREAM_RATE) as port,
-            lookdown(TINY | {"RESULTS__PICTURES": "clock"}) as self.server,
+            lookdown(TINY | {"RESULTS__IMAGES": "clock"}) as self.server,
             self.watching(
                 f"rtsp://127.0.0.1:{port}/stream", "--name", "clock", "--every", f"{RECENT_SECONDS}s"
             ) as watch,

@@ -10,7 +10,7 @@ from hypothesis import strategies
 FIXTURES = Path(__file__).resolve().parents[1] / "fixtures"
 DOCUMENT = json.loads((FIXTURES.parents[1] / "openapi" / "openapi.json").read_text(encoding="utf-8"))
 CALIBRATIONS = sorted(file for file in (FIXTURES / "calibrations").iterdir() if file.suffix != ".py")
-PICTURES = {
+IMAGES = {
     "image/jpeg": sorted((FIXTURES / "images").glob("*.jpg")),
     "image/png": [file for file in sorted((FIXTURES / "images").glob("*.png")) if file.name != "huge.png"],
     "image/webp": sorted((FIXTURES / "images").glob("*.webp")),
@@ -29,11 +29,11 @@ READS_AS = {"number": NUMBER, "integer": NUMBER, "boolean": re.compile("true|fal
 EXAMPLE = "the bytes of frame.jpg"
 """The image in the examples of forms. DeepStack's routes refuse it with 400, which is permitted."""
 CONDITION = re.compile(r'\*|"[!#-~]*"')
-ANY_PICTURE = contents([file for files in PICTURES.values() for file in files])
-for media_type, files in PICTURES.items():
+ANY_IMAGE = contents([file for files in IMAGES.values() for file in files])
+for media_type, files in IMAGES.items():
     schemathesis.openapi.media_type(media_type, contents(files))
-schemathesis.openapi.media_type("application/octet-stream", ANY_PICTURE)
-schemathesis.openapi.format("binary", ANY_PICTURE)
+schemathesis.openapi.media_type("application/octet-stream", ANY_IMAGE)
+schemathesis.openapi.format("binary", ANY_IMAGE)
 
 
 @schemathesis.hook
@@ -74,7 +74,7 @@ def before_call(context, case, kwargs):
         return
     if case.media_type == "multipart/form-data" and isinstance(case.body, dict):
         if case.path == "/detect" and case.body.get("img") in (EXAMPLE, EXAMPLE.encode()):
-            case.body["img"] = PICTURES["image/jpeg"][0].read_bytes()
+            case.body["img"] = IMAGES["image/jpeg"][0].read_bytes()
         case.query = {name: value for name, value in (case.query or {}).items() if name not in case.body}
     if case.method == "PUT":
         # No file has a camera with a generated name, and most contain their size.

@@ -6,7 +6,7 @@ mod targets;
 
 use std::{fs, path::Path};
 
-use targets::{importer, merge, picture, request, settings};
+use targets::{image_file, importer, merge, request, settings};
 
 /// Passes every file below `folder` to `read`. Returns the number of files that were accepted as
 /// valid.
@@ -43,7 +43,7 @@ fn every_importer_survives_its_corpus() {
 
 #[test]
 fn decoding_survives_its_corpus() {
-    replay_all("picture", &["tests/fixtures/images"], picture::read);
+    replay_all("image_file", &["tests/fixtures/images"], image_file::read);
 }
 
 #[test]

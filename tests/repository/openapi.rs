@@ -97,11 +97,11 @@ fn detection_describes_every_status_and_every_parameter() {
         .iter()
         .map(|parameter| parameter["name"].as_str().unwrap())
         .collect();
-    let [detection, picture] = [DetectParameters::TABLE, AnnotationOptions::TABLE]
+    let [detection, annotation] = [DetectParameters::TABLE, AnnotationOptions::TABLE]
         .map(|table| table.iter().map(|spec| spec.name));
     let names: Vec<_> = detection
         .chain(["format", "oriented"])
-        .chain(picture)
+        .chain(annotation)
         .collect();
     assert_eq!(query, names);
 

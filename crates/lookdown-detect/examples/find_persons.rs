@@ -12,14 +12,14 @@ use lookdown_lens::calibration::Calibration;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = env::args().skip(1);
-    let picture = arguments
+    let path = arguments
         .next()
         .ok_or("usage: find_persons IMAGE [CALIBRATION]")?;
     let camera = arguments.next();
     let camera = camera
         .map(|path| Calibration::read(Path::new(&path)).map(Arc::new))
         .transpose()?;
-    let frame = decode(&fs::read(picture)?, &DecodeLimits::default())?.frame;
+    let frame = decode(&fs::read(path)?, &DecodeLimits::default())?.frame;
     let parameters = DetectParameters::parse([("profile", "balanced")])?;
     let detector = Detector::new(&DetectorOptions::default())?;
     let found = detector.detect(Arc::new(frame), camera, &parameters)?;

@@ -8,8 +8,8 @@ mod coco;
 mod content;
 mod error;
 mod heads;
+mod image_files;
 mod image_id;
-mod pictures;
 mod text;
 mod voc;
 
@@ -19,7 +19,7 @@ pub use content::{DataSet, DataSetImage};
 pub use error::{DataSetError, ScoringMismatch};
 pub use image_id::ImageId;
 
-use self::pictures::{Files, PictureIndex};
+use self::image_files::{Files, ImageFileIndex};
 impl DataSet {
     /// Opens the data set at `path`, which is one of:
     ///
@@ -49,11 +49,11 @@ impl DataSet {
         let files = Files::below(path)?;
         let json = files.of_coco_layout(path);
         if !json.is_empty() {
-            return coco::read_files(&json, &files.pictures());
+            return coco::read_files(&json, &files.image_files());
         }
         let xml = files.ending_in("xml");
         if !xml.is_empty() {
-            return voc::read_files(path, &xml, &files.pictures());
+            return voc::read_files(path, &xml, &files.image_files());
         }
         let heads = files.named(heads::is_head_file);
         if !heads.is_empty() {
@@ -73,8 +73,8 @@ impl DataSet {
                     Some(name) if name == "annotations" => folder.parent().unwrap_or(folder),
                     _ => folder,
                 };
-                let pictures: PictureIndex = Files::below(root)?.pictures();
-                coco::read_files(&[path.to_owned()], &pictures)
+                let image_files: ImageFileIndex = Files::below(root)?.image_files();
+                coco::read_files(&[path.to_owned()], &image_files)
             }
             Some("csv") if heads::is_head_file(path) => heads::read_files(&[path.to_owned()]),
             _ => Err(DataSetError::Unrecognized {

@@ -5,7 +5,7 @@ import json
 from collections.abc import Iterator
 from pathlib import Path
 
-from .pictures import calibration
+from .frames import calibration
 from .places import LOOKDOWN, SAMPLES
 from .processes import Server, free_ports, running
 

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from .frames import calibration
 from .lookdown import MODEL
-from .pictures import calibration
 from .places import PEERS, WORK, model, python_of
 from .processes import Server, free_ports, running
 

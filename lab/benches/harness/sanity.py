@@ -3,8 +3,8 @@
 import json
 
 from .boxes import boxes, matched
+from .frames import frame
 from .lookdown import MODEL, detect, report
-from .pictures import frame
 from .processes import Server
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from .pictures import SIDE, calibration, frame
+from .frames import SIDE, calibration, frame
 from .places import PEERS, WORK
 
 sys.path.insert(0, str(PEERS / "plain_python"))
@@ -26,8 +26,8 @@ def view_file(plan: dict, size: int) -> Path:
     """The views of the frame as bytes `[views, 3, size, size]`."""
     file = WORK / f"views-{plan['profile']}-{size}.npy"
     lens = Lens(json.loads(calibration().read_text(encoding="utf-8")), SIDE)
-    picture = cv2.cvtColor(cv2.imread(str(frame())), cv2.COLOR_BGR2RGB)
-    np.save(file, np.stack([View(view, size, lens).render(picture).transpose(2, 0, 1) for view in plan["views"]]))
+    rgb = cv2.cvtColor(cv2.imread(str(frame())), cv2.COLOR_BGR2RGB)
+    np.save(file, np.stack([View(view, size, lens).render(rgb).transpose(2, 0, 1) for view in plan["views"]]))
     return file
 
 

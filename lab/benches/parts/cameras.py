@@ -5,9 +5,9 @@ from pathlib import Path
 
 from harness.effort import Effort
 from harness.figures import ratios, round_to, spread
+from harness.frames import cameras, frame
 from harness.load import load
 from harness.lookdown import ROOMY, detect, lookdown, report
-from harness.pictures import cameras, frame
 from harness.tables import spread_cell, table
 
 PROFILE = "fast"

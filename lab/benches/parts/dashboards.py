@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 from harness.effort import Effort
 from harness.figures import ratios, spread
+from harness.frames import frame
 from harness.haproxy import haproxy
 from harness.lookdown import detect, lookdown, report
-from harness.pictures import frame
 from harness.processes import Server
 from harness.tables import spread_cell, table
 

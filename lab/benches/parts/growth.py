@@ -2,9 +2,9 @@
 
 from harness.charts import lines
 from harness.effort import Effort
+from harness.frames import frame
 from harness.load import steady
 from harness.lookdown import MODEL, ROOMY, detect, lookdown, report, view_plan
-from harness.pictures import frame
 from harness.tables import table
 
 from .whole import stages_of
@@ -40,12 +40,12 @@ def with_views(effort: Effort, server, profile: str) -> dict:
 
 def with_side(effort: Effort, server, side: int) -> dict:
     """The stages of frames of a size."""
-    path, picture = detect("balanced", model=MODEL), frame(side)
-    report(server, path, picture)
-    timings = [report(server, path, picture)["timings_ms"] for _ in range(effort.frames)]
+    path, jpeg = detect("balanced", model=MODEL), frame(side)
+    report(server, path, jpeg)
+    timings = [report(server, path, jpeg)["timings_ms"] for _ in range(effort.frames)]
     middle = len(timings) // 2
     stages = {stage: sorted(timing[stage] for timing in timings)[middle] for stage in timings[0]}
-    return {"side": side, "kilobytes": picture.stat().st_size / 1000, "stages": stages}
+    return {"side": side, "kilobytes": jpeg.stat().st_size / 1000, "stages": stages}
 
 
 def tell(raw: dict) -> str:

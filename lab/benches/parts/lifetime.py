@@ -8,9 +8,9 @@ from pathlib import Path
 from harness.charts import lines
 from harness.effort import Effort
 from harness.figures import growth, spread
+from harness.frames import cameras, frame
 from harness.load import load, start_load
 from harness.lookdown import detect, lookdown, report
-from harness.pictures import cameras, frame
 from harness.tables import spread_cell, table
 
 PROFILE = "balanced"

@@ -6,9 +6,9 @@ import subprocess
 from harness.charts import bars
 from harness.effort import Effort
 from harness.figures import ratios, spread
+from harness.frames import frame
 from harness.load import load
 from harness.lookdown import MODEL, ROOMY, detect, lookdown, report, view_plan
-from harness.pictures import frame
 from harness.places import BENCHES, model, python_of
 from harness.processes import BenchError
 from harness.tables import spread_cell, table

@@ -2,9 +2,9 @@
 
 from harness.effort import Effort
 from harness.figures import spread
+from harness.frames import frame
 from harness.load import load
 from harness.lookdown import detect, lookdown, report
-from harness.pictures import frame
 from harness.tables import spread_cell, table
 
 PROFILE = "balanced"
@@ -14,13 +14,13 @@ TIMES = 10
 
 def measure(effort: Effort) -> dict:
     """Alternates capacity and overload with default settings."""
-    paths, picture, rounds = [detect(PROFILE)], frame(), []
+    paths, jpeg, rounds = [detect(PROFILE)], frame(), []
     with lookdown() as server:
-        report(server, paths[0], picture)  # builds the remap tables of the camera
+        report(server, paths[0], jpeg)  # builds the remap tables of the camera
         for _ in range(effort.rounds):
-            calm = load(server, paths, picture, clients=CLIENTS, warm_up=2.0, seconds=effort.seconds)
+            calm = load(server, paths, jpeg, clients=CLIENTS, warm_up=2.0, seconds=effort.seconds)
             rate = TIMES * calm["succeeded_per_second"]
-            storm = load(server, paths, picture, rate=rate, warm_up=2.0, seconds=effort.seconds)
+            storm = load(server, paths, jpeg, rate=rate, warm_up=2.0, seconds=effort.seconds)
             rounds.append({"capacity": calm, "overload": storm})
     return {"rounds": rounds}
 

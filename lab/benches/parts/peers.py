@@ -12,9 +12,9 @@ from harness import peers
 from harness.charts import bars
 from harness.effort import Effort
 from harness.figures import ratios, spread
+from harness.frames import frame
 from harness.load import load, steady
 from harness.lookdown import MODEL, ROOMY, detect, lookdown, view_plan
-from harness.pictures import frame
 from harness.processes import Server
 from harness.sanity import agreement
 from harness.tables import spread_cell, table

@@ -4,9 +4,9 @@ from statistics import median
 
 from harness.charts import lines
 from harness.effort import Effort
+from harness.frames import frame
 from harness.load import load, steady
 from harness.lookdown import ROOMY, detect, lookdown, report
-from harness.pictures import frame
 from harness.processes import Server
 from harness.tables import table
 
@@ -20,22 +20,22 @@ def measure(effort: Effort) -> dict:
 
 def of_profile(effort: Effort, profile: str) -> dict:
     """Measures stages, closed loops, then open loops at fractions of the closed loops' throughput."""
-    paths, picture = [detect(profile)], frame()
+    paths, jpeg = [detect(profile)], frame()
     with lookdown(ROOMY) as server:
         stages = stages_of(server, paths[0], effort.frames)
         seconds = stages["total"] / 1000
         closed = []
         for clients in effort.clients:
-            result = steady(server, paths, picture, clients=clients, seconds=effort.seconds, frame_seconds=seconds)
+            result = steady(server, paths, jpeg, clients=clients, seconds=effort.seconds, frame_seconds=seconds)
             closed.append(result)
     capacity = max(result["succeeded_per_second"] for result in closed)
     opened = []
     with lookdown() as server:
-        report(server, paths[0], picture)  # builds the remap tables of the camera
+        report(server, paths[0], jpeg)  # builds the remap tables of the camera
         for percent in effort.loads:
             rate = capacity * percent / 100
             enough = max(effort.seconds, 12 / capacity)
-            result = load(server, paths, picture, rate=rate, seconds=enough, warm_up=max(1.0, 4 / capacity))
+            result = load(server, paths, jpeg, rate=rate, seconds=enough, warm_up=max(1.0, 4 / capacity))
             opened.append(result | {"percent": percent})
     return {"capacity": capacity, "stages": stages, "closed": closed, "open": opened}
 

@@ -3,8 +3,8 @@
 //!
 //! Each function panics on an error, and returns true if its bytes reached the code under test.
 
+pub mod image_file;
 pub mod importer;
 pub mod merge;
-pub mod picture;
 pub mod request;
 pub mod settings;

@@ -60,9 +60,9 @@ def render_portraits(work, first_seed, count, threads=1):
             _camera(scene, rng, rng.random() < 0.5)
             rgba, _, _ = bl.render(scene, 12, scratch)
             ground = np.linspace(0, 1, 384)[:, None, None] * rng.uniform(0.02, 0.8, 3) + rng.uniform(0.02, 0.5, 3)
-            picture = display(rgba[..., :3] + ground * (1 - rgba[..., 3:]), 1.0)
+            portrait = display(rgba[..., :3] + ground * (1 - rgba[..., 3:]), 1.0)
             if rng.random() < 0.5:
                 y = int(rng.choice([20, 330]))
-                cv2.rectangle(picture, (20, y), (270, y + 30), [int(v) for v in rng.integers(0, 255, 3)], -1)
-            cv2.imwrite(str(work / "textures" / f"{portrait_name(split, k)}.png"), picture[..., ::-1])
+                cv2.rectangle(portrait, (20, y), (270, y + 30), [int(v) for v in rng.integers(0, 255, 3)], -1)
+            cv2.imwrite(str(work / "textures" / f"{portrait_name(split, k)}.png"), portrait[..., ::-1])
             progress.step()

@@ -13,7 +13,7 @@ from .body import Body
 from .crops import encode_radiance
 from .figures import add_figure
 from .heights import HEIGHT_SHARES, HEIGHTS
-from .indices import COATS, MANNEQUIN, PICTURE_OF_PERSON
+from .indices import COATS, IMAGE_OF_PERSON, MANNEQUIN
 from .light import floor_irradiance
 from .portraits import portrait_name
 from .progress import Progress
@@ -149,7 +149,7 @@ class Room:
                             [
                                 "window",
                                 "window",
-                                "picture",
+                                "poster",
                                 "person",
                                 "door",
                                 "shelf",
@@ -186,7 +186,7 @@ class Room:
                 (0, 0, 0.04, h),
             ):
                 b.box(sx, 0.06, sz, dx, 0.02, 0.9 + h / 2 + dz, p.white, bevel=0)
-        elif kind in ("picture", "person", "board"):
+        elif kind in ("poster", "person", "board"):
             person = kind == "person"
             w, h = (
                 (float(r.uniform(0.5, 1.3)), float(r.uniform(0.8, 1.8)))
@@ -199,7 +199,7 @@ class Room:
             )
             z = float(r.uniform(h / 2 + 0.3, max(h / 2 + 0.4, 1.7)))
             b.box(w + 0.06, 0.025, h + 0.06, 0, 0.012, z, p.black, bevel=0)
-            b.child(0, 0, index=PICTURE_OF_PERSON if person else 0).plane(
+            b.child(0, 0, index=IMAGE_OF_PERSON if person else 0).plane(
                 w, h, 0, 0.03, z, made, rx=math.pi / 2, rz=math.pi
             )
         elif kind == "door":
@@ -229,7 +229,7 @@ class Room:
         """A roll-up with an image of a person."""
         w, h = f.flip_board(b, self.palette)
         made = self.palette.texture(self.portrait(), uv=True, rough=0.5)
-        b.child(0, 0, index=PICTURE_OF_PERSON).plane(w - 0.04, h - 0.1, 0, -0.02, h / 2 + 0.1, made, rx=math.pi / 2)
+        b.child(0, 0, index=IMAGE_OF_PERSON).plane(w - 0.04, h - 0.1, 0, -0.02, h / 2 + 0.1, made, rx=math.pi / 2)
         self.occupy(b, 0.5, 0.3)
 
     def mannequin(self, b):

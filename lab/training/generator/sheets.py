@@ -63,20 +63,20 @@ def frame_sheet(folder, limit=12):
         return None
     data = json.loads(path.read_text())
     for image in data["images"][-limit:]:
-        picture = cv2.imread(str(folder / "images" / image["file_name"]))
+        tile = cv2.imread(str(folder / "images" / image["file_name"]))
         for a in (a for a in data["annotations"] if a["image_id"] == image["id"]):
             x, y, w, h = (int(round(v)) for v in a["bbox"])
             colour = (160, 160, 160) if a["ignore"] else (0, 220, 0)
-            cv2.rectangle(picture, (x, y), (x + w, y + h), colour, 1)
+            cv2.rectangle(tile, (x, y), (x + w, y + h), colour, 1)
             corners = cv2.boxPoints(((a["obb"][0], a["obb"][1]), (a["obb"][2], a["obb"][3]), a["obb"][4]))
             cv2.polylines(
-                picture,
+                tile,
                 [np.rint(corners).astype(np.int32)],
                 True,
                 (0, 180, 255) if not a["ignore"] else (110, 110, 110),
                 1,
             )
-        tiles.append(picture)
+        tiles.append(tile)
     return montage(tiles, 3, 620)
 
 

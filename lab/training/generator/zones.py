@@ -3,7 +3,7 @@
 import math
 
 from . import furniture as f
-from .indices import CHAIR_WITH_JACKET, COATS, PICTURE_OF_PERSON, PRAM
+from .indices import CHAIR_WITH_JACKET, COATS, IMAGE_OF_PERSON, PRAM
 
 
 def chair(room, b, height=0.45, style=None):
@@ -47,7 +47,7 @@ def screen(room, b, z, person=0.1):
     name = room.portrait() if room.rng.random() < person else f"screen{room.rng.integers(4)}"
     made = p.texture(name, uv=True, emit=0.7)
     b.box(0.55, 0.03, 0.33, 0, 0, z + 0.32, p.black, bevel=0)
-    b.child(0, 0, index=PICTURE_OF_PERSON if "portrait" in name else 0).plane(
+    b.child(0, 0, index=IMAGE_OF_PERSON if "portrait" in name else 0).plane(
         0.52, 0.3, 0, 0.017, z + 0.32, made, rx=math.pi / 2, rz=math.pi
     )
     b.box(0.04, 0.03, 0.2, 0, -0.01, z + 0.09, p.black, bevel=0)

@@ -13,7 +13,7 @@ from .yolo_boxes import decoded
 def convert_detector(cfg: Path, weights: Path, folder: Path, name: str, class_names: Path | None) -> str:
     """Writes the model folder and returns a line that describes it."""
     network = read_network(cfg)
-    picture, classes = network.picture, network.heads[0].classes
+    shape, classes = network.input_shape, network.heads[0].classes
     person = person_class(classes, class_names)
     builder = OnnxBuilder()
     maps = network.add_to(builder, "images", read_weights(weights, network.parameters))
@@ -24,8 +24,8 @@ def convert_detector(cfg: Path, weights: Path, folder: Path, name: str, class_na
         builder.save(
             file,
             outputs=outputs,
-            height=picture.height,
-            width=picture.width,
+            height=shape.height,
+            width=shape.width,
             description=f"{name}, from {cfg.name}. images: RGB 0..1. Outputs: {', '.join(outputs)}.",
         )
 
@@ -33,7 +33,7 @@ def convert_detector(cfg: Path, weights: Path, folder: Path, name: str, class_na
     write_model_folder(folder, name=name, source=source, tables=_tables(network, person), save=save)
     return (
         f"{folder / 'model.onnx'}: {network.parameters / 1e6:.1f} million weights, "
-        f"{picture.width} x {picture.height} pixels, person is class {person} of {classes}"
+        f"{shape.width} x {shape.height} pixels, person is class {person} of {classes}"
     )
 
 

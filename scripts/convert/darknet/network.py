@@ -19,9 +19,9 @@ COLOURS = 3
 
 @dataclass(frozen=True)
 class Network:
-    """Layers in order; `picture` is the shape of the input."""
+    """Layers in order, for images of `input_shape`."""
 
-    picture: Shape
+    input_shape: Shape
     layers: list[Layer]
 
     @property
@@ -34,12 +34,12 @@ class Network:
         """The layers that produce boxes."""
         return [layer for layer in self.layers if isinstance(layer, Head)]
 
-    def add_to(self, builder: OnnxBuilder, picture: str, weights: numpy.ndarray) -> list[str]:
+    def add_to(self, builder: OnnxBuilder, image: str, weights: numpy.ndarray) -> list[str]:
         """Adds every layer to the graph and returns the raw maps `[N, channels, height, width]` of the heads.
 
-        `picture` is RGB, 0 to 1; `weights` are all of the network's, in order.
+        `image` is RGB, 0 to 1; `weights` are all of the network's, in order.
         """
-        tensors = {-1: picture}
+        tensors = {-1: image}
         first = 0
         for index, layer in enumerate(self.layers):
             own = weights[first : first + layer.parameters]
@@ -54,17 +54,17 @@ def read_network(cfg: Path) -> Network:
     if not sections or sections[0].kind not in ("net", "network"):
         raise ConversionError(f"{cfg.name} does not begin with [net]; is this a darknet .cfg file?")
     net, *rest = sections
-    picture = Shape(net.whole("channels", COLOURS), net.whole("height", least=1), net.whole("width", least=1))
-    if picture.channels != COLOURS:
-        raise net.refusal(f"has channels={picture.channels}; images have {COLOURS}")
-    shapes = {-1: picture}
+    input_shape = Shape(net.whole("channels", COLOURS), net.whole("height", least=1), net.whole("width", least=1))
+    if input_shape.channels != COLOURS:
+        raise net.refusal(f"has channels={input_shape.channels}; images have {COLOURS}")
+    shapes = {-1: input_shape}
     layers = []
     for index, section in enumerate(rest):
         if section.kind not in KINDS:
             raise section.refusal(f"has no translation; {', '.join(KINDS)} have")
         layers.append(KINDS[section.kind](section, index, shapes))
         shapes[index] = layers[index].shape
-    network = Network(picture, layers)
+    network = Network(input_shape, layers)
     _require_one_kind_of_head(cfg, network.heads)
     return network
 

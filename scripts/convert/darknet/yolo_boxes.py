@@ -14,7 +14,7 @@ def decoded(builder: OnnxBuilder, network: Network, maps: list[str], person: int
         cells = head.shape.width * head.shape.height
         parted = builder.reshape(tensor, [0, len(head.mask), 5 + head.classes, cells])
         centre, extent, objectness, classes = builder.split(parted, [2, 2, 1, head.classes], axis=2)
-        boxes.append(_boxes(builder, centre, extent, head, network.picture.width / head.shape.width))
+        boxes.append(_boxes(builder, centre, extent, head, network.input_shape.width / head.shape.width))
         scores.append(_scores(builder, objectness, classes, head.classes, person))
         candidates += len(head.mask) * cells
     return builder.node("Concat", boxes, axis=1), builder.node("Concat", scores, axis=1), candidates

@@ -18,10 +18,10 @@ def parse(cfg: str) -> list[tuple[str, dict[str, str]]]:
     return sections
 
 
-def run(cfg: str, numbers: numpy.ndarray, picture: numpy.ndarray) -> list[numpy.ndarray]:
+def run(cfg: str, numbers: numpy.ndarray, image: numpy.ndarray) -> list[numpy.ndarray]:
     """The inputs of the heads, each `[channels, height, width]`, for an image `[3, height, width]`."""
     maps, heads, numbers = [], [], numbers.astype(numpy.float64)
-    last = picture.astype(numpy.float64)
+    last = image.astype(numpy.float64)
     for kind, options in parse(cfg)[1:]:
         whole = {name: int(value) for name, value in options.items() if value.lstrip("-").isdigit()}
         match kind:

@@ -5,9 +5,9 @@ import numpy
 from .reference import correlated
 
 
-def run(weights: dict[str, numpy.ndarray], picture: numpy.ndarray) -> tuple[numpy.ndarray, numpy.ndarray]:
+def run(weights: dict[str, numpy.ndarray], rgb: numpy.ndarray) -> tuple[numpy.ndarray, numpy.ndarray]:
     """Corners `[cells, 4]` and probabilities `[cells, classes]` for an RGB image `[3, size, size]`."""
-    image = picture[::-1].astype(numpy.float64)
+    image = rgb[::-1].astype(numpy.float64)
     quarters = [image[:, row::2, column::2] for row, column in ((0, 0), (1, 0), (0, 1), (1, 1))]
     image = unit(weights, "backbone.backbone.stem.conv", numpy.concatenate(quarters))
     maps = []

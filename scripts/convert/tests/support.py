@@ -13,7 +13,7 @@ from ..darknet.network import read_network
 from . import reference
 from .made_up_darknet import write_weights
 
-WEIGHTS_SEED, PICTURE_SEED = 1, 2
+WEIGHTS_SEED, IMAGE_SEED = 1, 2
 
 
 class MaxPool(OpRun):
@@ -55,10 +55,10 @@ class WithDarknetFiles(unittest.TestCase):
         self.convert(class_names)
         _, net = reference.parse(cfg)[0]
         shape = (2, 3, int(net["height"]), int(net["width"]))
-        pictures = numpy.random.default_rng(PICTURE_SEED).uniform(0, 1, shape).astype(numpy.float32)
+        images = numpy.random.default_rng(IMAGE_SEED).uniform(0, 1, shape).astype(numpy.float32)
         numbers = numpy.fromfile(self.weights, "<f4", offset=20)
-        found = ReferenceEvaluator(str(self.model / "model.onnx"), new_ops=[MaxPool]).run(None, {"images": pictures})
-        expected = zip(*(decode(cfg, reference.run(cfg, numbers, picture)) for picture in pictures), strict=True)
+        found = ReferenceEvaluator(str(self.model / "model.onnx"), new_ops=[MaxPool]).run(None, {"images": images})
+        expected = zip(*(decode(cfg, reference.run(cfg, numbers, image)) for image in images), strict=True)
         for answer, answers in zip(found, expected, strict=True):
             self.assertGreater(answer.std(), 0)
             numpy.testing.assert_allclose(answer, numpy.stack(answers), rtol=1e-3, atol=1e-4)

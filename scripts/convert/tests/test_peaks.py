@@ -29,8 +29,8 @@ class FoundPeaks(unittest.TestCase):
         }
         file = Path(self.enterContext(tempfile.TemporaryDirectory())) / "peaks.onnx"
         builder.save(file, outputs=outputs, height=SIZE, width=SIZE, description="")
-        pictures = numpy.concatenate([heat[:, None], maps], axis=1).astype(numpy.float32)
-        return ReferenceEvaluator(str(file), new_ops=[MaxPool]).run(list(outputs), {"images": pictures})
+        images = numpy.concatenate([heat[:, None], maps], axis=1).astype(numpy.float32)
+        return ReferenceEvaluator(str(file), new_ops=[MaxPool]).run(list(outputs), {"images": images})
 
     def test_peaks_suppress_neighbours_per_image(self):
         heat = numpy.zeros((2, SIZE, SIZE))

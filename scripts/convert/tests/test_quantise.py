@@ -85,14 +85,14 @@ class WithNetwork(unittest.TestCase):
         self.tensors = int8_tensors(graph)
         graph.save(self.folded)
         shape = (2, 3, SIZE, SIZE)
-        self.pictures = numpy.random.default_rng(RANDOM_SEED).uniform(0, 255, shape).astype(numpy.float32)
+        self.images = numpy.random.default_rng(RANDOM_SEED).uniform(0, 255, shape).astype(numpy.float32)
 
     def answer(self, file: Path, tensors: list[str] | None = None) -> list[numpy.ndarray]:
         model = onnx.load(file)
         # The evaluator supports DequantizeLinear from this version on, with the same meaning.
         model.opset_import[0].version = 19
         model.graph.output.extend(onnx.ValueInfoProto(name=tensor) for tensor in tensors or [])
-        return ReferenceEvaluator(model, new_ops=[MaxPool]).run(tensors, {"images": self.pictures})
+        return ReferenceEvaluator(model, new_ops=[MaxPool]).run(tensors, {"images": self.images})
 
     def write_ranges(self, model_sha256: str) -> None:
         values = self.answer(self.folded, self.tensors)

@@ -38,11 +38,11 @@ class Answers(WithCheckpoint):
     def require_same_answers(self, person: int, class_names=None, **network):
         weights = self.write(**network)
         self.convert(class_names=class_names)
-        pictures = numpy.random.default_rng(4).uniform(0, 255, (2, 3, SIZE, SIZE)).astype(numpy.float32)
+        images = numpy.random.default_rng(4).uniform(0, 255, (2, 3, SIZE, SIZE)).astype(numpy.float32)
         graph = ReferenceEvaluator(str(self.model / "model.onnx"), new_ops=[MaxPool])
-        boxes, scores = graph.run(["boxes", "scores"], {"images": pictures})
-        for picture, found_boxes, found_scores in zip(pictures, boxes, scores, strict=True):
-            corners, chances = reference_yolox.run(weights, picture)
+        boxes, scores = graph.run(["boxes", "scores"], {"images": images})
+        for image, found_boxes, found_scores in zip(images, boxes, scores, strict=True):
+            corners, chances = reference_yolox.run(weights, image)
             numpy.testing.assert_allclose(found_boxes, corners, rtol=1e-3, atol=1e-3)
             numpy.testing.assert_allclose(found_scores, chances[:, person], rtol=1e-3, atol=1e-6)
 

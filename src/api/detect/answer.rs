@@ -24,7 +24,7 @@ const NAMELESS: &str = "frame";
 /// The requested form of the response.
 pub(in crate::api) struct AnswerOptions {
     format: AnswerFormat,
-    picture: AnnotationOptions,
+    image_options: AnnotationOptions,
     /// The file name of the frame as the client sent it.
     file_name: Option<String>,
 }
@@ -43,10 +43,10 @@ impl AnswerOptions {
         file_name: Option<String>,
     ) -> Result<Self, Problem> {
         let format = take(given, TABLE);
-        let picture = take(given, AnnotationOptions::TABLE);
+        let image_options = take(given, AnnotationOptions::TABLE);
         Ok(Self {
             format: AnswerFormat::read(pairs(&format), headers)?,
-            picture: AnnotationOptions::parse(pairs(&picture))?,
+            image_options: AnnotationOptions::parse(pairs(&image_options))?,
             file_name,
         })
     }
@@ -54,7 +54,7 @@ impl AnswerOptions {
     /// Returns the width of the annotated image, pixels; 0 for other formats.
     pub(in crate::api) fn drawn_width(&self) -> u32 {
         match self.format {
-            AnswerFormat::Picture(_) => self.picture.width,
+            AnswerFormat::Image(_) => self.image_options.width,
             AnswerFormat::Report | AnswerFormat::Annotations(..) => 0,
         }
     }
@@ -69,9 +69,9 @@ impl AnswerOptions {
         let report = &detected.report;
         let bytes = match self.format {
             AnswerFormat::Report => json.clone(),
-            AnswerFormat::Picture(format) => {
-                let picture = annotated_image(detected, format, &self.picture);
-                picture.map_err(not_drawn)?.into()
+            AnswerFormat::Image(format) => {
+                let image = annotated_image(detected, format, &self.image_options);
+                image.map_err(not_drawn)?.into()
             }
             AnswerFormat::Annotations(format, boxes) => {
                 let name = self.file_name.unwrap_or_else(|| NAMELESS.to_owned());

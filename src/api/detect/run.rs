@@ -21,7 +21,7 @@ use crate::{
         http::{context::RequestContext, problem::Problem},
     },
     metrics::Metrics,
-    results::{NewPicture, NewReport},
+    results::{NewImage, NewReport},
     telemetry::RequestTrace,
 };
 
@@ -52,7 +52,7 @@ struct Written<T> {
 /// The results of the work on a worker thread.
 struct Finished<T> {
     report: DetectionReport,
-    picture: Option<NewPicture>,
+    image: Option<NewImage>,
     written: Result<Written<T>, Problem>,
 }
 
@@ -67,8 +67,8 @@ pub(in crate::api) async fn run_detection<T: Send + 'static>(
     let timeout = job.parameters.timeout;
     let timeline = job.ticket.timeline.clone();
     let is_stored = job.parameters.store;
-    let concealment = state.options.conceal_pictures;
-    let pictures_of = Arc::clone(&state.options.pictures_of);
+    let concealment = state.options.conceal_images;
+    let images_of = Arc::clone(&state.options.images_of);
     let observer = state.clone();
     let work = state.workers.detect_and(job, move |detected| {
         if is_stored {
@@ -76,11 +76,11 @@ pub(in crate::api) async fn run_detection<T: Send + 'static>(
         }
         // Drawing needs the frame after the report has been taken.
         let report = detected.report.clone();
-        let is_kept = is_stored && pictures_of.include(&report.camera);
-        let picture = is_kept.then(|| picture(&detected, concealment)).flatten();
+        let is_kept = is_stored && images_of.include(&report.camera);
+        let image = is_kept.then(|| new_image(&detected, concealment)).flatten();
         Finished {
             report,
-            picture,
+            image,
             written: written(detected, write),
         }
     });
@@ -96,7 +96,7 @@ pub(in crate::api) async fn run_detection<T: Send + 'static>(
             persons: report.persons.len(),
             json,
         };
-        state.results.publish(kept, finished.picture);
+        state.results.publish(kept, finished.image);
         record_zones(state, &report);
     }
     Ok(Answered { report, answer })
@@ -138,9 +138,9 @@ fn written<T>(
 }
 
 /// Returns the image to store with the report. A failure here does not fail the request.
-fn picture(detected: &DetectedFrame, concealment: Option<Concealment>) -> Option<NewPicture> {
+fn new_image(detected: &DetectedFrame, concealment: Option<Concealment>) -> Option<NewImage> {
     match StoredFrame::of(detected, concealment) {
-        Ok(kept) => Some(NewPicture {
+        Ok(kept) => Some(NewImage {
             frame: kept.jpeg,
             sketch: kept.sketch,
         }),

@@ -165,7 +165,7 @@ async fn read_gauges(state: &ApiState) {
             (&metrics.results_cameras, usage.cameras),
             (&metrics.results_reports, usage.reports),
             (&metrics.results_bytes, usage.bytes),
-            (&metrics.results_pictures, usage.pictures),
+            (&metrics.results_images, usage.images),
         ] {
             gauge.set(gauge_value(count));
         }

@@ -8,7 +8,7 @@ mod feed;
 pub(in crate::api) mod followed;
 pub(in crate::api) mod history;
 pub(in crate::api) mod latest;
-pub(in crate::api) mod picture;
+pub(in crate::api) mod latest_image;
 mod row;
 
 use axum::{

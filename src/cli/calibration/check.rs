@@ -237,9 +237,9 @@ fn areas(calibration: &Calibration) -> impl Iterator<Item = (&'static str, Strin
 }
 
 fn draw(calibration: &Calibration, frame: &Path, out: &Path) -> anyhow::Result<()> {
-    let mut picture =
+    let mut preview =
         read_frame(frame).with_context(|| format!("--preview: {}", frame.display()))?;
-    let (width, height) = (picture.width(), picture.height());
+    let (width, height) = (preview.width(), preview.height());
     let Ok(geometry) = calibration.for_frame(width, height) else {
         let (calibrated_width, calibrated_height) = calibration.image_size();
         bail!(
@@ -248,10 +248,10 @@ fn draw(calibration: &Calibration, frame: &Path, out: &Path) -> anyhow::Result<(
         );
     };
     let CameraGeometry { lens, mount, areas } = &geometry;
-    sketch_areas(&mut picture, &areas.zones, &areas.masks, lens, mount);
-    sketch_foot_filter(&mut picture, &areas.foot_filter, lens, mount);
-    sketch_lines(&mut picture, &areas.lines, lens, mount);
-    sketch_lens(&mut picture, lens, &views(calibration));
-    fs::write(out, encode_jpeg(&picture, JPEG_QUALITY)?)
+    sketch_areas(&mut preview, &areas.zones, &areas.masks, lens, mount);
+    sketch_foot_filter(&mut preview, &areas.foot_filter, lens, mount);
+    sketch_lines(&mut preview, &areas.lines, lens, mount);
+    sketch_lens(&mut preview, lens, &views(calibration));
+    fs::write(out, encode_jpeg(&preview, JPEG_QUALITY)?)
         .with_context(|| format!("--out: {} cannot be written", out.display()))
 }

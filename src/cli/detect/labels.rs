@@ -9,7 +9,7 @@ use std::{
 use anyhow::{Context, bail};
 use lookdown_detect::pipeline::DetectionReport;
 
-use super::pictures::Picture;
+use super::image_files::ImageFile;
 use crate::annotation_formats::{AnnotatedImage, AnnotationFormat, BoxKind};
 
 /// The annotations of one run.
@@ -29,18 +29,18 @@ impl Labels {
         format: AnnotationFormat,
         boxes: BoxKind,
         folder: &Path,
-        pictures: &[Picture],
+        image_files: &[ImageFile],
     ) -> anyhow::Result<Self> {
         let mut taken: HashMap<String, &Path> = HashMap::new();
-        for picture in pictures {
-            let own_file = format.own_file(&picture.name);
-            let place = own_file.unwrap_or_else(|| picture.name.clone());
-            if let Some(other) = taken.insert(place, &picture.path) {
+        for image_file in image_files {
+            let own_file = format.own_file(&image_file.name);
+            let place = own_file.unwrap_or_else(|| image_file.name.clone());
+            if let Some(other) = taken.insert(place, &image_file.path) {
                 bail!(
                     "--format {format}: {} and {} would share their annotations: rename one, or \
                      name the folder above both",
                     other.display(),
-                    picture.path.display()
+                    image_file.path.display()
                 );
             }
         }
@@ -49,13 +49,13 @@ impl Labels {
             format,
             boxes,
             folder: folder.to_owned(),
-            images: Vec::with_capacity(pictures.len()),
+            images: Vec::with_capacity(image_files.len()),
         })
     }
 
     /// Takes in what was found in an image.
-    pub(super) fn add(&mut self, picture: &Picture, report: &DetectionReport) {
-        let image = AnnotatedImage::of(report, picture.name.clone());
+    pub(super) fn add(&mut self, image_file: &ImageFile, report: &DetectionReport) {
+        let image = AnnotatedImage::of(report, image_file.name.clone());
         self.images.push(image);
     }
 

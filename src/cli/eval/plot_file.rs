@@ -35,12 +35,12 @@ impl FromStr for PlotFile {
 
 impl PlotFile {
     pub(super) fn write(&self, plot: &LinePlot) -> anyhow::Result<()> {
-        let picture = if self.is_png {
+        let encoded = if self.is_png {
             plot.png()?
         } else {
             plot.svg()?.into_bytes()
         };
-        fs::write(&self.path, picture)
+        fs::write(&self.path, encoded)
             .with_context(|| format!("{} cannot be written", self.path.display()))
     }
 }

@@ -3,7 +3,7 @@ use std::collections::BTreeSet;
 use jiff::Timestamp;
 
 use super::*;
-use crate::results::{NewReport, PicturesOf, ReportId};
+use crate::results::{ImagesOf, NewReport, ReportId};
 
 const HOLD: Duration = Duration::from_secs(5);
 const EXPIRY: Duration = Duration::from_mins(10);
@@ -187,7 +187,7 @@ fn occupancy_ends_after_the_hold_availability_at_expiry() {
 #[test]
 fn removed_cameras_are_withdrawn() {
     let discovery = Discovery {
-        images: PicturesOf::All,
+        images: ImagesOf::All,
         ..Discovery::default()
     };
     let mut cameras = cameras_with(discovery, 10);

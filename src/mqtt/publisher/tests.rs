@@ -6,7 +6,7 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio_util::codec::Framed;
 
 use super::*;
-use crate::results::{MemoryResults, NewPicture, NewReport, PicturesOf, ResultLimits};
+use crate::results::{ImagesOf, MemoryResults, NewImage, NewReport, ResultLimits};
 
 type Client = Framed<TcpStream, Codec>;
 
@@ -38,8 +38,8 @@ async fn setup_with(image_every: Option<Duration>) -> Setup {
         image_every,
         discovery: Discovery {
             images: match image_every {
-                Some(_) => PicturesOf::All,
-                None => PicturesOf::default(),
+                Some(_) => ImagesOf::All,
+                None => ImagesOf::default(),
             },
             ..Discovery::default()
         },
@@ -183,11 +183,11 @@ async fn each_new_image_is_published_and_not_retained() {
     let (mut client, _) = accept(&setup.listener).await;
     welcome(&mut client).await;
     let sketch = r#"{"frame_width":1680,"marks":[],"views":[],"zones":[],"timestamp":""}"#;
-    let picture = NewPicture {
+    let image = NewImage {
         frame: Bytes::from_static(include_bytes!("../../../samples/office.jpg")),
         sketch: Bytes::from_static(sketch.as_bytes()),
     };
-    setup.results.publish(report(1), Some(picture.clone()));
+    setup.results.publish(report(1), Some(image.clone()));
     let mut images = 0;
     while images < 2 {
         let Packet::Publish(said) = client.next().await.unwrap().unwrap() else {
@@ -198,7 +198,7 @@ async fn each_new_image_is_published_and_not_retained() {
             assert!(!said.retain);
             assert!(said.payload.starts_with(&[0xff, 0xd8]) && said.payload.len() <= 1 << 20);
             if images == 1 {
-                setup.results.publish(report(1), Some(picture.clone()));
+                setup.results.publish(report(1), Some(image.clone()));
             }
         }
     }

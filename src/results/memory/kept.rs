@@ -8,9 +8,9 @@ use std::{
 
 use jiff::{SignedDuration, Timestamp};
 
-use super::pictures::Pictures;
+use super::images::Images;
 use crate::results::{
-    Cameras, NewPicture, NewReport, ReportId, ResultLimits, ResultUse, StoredPicture, StoredReport,
+    Cameras, NewImage, NewReport, ReportId, ResultLimits, ResultUse, StoredImage, StoredReport,
 };
 
 /// Every report is in `cameras`, and in exactly one of `latest` and `earlier`.
@@ -23,7 +23,7 @@ pub(super) struct Kept {
     latest: BTreeMap<ReportId, Arc<StoredReport>>,
     /// All other reports.
     earlier: BTreeMap<ReportId, Arc<StoredReport>>,
-    pictures: Pictures,
+    images: Images,
     bytes: usize,
     newest: ReportId,
     /// The number of cameras that were removed.
@@ -33,7 +33,7 @@ pub(super) struct Kept {
 impl Kept {
     pub(super) fn new(limits: ResultLimits) -> Self {
         Self {
-            pictures: Pictures::new(limits.max_pictures),
+            images: Images::new(limits.max_images),
             limits,
             cameras: HashMap::new(),
             latest: BTreeMap::new(),
@@ -48,7 +48,7 @@ impl Kept {
     pub(super) fn add(
         &mut self,
         report: NewReport,
-        picture: Option<NewPicture>,
+        image: Option<NewImage>,
         now: Timestamp,
     ) -> Arc<StoredReport> {
         let id = ReportId::next(self.newest, now);
@@ -56,7 +56,7 @@ impl Kept {
         self.newest = id;
         self.bytes += stored.report.bytes();
         let camera = &stored.report.camera;
-        self.pictures.replace(camera, id, picture);
+        self.images.replace(camera, id, image);
         let reports = self.cameras.entry(camera.clone()).or_default();
         if let Some(before) = reports.back() {
             self.latest.remove(&before.id);
@@ -139,7 +139,7 @@ impl Kept {
         }
         if reports.is_empty() {
             self.cameras.remove(camera);
-            self.pictures.forget(camera);
+            self.images.forget(camera);
             self.removed_cameras += 1;
         }
         true
@@ -186,8 +186,8 @@ impl Kept {
         }
     }
 
-    pub(super) fn picture(&self, camera: &str) -> Option<Arc<StoredPicture>> {
-        self.pictures.of(camera)
+    pub(super) fn image(&self, camera: &str) -> Option<Arc<StoredImage>> {
+        self.images.of(camera)
     }
 
     pub(super) fn usage(&self) -> ResultUse {
@@ -195,7 +195,7 @@ impl Kept {
             cameras: self.cameras.len(),
             reports: self.count(),
             bytes: self.bytes,
-            pictures: self.pictures.count(),
+            images: self.images.count(),
         }
     }
 }

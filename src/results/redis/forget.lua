@@ -2,16 +2,16 @@
 --
 -- `cameras`: each camera with the ID of its latest report. `latest`: `ID:SIZE` of the latest report
 -- of each camera. `earlier`: `ID:SIZE:CAMERA` of every other report, by ID. `totals`: the newest ID
--- (`last`), and the size of all reports (`bytes`). `pictures`: the cameras that have an image, with
+-- (`last`), and the size of all reports (`bytes`). `images`: the cameras that have an image, with
 -- the ID of its report. The content of a report is in a stream of its camera, under the same ID.
-local earlier, cameras, latest, totals, pictures = unpack(KEYS)
-local prefix_of_cameras, prefix_of_pictures, camera = unpack(ARGV, 1, 3)
+local earlier, cameras, latest, totals, images = unpack(KEYS)
+local prefix_of_cameras, prefix_of_images, camera = unpack(ARGV, 1, 3)
 -- The size of all reports that were removed.
 local freed = 0
 
-local function forget_picture(name)
-  if redis.call('ZREM', pictures, name) == 1 then
-    redis.call('DEL', prefix_of_pictures .. name)
+local function forget_image(name)
+  if redis.call('ZREM', images, name) == 1 then
+    redis.call('DEL', prefix_of_images .. name)
   end
 end
 
@@ -41,7 +41,7 @@ local function forget_camera(name)
     freed = freed + string.match(newest, '^%d+:(%d+)')
   end
   redis.call('ZREM', cameras, name)
-  forget_picture(name)
+  forget_image(name)
   return redis.call('DEL', stream)
 end
 

@@ -27,7 +27,7 @@ impl Keys {
             self.cameras(),
             self.key("latest"),
             self.totals(),
-            self.pictures(),
+            self.images(),
         ]
     }
 
@@ -47,13 +47,13 @@ impl Keys {
     }
 
     /// A sorted set of the cameras that have an image, by the ID of its report.
-    pub(super) fn pictures(&self) -> String {
-        self.key("pictures")
+    pub(super) fn images(&self) -> String {
+        self.key("images")
     }
 
     /// A hash of a camera's image: the report's ID (`id`), `frame` and `sketch`.
-    pub(super) fn picture(&self, camera: &str) -> String {
-        self.prefix_of_pictures() + camera
+    pub(super) fn image(&self, camera: &str) -> String {
+        self.prefix_of_images() + camera
     }
 
     /// The followed number of a camera: the number, a space, and its time in microseconds.
@@ -62,8 +62,8 @@ impl Keys {
     }
 
     /// The prefix of the keys of all images.
-    pub(super) fn prefix_of_pictures(&self) -> String {
-        self.key("picture:")
+    pub(super) fn prefix_of_images(&self) -> String {
+        self.key("image:")
     }
 
     /// A sorted set of the servers by the number of the last report that each sent.

@@ -8,7 +8,7 @@ use tokio::sync::Notify;
 
 use crate::{
     metrics::IntCounter,
-    results::{NewPicture, NewReport},
+    results::{NewImage, NewReport},
 };
 
 /// Most reports that wait: minutes of a few cameras.
@@ -19,7 +19,7 @@ const MOST_BYTES: usize = 32 << 20;
 #[derive(Debug)]
 pub(super) struct PendingReport {
     pub(super) report: NewReport,
-    pub(super) picture: Option<NewPicture>,
+    pub(super) image: Option<NewImage>,
 }
 
 /// The queue, oldest first.
@@ -50,10 +50,10 @@ impl Outbox {
     }
 
     /// Appends a report. Never waits.
-    pub(super) fn push(&self, report: NewReport, picture: Option<NewPicture>) {
-        let parcel = PendingReport { report, picture };
+    pub(super) fn push(&self, report: NewReport, image: Option<NewImage>) {
+        let parcel = PendingReport { report, image };
         let mut waiting = self.waiting();
-        waiting.drop_picture_of(&parcel.report.camera);
+        waiting.drop_image_of(&parcel.report.camera);
         waiting.bytes += parcel.bytes();
         waiting.parcels.push_back(parcel);
         while waiting.parcels.len() > MOST_REPORTS || waiting.bytes > MOST_BYTES {
@@ -122,17 +122,17 @@ impl Outbox {
 
 impl PendingReport {
     fn bytes(&self) -> usize {
-        self.report.bytes() + self.picture.as_ref().map_or(0, NewPicture::bytes)
+        self.report.bytes() + self.image.as_ref().map_or(0, NewImage::bytes)
     }
 }
 
 impl Waiting {
     /// Drops the camera's queued image, as a later report replaces it.
-    fn drop_picture_of(&mut self, camera: &str) {
+    fn drop_image_of(&mut self, camera: &str) {
         let mut own = self.parcels.iter_mut().rev();
         let last = own.find(|parcel| parcel.report.camera == camera);
-        if let Some(picture) = last.and_then(|parcel| parcel.picture.take()) {
-            self.bytes -= picture.bytes();
+        if let Some(image) = last.and_then(|parcel| parcel.image.take()) {
+            self.bytes -= image.bytes();
         }
     }
 
@@ -209,18 +209,18 @@ mod tests {
     #[tokio::test]
     async fn only_the_latest_image_of_a_camera_waits() {
         let outbox = outbox();
-        let picture = |length| NewPicture {
+        let image = |length| NewImage {
             frame: Bytes::from(vec![0; length]),
             sketch: Bytes::new(),
         };
         for number in 1..=9 {
-            outbox.push(report(number, 1), Some(picture(MOST_BYTES / 2)));
+            outbox.push(report(number, 1), Some(image(MOST_BYTES / 2)));
         }
         assert_eq!((outbox.count(), outbox.dropped.get()), (9, 0));
         for number in 1..=9 {
             let parcel = outbox.first().await;
             assert_eq!(parcel.report.persons, number);
-            assert_eq!(parcel.picture.is_some(), number == 9);
+            assert_eq!(parcel.image.is_some(), number == 9);
         }
     }
 }

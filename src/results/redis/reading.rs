@@ -15,8 +15,8 @@ use redis::{
 
 use super::{keys::Keys, message::is_one_line};
 use crate::results::{
-    Cameras, FOLLOWED_FOR, FollowedNumber, NewPicture, NewReport, ReportId, ResultUse,
-    StoredPicture, StoredReport,
+    Cameras, FOLLOWED_FOR, FollowedNumber, NewImage, NewReport, ReportId, ResultUse, StoredImage,
+    StoredReport,
 };
 
 /// The script that deletes a camera.
@@ -62,7 +62,7 @@ impl Reader<'_> {
         let mut call = script.prepare_invoke();
         call.key(&keys.index()[..]);
         call.arg(keys.prefix_of_cameras());
-        call.arg(keys.prefix_of_pictures()).arg(camera);
+        call.arg(keys.prefix_of_images()).arg(camera);
         call.invoke_async(&mut self.connection).await
     }
 
@@ -154,19 +154,16 @@ impl Reader<'_> {
         self.found(each, cameras.collect()).await
     }
 
-    pub(super) async fn picture(
-        &mut self,
-        camera: &str,
-    ) -> RedisResult<Option<Arc<StoredPicture>>> {
+    pub(super) async fn image(&mut self, camera: &str) -> RedisResult<Option<Arc<StoredImage>>> {
         let mut parts = cmd("HMGET");
-        parts.arg(self.keys.picture(camera));
+        parts.arg(self.keys.image(camera));
         parts.arg("id").arg("frame").arg("sketch");
         let parts = parts.query_async(&mut self.connection);
         let (id, frame, sketch): (Option<String>, Option<Vec<u8>>, Option<Vec<u8>>) = parts.await?;
         let stored = || {
-            Some(Arc::new(StoredPicture {
+            Some(Arc::new(StoredImage {
                 id: id?.parse().ok()?,
-                picture: NewPicture {
+                image: NewImage {
                     frame: frame?.into(),
                     sketch: sketch?.into(),
                 },
@@ -224,15 +221,15 @@ impl Reader<'_> {
         counts.cmd("ZCARD").arg(self.keys.cameras());
         counts.cmd("ZCARD").arg(self.keys.earlier());
         counts.cmd("HGET").arg(self.keys.totals()).arg("bytes");
-        counts.cmd("ZCARD").arg(self.keys.pictures());
+        counts.cmd("ZCARD").arg(self.keys.images());
         let counts = counts.query_async(&mut self.connection);
-        let (cameras, earlier, bytes, pictures): (usize, usize, Option<usize>, usize) =
+        let (cameras, earlier, bytes, images): (usize, usize, Option<usize>, usize) =
             counts.await?;
         Ok(ResultUse {
             cameras,
             reports: cameras + earlier,
             bytes: bytes.unwrap_or_default(),
-            pictures,
+            images,
         })
     }
 

@@ -8,7 +8,7 @@ local received_at, persons, json, frame, sketch = unpack(ARGV, 8, 12)
 local bytes = tonumber(ARGV[13])
 local most_cameras, most_of_camera = tonumber(ARGV[14]), tonumber(ARGV[15])
 local most_reports, most_bytes = tonumber(ARGV[16]), tonumber(ARGV[17])
-local most_pictures, max_age_seconds = tonumber(ARGV[18]), tonumber(ARGV[19])
+local most_images, max_age_seconds = tonumber(ARGV[18]), tonumber(ARGV[19])
 -- Most expired reports that one call removes: more in the first call of a second than in others.
 local OLD_AT_A_TIME, OLD_IN_BETWEEN = 100, 2
 -- Most servers whose last number is kept. The one with the oldest goes first.
@@ -48,19 +48,19 @@ redis.call('SPUBLISH', channel, message)
 redis.call('SPUBLISH', channel_of_all, message)
 
 -- The image is that of the latest report. A report without an image removes it.
-local is_first_picture = false
+local is_first_image = false
 if frame == '' then
-  forget_picture(camera)
+  forget_image(camera)
 else
-  local picture = prefix_of_pictures .. camera
-  redis.call('DEL', picture)
-  redis.call('HSET', picture, 'id', micros, 'frame', frame, 'sketch', sketch)
-  redis.call('EXPIRE', picture, max_age_seconds)
-  redis.call('ZADD', pictures, micros, camera)
-  local count = redis.call('ZCARD', pictures)
-  is_first_picture = count == 1
-  for _ = most_pictures + 1, count do
-    forget_picture(redis.call('ZRANGE', pictures, 0, 0)[1])
+  local image_key = prefix_of_images .. camera
+  redis.call('DEL', image_key)
+  redis.call('HSET', image_key, 'id', micros, 'frame', frame, 'sketch', sketch)
+  redis.call('EXPIRE', image_key, max_age_seconds)
+  redis.call('ZADD', images, micros, camera)
+  local count = redis.call('ZCARD', images)
+  is_first_image = count == 1
+  for _ = most_images + 1, count do
+    forget_image(redis.call('ZRANGE', images, 0, 0)[1])
   end
 end
 
@@ -108,10 +108,10 @@ end
 
 redis.call('HSET', totals, 'last', micros, 'bytes', string.format('%.0f', total + bytes - freed))
 redis.call('EXPIRE', stream, max_age_seconds)
-if is_new_second or is_first_earlier or is_first_picture or not before then
-  redis.call('ZREMRANGEBYSCORE', pictures, '-inf', oldest)
+if is_new_second or is_first_earlier or is_first_image or not before then
+  redis.call('ZREMRANGEBYSCORE', images, '-inf', oldest)
   redis.call('ZREMRANGEBYRANK', senders, 0, -MOST_SENDERS - 1)
-  for _, key in ipairs({earlier, cameras, latest, totals, pictures, senders}) do
+  for _, key in ipairs({earlier, cameras, latest, totals, images, senders}) do
     redis.call('EXPIRE', key, max_age_seconds)
   end
 end

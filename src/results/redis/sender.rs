@@ -70,21 +70,21 @@ impl Sender<'_> {
     async fn record(
         &self,
         mut connection: MultiplexedConnection,
-        PendingReport { report, picture }: &PendingReport,
+        PendingReport { report, image }: &PendingReport,
         number: u64,
     ) -> RedisResult<()> {
         let (keys, limits) = (&self.shared.keys, &self.shared.limits);
         let mut call = self.script.prepare_invoke();
         call.key(&keys.index()[..]).key(keys.senders());
         call.arg(keys.prefix_of_cameras());
-        call.arg(keys.prefix_of_pictures()).arg(&report.camera);
+        call.arg(keys.prefix_of_images()).arg(&report.camera);
         call.arg(keys.channel(&Cameras::One(report.camera.clone())));
         call.arg(keys.channel(&Cameras::All));
         call.arg(&self.id[..]).arg(number);
         call.arg(report.received_at.to_string());
         call.arg(report.persons).arg(&report.json[..]);
         // An empty image means that there is none.
-        let parts = picture.as_ref().map(|it| [&it.frame[..], &it.sketch[..]]);
+        let parts = image.as_ref().map(|it| [&it.frame[..], &it.sketch[..]]);
         let [frame, sketch] = parts.unwrap_or_default();
         call.arg(frame).arg(sketch);
         call.arg(report.bytes());
@@ -93,7 +93,7 @@ impl Sender<'_> {
             limits.history_per_camera.get(),
             limits.max_reports.get(),
             limits.max_bytes,
-            limits.max_pictures.get(),
+            limits.max_images.get(),
         ] {
             call.arg(limit);
         }

@@ -92,7 +92,7 @@ async fn unusable_tensors_are_refused_in_one_sentence() {
         ),
         (
             json!([{ "name": "image", "datatype": "BYTES", "shape": [1],
-                "parameters": { "shared_memory_region": "pictures", "shared_memory_byte_size": 9 } }]),
+                "parameters": { "shared_memory_region": "images", "shared_memory_byte_size": 9 } }]),
             "shared memory is not supported",
         ),
         (

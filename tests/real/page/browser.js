@@ -13,7 +13,7 @@ const AXE = readFileSync(require.resolve("axe-core/axe.min.js"), "utf8");
 export const SERVER = process.env.LOOKDOWN_URL;
 export const SAMPLES = process.env.LOOKDOWN_SAMPLES;
 /** The folder of screenshots. None are taken if it is unset. */
-const PICTURES = process.env.LOOKDOWN_PAGE_PICTURES;
+const IMAGES = process.env.LOOKDOWN_PAGE_IMAGES;
 export const WIDE = { width: 1440, height: 900 };
 export const PHONE = { width: 390, height: 844 };
 
@@ -100,8 +100,8 @@ export async function assertFits(page) {
 }
 
 /** Takes a screenshot of the whole page, if screenshots are enabled. */
-export async function picture(page, name) {
-  if (!PICTURES) return;
+export async function screenshot(page, name) {
+  if (!IMAGES) return;
   await page.mouse.move(0, 0);
-  await page.screenshot({ path: `${PICTURES}/page-${name}.jpg`, type: "jpeg", quality: 80, fullPage: true });
+  await page.screenshot({ path: `${IMAGES}/page-${name}.jpg`, type: "jpeg", quality: 80, fullPage: true });
 }

@@ -1,7 +1,7 @@
 /** The section Cameras of `lookdown run`: a camera is added, tested, used in the other sections, changed and removed. */
 
 import assert from "node:assert/strict";
-import { PHONE, WIDE, assertAccessible, assertFits, pageTest, picture } from "./browser.js";
+import { PHONE, WIDE, assertAccessible, assertFits, pageTest, screenshot } from "./browser.js";
 
 /** The addresses of `lookdown run` without cameras, of one with a camera of its settings, and of a camera with the user `viewer`. */
 const { LOOKDOWN_RUN_URL: RUN, LOOKDOWN_SETTINGS_RUN_URL: SETTINGS_RUN, LOOKDOWN_CAMERA_URL: CAMERA, LOOKDOWN_CAMERA_PASSWORD: PASSWORD } = process.env;
@@ -118,12 +118,12 @@ for (const [device, viewport, colorScheme] of [["wide", WIDE, "dark"], ["phone",
       await page.locator(".card .plot").first().waitFor();
       await assertFits(page);
       await assertAccessible(page);
-      await picture(page, `camera-${device}`);
+      await screenshot(page, `camera-${device}`);
       await page.getByRole("button", { name: "Add a camera" }).click();
       await page.getByText("URLs of common makers").click();
       await assertFits(page);
       await assertAccessible(page);
-      await picture(page, `add-camera-${device}`);
+      await screenshot(page, `add-camera-${device}`);
     },
     { server: RUN, viewport, colorScheme, expected: /status of 404/ },
   );

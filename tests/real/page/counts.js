@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { readFile, readdir } from "node:fs/promises";
 import test from "node:test";
-import { PHONE, SERVER, WIDE, assertAccessible, assertFits, pageTest, picture } from "./browser.js";
+import { PHONE, SERVER, WIDE, assertAccessible, assertFits, pageTest, screenshot } from "./browser.js";
 
 /** The address of the server, that of one whose counts are gone, a folder of frames of a walk, and its true crossings. */
 const { LOOKDOWN_COUNTED_URL: COUNTED, LOOKDOWN_UNCOUNTED_URL: UNCOUNTED, LOOKDOWN_WALK: WALK } = process.env;
@@ -72,7 +72,7 @@ for (const [device, viewport, colorScheme] of [["wide", WIDE, "light"], ["phone"
       await assertAccessible(page);
       await page.getByLabel("Heat map").check();
       await card.locator("image").waitFor();
-      if (device === "wide") await picture(page, "counts-wide");
+      if (device === "wide") await screenshot(page, "counts-wide");
       await page.getByLabel("Heat map").uncheck();
       await card.locator("image").waitFor({ state: "detached" });
     },
@@ -123,7 +123,7 @@ pageTest(
     await card.getByRole("button", { name: "Zones" }).click();
     await page.getByRole("button", { name: "Area from walks" }).click();
     await page.getByRole("button", { name: /^Area 1 \d+ corners, on the floor/ }).waitFor();
-    await picture(page, "area-from-walks");
+    await screenshot(page, "area-from-walks");
     await page.getByRole("button", { name: "Save walks" }).click();
     await page.getByText("walks is saved and in use.").waitFor();
     const { areas } = await (await fetch(`${COUNTED}/calibrations/walks`)).json();

@@ -33,7 +33,7 @@ pageTest("a sample is picked with the keyboard, and its persons are found", "#de
   assert.equal(await page.locator("#count").textContent(), "6");
   assert.match(await page.locator("#announcement").textContent(), /^6 persons found in \d+ milliseconds\.$/);
   assert.equal(await page.locator("#timings dt").count(), 6);
-  assert.match(await page.locator("#picture").getAttribute("alt"), /office\.jpg/);
+  assert.match(await page.locator("#frame").getAttribute("alt"), /office\.jpg/);
 });
 
 pageTest("an own image has not the calibration of a sample", "#detect", async (page) => {
@@ -48,14 +48,14 @@ pageTest("the marks are at the positions of the report", "#detect", async (page)
   const report = await reportAfter(page, () => detectSample(page, "office"));
   const [first] = report.persons;
   // Measured at the same moment, as later layout may move them.
-  const [picture, badge] = await page.evaluate(() =>
-    ["#picture", "#marks [data-person='0'] circle"].map((name) => document.querySelector(name).getBoundingClientRect().toJSON()),
+  const [image, badge] = await page.evaluate(() =>
+    ["#frame", "#marks [data-person='0'] circle"].map((name) => document.querySelector(name).getBoundingClientRect().toJSON()),
   );
-  const scale = Math.min(picture.width, picture.height) / 960;
+  const scale = Math.min(image.width, image.height) / 960;
   const at = (box, side, start) => box[start] + box[side] / 2;
   const fromCenter = (value) => (value - 480) * scale;
-  assert.ok(Math.abs(at(badge, "width", "x") - at(picture, "width", "x") - fromCenter(first.oriented_box.cx)) < 1);
-  assert.ok(Math.abs(at(badge, "height", "y") - at(picture, "height", "y") - fromCenter(first.oriented_box.cy)) < 1);
+  assert.ok(Math.abs(at(badge, "width", "x") - at(image, "width", "x") - fromCenter(first.oriented_box.cx)) < 1);
+  assert.ok(Math.abs(at(badge, "height", "y") - at(image, "height", "y") - fromCenter(first.oriented_box.cy)) < 1);
 });
 
 pageTest("a frame is dropped, pasted or opened", "#detect", async (page) => {

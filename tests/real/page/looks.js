@@ -3,7 +3,7 @@
 
 import assert from "node:assert/strict";
 import test from "node:test";
-import { PHONE, SERVER, WIDE, assertAccessible, assertFits, detectSample, pageTest, picture, post, reportAfter } from "./browser.js";
+import { PHONE, SERVER, WIDE, assertAccessible, assertFits, detectSample, pageTest, post, reportAfter, screenshot } from "./browser.js";
 
 const SECTIONS = {
   Views: ".tile",
@@ -45,7 +45,7 @@ for (const [device, viewport] of [["wide", WIDE], ["phone", PHONE]]) {
     const look = async (page) => {
       // The wide screen in light mode, the phone in dark mode.
       const isKept = (device === "wide") === (colorScheme === "light");
-      const keep = (name) => isKept && picture(page, `${name}-${device}`);
+      const keep = (name) => isKept && screenshot(page, `${name}-${device}`);
       await assertFits(page);
       await assertAccessible(page);
       await keep("empty");

@@ -53,12 +53,12 @@ def prove(effort: Effort) -> list[Row]:
 def _jump(row: Row, address: str, clock: Path, jump: str) -> str:
     """Returns the year in the date of a report after the jump."""
     began = time.monotonic()
-    picture = OFFICE.read_bytes()
-    whole = request("POST", DETECT, picture, {"Content-Type": "image/jpeg", "Connection": "close"})
+    frame = OFFICE.read_bytes()
+    whole = request("POST", DETECT, frame, {"Content-Type": "image/jpeg", "Connection": "close"})
     with contextlib.closing(connect(address)) as slow:
         slow.sendall(whole[: len(whole) // 2])
         clock.write_text(jump, encoding="ascii")
-        report = ask(address, "POST", DETECT, picture)
+        report = ask(address, "POST", DETECT, frame)
         try:
             status = read_answer(slow).status
         except (Lost, OSError) as error:
@@ -75,6 +75,6 @@ def _jump(row: Row, address: str, clock: Path, jump: str) -> str:
     put = ask(address, "PUT", "/calibrations/office", json.dumps(body).encode()).status
     row.require(put == 200, f"{jump}: a calibration was answered {put}")
     clock.write_text("+0", encoding="ascii")
-    again = ask(address, "POST", DETECT, picture).status
+    again = ask(address, "POST", DETECT, frame).status
     row.require(again == 200, f"back from {jump}: a frame was answered {again}")
     return report.json()["received_at"][:4] if report.status == 200 else "?"

@@ -55,9 +55,9 @@ def _playlist(folder: Path) -> Row:
         row.skipped = "there is no ffmpeg"
         return row
     other = folder / "other.ts"
-    picture = ["-loop", "1", "-i", SAMPLES / "office.jpg", "-t", "2", "-r", "5", "-pix_fmt", "yuv420p"]
+    frames = ["-loop", "1", "-i", SAMPLES / "office.jpg", "-t", "2", "-r", "5", "-pix_fmt", "yuv420p"]
     scaled = ["-vf", "scale=640:640", "-f", "mpegts", other]
-    subprocess.run(["ffmpeg", "-v", "error", *picture, *scaled], check=True)
+    subprocess.run(["ffmpeg", "-v", "error", *frames, *scaled], check=True)
     reports = 0
     for text in (
         f"#EXTM3U\n#EXT-X-TARGETDURATION:2\n#EXTINF:2,\n{other}\n#EXT-X-ENDLIST\n",

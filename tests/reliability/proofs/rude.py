@@ -40,26 +40,26 @@ VISITS = 10
 
 def prove(effort: Effort) -> list[Row]:
     """Returns a row for each kind of client."""
-    picture = OFFICE.read_bytes()
-    whole = request("POST", DETECT, picture, {"Content-Type": "image/jpeg"})
-    head = len(whole) - len(picture)
+    frame = OFFICE.read_bytes()
+    whole = request("POST", DETECT, frame, {"Content-Type": "image/jpeg"})
+    head = len(whole) - len(frame)
     kinds = {
         "heads, a byte now and then": lambda link: _drip(link, whole[: head - 4], start=20),
         "bodies, a byte now and then": lambda link: _drip(link, whole[: head + 1000], start=head),
         "silent connections": lambda link: _wait_for_end(link),
         "silence after an answer": lambda link: _silent_after(link),
-        "gone in the middle of an upload": lambda link: _send_and_vanish(link, whole[: head + len(picture) // 2]),
+        "gone in the middle of an upload": lambda link: _send_and_vanish(link, whole[: head + len(frame) // 2]),
         "gone while they wait": lambda link: _send_and_vanish(link, whole),
     }
     with lookdown(SETTINGS) as server:
-        ask(server.address, "POST", DETECT, picture)
+        ask(server.address, "POST", DETECT, frame)
         return [
-            _beside(server, name, client, effort.rude_clients, VISITS if name.startswith("gone") else 1, picture)
+            _beside(server, name, client, effort.rude_clients, VISITS if name.startswith("gone") else 1, frame)
             for name, client in kinds.items()
         ]
 
 
-def _beside(server: Server, name: str, client: Callable, count: int, visits: int, picture: bytes) -> Row:
+def _beside(server: Server, name: str, client: Callable, count: int, visits: int, frame: bytes) -> Row:
     row = Row(name, f"{count} at a time{f', {visits} times each' if visits > 1 else ''}, and a good client beside them")
     before, began, held = holdings(server.pid), time.monotonic(), []
     threads = [threading.Thread(target=_be, args=(server.address, client, visits, held)) for _ in range(count)]
@@ -69,7 +69,7 @@ def _beside(server: Server, name: str, client: Callable, count: int, visits: int
     while any(thread.is_alive() for thread in threads) and time.monotonic() - began < 2 * LONGEST_SECONDS:
         asked = time.monotonic()
         try:
-            status = ask(server.address, "POST", DETECT, picture).status
+            status = ask(server.address, "POST", DETECT, frame).status
         except (Lost, OSError) as error:
             status = f"none ({error})"
         waits.append(time.monotonic() - asked)

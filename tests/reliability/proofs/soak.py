@@ -30,16 +30,16 @@ def prove(effort: Effort) -> list[Row]:
     """Runs with the default settings and a real model."""
     minutes = effort.soak_seconds / 60
     row = Row("soak", f"{minutes:.1f} min at {LOAD:.0%} of the capacity, profile `fast`, and four kinds of bad input")
-    picture = OFFICE.read_bytes()
+    frame = OFFICE.read_bytes()
     with tempfile.TemporaryDirectory() as name, lookdown({"LOG__FILTER": "error"}) as server:
         folder = Path(name)
         capacity = load(server, [DETECT], OFFICE, clients=4, seconds=3.0)["succeeded_per_second"]
         streams = [
-            ("200", DETECT, picture, LOAD * capacity),
+            ("200", DETECT, frame, LOAD * capacity),
             ("415", DETECT, b"no image at all", BAD_PER_SECOND),
-            ("422", DETECT, picture[: len(picture) // 2], BAD_PER_SECOND),
-            ("422", "/detect?score_threshold=2", picture, BAD_PER_SECOND),
-            ("404", "/detect?calibration=unknown", picture, BAD_PER_SECOND),
+            ("422", DETECT, frame[: len(frame) // 2], BAD_PER_SECOND),
+            ("422", "/detect?score_threshold=2", frame, BAD_PER_SECOND),
+            ("404", "/detect?calibration=unknown", frame, BAD_PER_SECOND),
         ]
         with Watch(server.pid, effort.soak_seconds / 200) as watch:
             statuses = [

@@ -68,10 +68,10 @@ def prove(effort: Effort) -> list[Row]:
 
 def start_clients(server: Server, tally: Tally) -> list[Client]:
     """Starts the same number of clients of every kind."""
-    picture = OFFICE.read_bytes()
+    frame = OFFICE.read_bytes()
     headers = {"Content-Type": "image/jpeg"}
-    kept = request("POST", DETECT, picture, headers)
-    alone = request("POST", DETECT, picture, headers | {"Connection": "close"})
+    kept = request("POST", DETECT, frame, headers)
+    alone = request("POST", DETECT, frame, headers | {"Connection": "close"})
     clients = []
     for index in range(CLIENTS):
         keeps = index % 2 == 0

@@ -24,7 +24,7 @@ pub struct ImageGrid {
 #[derive(Debug, Clone)]
 pub struct GridCell {
     /// The image.
-    pub picture: Frame,
+    pub image: Frame,
     /// Text below the image.
     pub caption: String,
 }
@@ -51,7 +51,7 @@ impl ImageGrid {
             text.write(&mut sheet, name, [*margin, f64::from(top)], INK);
             for (column, cell) in cells.iter().enumerate() {
                 let (left, top) = layout.corner(row, column);
-                paste(&mut sheet, &cell.picture, left, top);
+                paste(&mut sheet, &cell.image, left, top);
                 let below = f64::from(top + layout.cell_height) + margin / 2.0;
                 text.write(&mut sheet, &cell.caption, [f64::from(left), below], INK);
             }
@@ -75,9 +75,9 @@ struct Layout {
 
 impl Layout {
     fn of(grid: &ImageGrid) -> Self {
-        let pictures = || grid.rows.iter().flat_map(|(_, cells)| cells);
-        let widths = pictures().map(|cell| cell.picture.width());
-        let heights = pictures().map(|cell| cell.picture.height());
+        let cells = || grid.rows.iter().flat_map(|(_, cells)| cells);
+        let widths = cells().map(|cell| cell.image.width());
+        let heights = cells().map(|cell| cell.image.height());
         let (cell_width, cell_height) = (widths.max().unwrap_or(1), heights.max().unwrap_or(1));
         let text = Text::new((f64::from(cell_width) * TEXT_SHARE).max(12.0));
         let margin = text.height() * MARGIN_SHARE;
@@ -122,10 +122,10 @@ fn whole(pixels: f64) -> u32 {
     }
 }
 
-fn paste(sheet: &mut Frame, picture: &Frame, left: u32, top: u32) {
+fn paste(sheet: &mut Frame, image: &Frame, left: u32, top: u32) {
     let stride = sheet.width() as usize * 3;
-    let bytes = picture.width() as usize * 3;
-    let rows = picture.pixels().chunks_exact(bytes);
+    let bytes = image.width() as usize * 3;
+    let rows = image.pixels().chunks_exact(bytes);
     let start = top as usize * stride + left as usize * 3;
     let lines = sheet.pixels_mut()[start..].chunks_mut(stride);
     for (row, line) in rows.zip(lines) {
@@ -139,7 +139,7 @@ mod tests {
 
     fn cell(value: u8, width: u32) -> GridCell {
         GridCell {
-            picture: Frame::new(width, 40, vec![value; width as usize * 40 * 3]).unwrap(),
+            image: Frame::new(width, 40, vec![value; width as usize * 40 * 3]).unwrap(),
             caption: "3 boxes".to_owned(),
         }
     }

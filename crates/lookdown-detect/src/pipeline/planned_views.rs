@@ -39,8 +39,9 @@ pub struct PlannedViews {
     /// The mean number of views that cover a position in the lens image.
     pub mean_views: f64,
     /// The number of network inputs of the first pass over every frame.
-    pub pictures: usize,
-    /// The maximum number of additional upright crops around possible persons, with mirrored copies.
+    pub images: usize,
+    /// The maximum number of additional upright crops around possible persons, with mirrored
+    /// copies.
     pub crops_at_most: usize,
     /// The number of runs of the network in the first pass.
     pub batches: usize,
@@ -105,7 +106,7 @@ impl Engine {
         let coverage = views
             .as_ref()
             .map(|views| Coverage::of(lens, views, image_width, image_height));
-        let pictures = views.as_ref().map_or(1, Vec::len);
+        let images = views.as_ref().map_or(1, Vec::len);
         Ok(PlannedViews {
             profile,
             model: model.name().to_owned(),
@@ -113,10 +114,10 @@ impl Engine {
             image_height,
             seen_share: coverage.map_or(1.0, |coverage| coverage.seen_share),
             mean_views: coverage.map_or(1.0, |coverage| coverage.mean_views),
-            pictures,
+            images,
             crops_at_most: profile.max_crop_inputs(),
-            batches: pictures.div_ceil(options.batches.max_views.get()),
-            pixels: pictures as u64 * u64::from(input.width) * u64::from(input.height),
+            batches: images.div_ceil(options.batches.max_views.get()),
+            pixels: images as u64 * u64::from(input.width) * u64::from(input.height),
             views: views
                 .into_iter()
                 .flatten()

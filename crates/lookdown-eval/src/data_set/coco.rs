@@ -15,7 +15,7 @@ use lookdown_detect::detection::BBox;
 use lookdown_lens::calibration::{Calibration, CalibrationError, CalibrationId};
 use serde::Deserialize;
 
-use super::{DataSet, DataSetError, DataSetImage, ImageId, PictureIndex, text::read_text};
+use super::{DataSet, DataSetError, DataSetImage, ImageFileIndex, ImageId, text::read_text};
 use crate::{AnnotatedPerson, Outline, RotatedBox, Scoring};
 
 /// The largest common file, that of COCO's training set, has 450 MB.
@@ -71,11 +71,11 @@ pub(super) fn read_own_folder(folder: &Path, file: &Path) -> Result<DataSet, Dat
 /// Reads annotation files as one data set.
 pub(super) fn read_files(
     files: &[PathBuf],
-    pictures: &PictureIndex,
+    image_files: &ImageFileIndex,
 ) -> Result<DataSet, DataSetError> {
     let mut reader = Reader::default();
     for file in files {
-        reader.read(file, None, |name| pictures.by_file_name(name))?;
+        reader.read(file, None, |name| image_files.by_file_name(name))?;
     }
     Ok(reader.data_set())
 }
@@ -120,7 +120,7 @@ impl Reader {
         &mut self,
         path: &Path,
         mut calibrations: Option<&mut Calibrations>,
-        picture: impl Fn(&Path) -> Result<PathBuf, String>,
+        image_file: impl Fn(&Path) -> Result<PathBuf, String>,
     ) -> Result<(), DataSetError> {
         let wrong = |problem: String| DataSetError::Annotations {
             path: path.to_owned(),
@@ -136,9 +136,9 @@ impl Reader {
                     image.id
                 )));
             }
-            let picture =
-                picture(&image.file_name).map_err(|problem| wrong(format!("images: {problem}")))?;
-            let mut read = DataSetImage::empty(image.id.clone(), picture);
+            let image_file = image_file(&image.file_name)
+                .map_err(|problem| wrong(format!("images: {problem}")))?;
+            let mut read = DataSetImage::empty(image.id.clone(), image_file);
             read.size = image.width.zip(image.height).map(Into::into);
             if let (Some(calibrations), Some(id)) = (calibrations.as_mut(), &image.calibration) {
                 let id: CalibrationId = id

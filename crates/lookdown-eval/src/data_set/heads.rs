@@ -7,7 +7,9 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{DataSet, DataSetError, DataSetImage, ImageId, pictures::pictures_in, text::read_text};
+use super::{
+    DataSet, DataSetError, DataSetImage, ImageId, image_files::image_files_in, text::read_text,
+};
 use crate::{AnnotatedPerson, Outline, Scoring};
 
 const MAX_BYTES: u64 = 64 * 1024 * 1024;
@@ -47,21 +49,21 @@ fn read(path: &Path, images: &mut Vec<DataSetImage>) -> Result<(), DataSetError>
         .map(|folder| folder.join(sequence))
         .find(|folder| folder.is_dir())
         .ok_or_else(|| wrong(format!("there is no folder {sequence}/ with its images")))?;
-    let pictures = pictures_in(&folder)?;
+    let image_files = image_files_in(&folder)?;
     let text = read_text(path, MAX_BYTES)?;
     let rows: Vec<_> = text.lines().filter(|row| !row.trim().is_empty()).collect();
-    if rows.len() != pictures.len() {
+    if rows.len() != image_files.len() {
         return Err(wrong(format!(
             "it has {} rows, but {} has {} images; there must be a row for each",
             rows.len(),
             folder.display(),
-            pictures.len()
+            image_files.len()
         )));
     }
-    for (index, (row, picture)) in rows.into_iter().zip(pictures).enumerate() {
-        let name = picture.file_name().unwrap_or_default().to_string_lossy();
+    for (index, (row, image_file)) in rows.into_iter().zip(image_files).enumerate() {
+        let name = image_file.file_name().unwrap_or_default().to_string_lossy();
         let id = ImageId::Text(format!("{sequence}/{name}"));
-        let mut image = DataSetImage::empty(id, picture);
+        let mut image = DataSetImage::empty(id, image_file);
         for head in heads(row).map_err(|problem| wrong(format!("row {}: {problem}", index + 1)))? {
             image.add(AnnotatedPerson::from(Outline::Head(head)));
         }

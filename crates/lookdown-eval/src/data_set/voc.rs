@@ -11,7 +11,7 @@ use lookdown_detect::detection::BBox;
 use quick_xml::{Reader, events::Event};
 use serde::Deserialize;
 
-use super::{DataSet, DataSetError, DataSetImage, ImageId, PictureIndex, text::read_text};
+use super::{DataSet, DataSetError, DataSetImage, ImageFileIndex, ImageId, text::read_text};
 use crate::{AnnotatedPerson, Outline, Scoring};
 
 /// The file of a crowded image has some 100 kB.
@@ -58,7 +58,7 @@ struct Bndbox {
 pub(super) fn read_files(
     root: &Path,
     files: &[PathBuf],
-    pictures: &PictureIndex,
+    image_files: &ImageFileIndex,
 ) -> Result<DataSet, DataSetError> {
     let mut images = Vec::with_capacity(files.len());
     let mut is_anything_annotated = false;
@@ -74,7 +74,7 @@ pub(super) fn read_files(
         is_anything_annotated |= !annotation.objects.is_empty();
         let id = path.strip_prefix(root).unwrap_or(path).with_extension("");
         let id = ImageId::Text(id.to_string_lossy().into_owned());
-        images.push(read(path, id, &annotation, pictures).map_err(wrong)?);
+        images.push(read(path, id, &annotation, image_files).map_err(wrong)?);
     }
     let has_persons = images
         .iter()
@@ -119,10 +119,10 @@ fn read(
     path: &Path,
     id: ImageId,
     annotation: &Annotation,
-    pictures: &PictureIndex,
+    image_files: &ImageFileIndex,
 ) -> Result<DataSetImage, String> {
-    let picture = pictures.named_like(path)?;
-    let mut image = DataSetImage::empty(id, picture);
+    let image_file = image_files.named_like(path)?;
+    let mut image = DataSetImage::empty(id, image_file);
     image.size = match &annotation.size {
         Some(Size { width, height }) => Some([
             number("size: width", width)?,

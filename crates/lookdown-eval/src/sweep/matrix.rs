@@ -48,12 +48,12 @@ pub fn matrix(
             .iter()
             .map(|person| mark(person, corner, scale))
             .collect();
-        let mut picture = small.clone();
-        annotate(&mut picture, &Drawing::of(marks));
+        let mut image = small.clone();
+        annotate(&mut image, &Drawing::of(marks));
         let boxes = if found.len() == 1 { "box" } else { "boxes" };
         let ap = evaluated.summary.ap50.all_point_area;
         Some(GridCell {
-            picture,
+            image,
             caption: format!("{} {boxes}, AP {ap:.3}", found.len()),
         })
     };

@@ -111,15 +111,15 @@ fn the_plot_has_a_point_per_iou_threshold() {
 #[test]
 fn the_matrix_is_cropped_to_the_boxes_of_all_cells() {
     let gray = Frame::new(200, 200, vec![90; 200 * 200 * 3]).unwrap();
-    let picture = matrix("tiny".to_owned(), &swept(), &gray, 0).unwrap();
+    let image = matrix("tiny".to_owned(), &swept(), &gray, 0).unwrap();
     // The two boxes lie within columns 20 to 160. With the margin this is a square of 157 pixels.
     assert!(
-        (5 * 157..5 * 157 + 160).contains(&picture.width()),
-        "{picture:?}"
+        (5 * 157..5 * 157 + 160).contains(&image.width()),
+        "{image:?}"
     );
     // The outline of the first box is bluish, that of the second yellowish, with soft edges.
     let count = |more: usize, less: usize| {
-        let pixels = picture.pixels().chunks_exact(3);
+        let pixels = image.pixels().chunks_exact(3);
         let outlined = pixels.filter(|pixel| pixel[more] > pixel[less].saturating_add(60));
         outlined.count()
     };

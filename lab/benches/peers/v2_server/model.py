@@ -27,11 +27,11 @@ class Detector(MLModel):
         return True
 
     async def predict(self, payload: InferenceRequest) -> InferenceResponse:
-        pictures = np.frombuffer(Base64Codec.decode_input(payload.inputs[0])[0], np.uint8)
-        pictures = pictures.reshape(-1, 3, self.size, self.size)
+        views = np.frombuffer(Base64Codec.decode_input(payload.inputs[0])[0], np.uint8)
+        views = views.reshape(-1, 3, self.size, self.size)
         rows = []
-        for start in range(0, len(pictures), self.batch):
-            tensor = pictures[start : start + self.batch].astype(np.float32)
+        for start in range(0, len(views), self.batch):
+            tensor = views[start : start + self.batch].astype(np.float32)
             found = self.session.run(["boxes", "scores"], {"images": tensor})
             for view, (boxes, scores) in enumerate(zip(*found), start):
                 good = scores >= SCORE

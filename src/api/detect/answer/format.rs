@@ -24,18 +24,18 @@ pub(super) enum AnswerFormat {
     /// The report.
     Report,
     /// The annotated image.
-    Picture(ImageFormat),
+    Image(ImageFormat),
     /// A file for annotation tools.
     Annotations(AnnotationFormat, BoxKind),
 }
 
 /// The names of the report and of the annotated image.
 const REPORT: &str = "json";
-const PICTURE: &str = "image";
+const IMAGE: &str = "image";
 const ANNOTATIONS: &[&str] = <AnnotationFormat as VariantNames>::VARIANTS;
 const NAMES: [&str; 2 + ANNOTATIONS.len()] = {
     let mut names = [REPORT; 2 + ANNOTATIONS.len()];
-    names[1] = PICTURE;
+    names[1] = IMAGE;
     let (_, annotations) = names.split_at_mut(2);
     annotations.copy_from_slice(ANNOTATIONS);
     names
@@ -70,19 +70,18 @@ parameter_table! {
 const GEOJSON: AnswerFormat =
     AnswerFormat::Annotations(AnnotationFormat::GeoJson, BoxKind::Oriented);
 
-const PICTURES: [(AnswerFormat, &str); 2] =
-    [of_picture(ImageFormat::Jpeg), of_picture(ImageFormat::Png)];
+const IMAGES: [(AnswerFormat, &str); 2] = [of_image(ImageFormat::Jpeg), of_image(ImageFormat::Png)];
 /// The formats that `Accept` can select. The media types of the other formats are not specific to
 /// them.
 const NEGOTIABLE: [(AnswerFormat, &str); 4] = [
     (AnswerFormat::Report, AnswerFormat::Report.media_type()),
-    PICTURES[0],
-    PICTURES[1],
+    IMAGES[0],
+    IMAGES[1],
     (GEOJSON, GEOJSON.media_type()),
 ];
 
-const fn of_picture(format: ImageFormat) -> (AnswerFormat, &'static str) {
-    let format = AnswerFormat::Picture(format);
+const fn of_image(format: ImageFormat) -> (AnswerFormat, &'static str) {
+    let format = AnswerFormat::Image(format);
     (format, format.media_type())
 }
 
@@ -103,7 +102,7 @@ impl AnswerFormat {
         let format = match given.text(&FORMAT) {
             None => accepted.best_of(&NEGOTIABLE).ok_or_else(not_acceptable)?,
             Some(REPORT) => Self::Report,
-            Some(PICTURE) => accepted.best_of(&PICTURES).unwrap_or(PICTURES[0].0),
+            Some(IMAGE) => accepted.best_of(&IMAGES).unwrap_or(IMAGES[0].0),
             Some(name) => Self::Annotations(FORMAT.parse(name)?, boxes),
         };
         if boxes == BoxKind::Oriented && !format.has_oriented_boxes() {
@@ -123,8 +122,8 @@ impl AnswerFormat {
     pub(super) const fn media_type(self) -> &'static str {
         match self {
             Self::Report => "application/json",
-            Self::Picture(ImageFormat::Jpeg) => "image/jpeg",
-            Self::Picture(ImageFormat::Png) => "image/png",
+            Self::Image(ImageFormat::Jpeg) => "image/jpeg",
+            Self::Image(ImageFormat::Png) => "image/png",
             Self::Annotations(format, _) => format.media_type(),
         }
     }

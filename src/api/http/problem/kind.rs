@@ -79,8 +79,8 @@ problems! {
     UnknownCamera = NOT_FOUND "unknown-camera" "Unknown camera"
         => "`GET /results` lists the cameras that have reports.";
     /// The result store has no image of the camera.
-    PictureNotKept = NOT_FOUND "picture-not-kept" "Image not stored"
-        => "Add the camera to `results.pictures`.";
+    ImageNotKept = NOT_FOUND "image-not-kept" "Image not stored"
+        => "Add the camera to `results.images`.";
     /// The model is not loaded.
     UnknownModel = NOT_FOUND "unknown-model" "Unknown model"
         => "`POST /v2/repository/index` lists the models.";

@@ -64,7 +64,7 @@ pub(in crate::api) struct ViewPlanInfo {
 #[derive(Serialize, ToSchema)]
 pub(in crate::api) struct PlanCost {
     /// Number of images that the model receives for every frame.
-    pictures: usize,
+    images: usize,
     /// Largest number of additional upright crops of the frame around possible persons.
     crops_at_most: usize,
     /// Number of batches for the images of every frame.
@@ -255,7 +255,7 @@ impl From<&PlannedViews> for ViewPlanInfo {
             coverage: plan.seen_share,
             overlap: plan.mean_views,
             cost: PlanCost {
-                pictures: plan.pictures,
+                images: plan.images,
                 crops_at_most: plan.crops_at_most,
                 batches: plan.batches,
                 pixels: plan.pixels,

@@ -15,24 +15,24 @@ fn kept([max_cameras, history_per_camera, max_reports, max_bytes]: [usize; 4]) -
         history_per_camera: count(history_per_camera),
         max_reports: count(max_reports),
         max_bytes,
-        max_pictures: count(2),
+        max_images: count(2),
         max_listeners: NonZeroUsize::MIN,
         max_age: Duration::from_hours(24),
     })
 }
 
-fn add_with_picture(kept: &mut Kept, camera: &str) -> ReportId {
+fn add_with_image(kept: &mut Kept, camera: &str) -> ReportId {
     let report = NewReport {
         camera: camera.to_owned(),
         received_at: Timestamp::UNIX_EPOCH,
         persons: 0,
         json: Bytes::new(),
     };
-    let picture = NewPicture {
+    let image = NewImage {
         frame: Bytes::from_static(b"frame"),
         sketch: Bytes::from_static(b"sketch"),
     };
-    kept.add(report, Some(picture), Timestamp::UNIX_EPOCH).id
+    kept.add(report, Some(image), Timestamp::UNIX_EPOCH).id
 }
 
 fn add(kept: &mut Kept, camera: &str, length: usize) -> ReportId {
@@ -119,26 +119,26 @@ fn a_report_above_the_byte_limit_evicts_everything() {
 #[test]
 fn a_camera_has_the_image_of_its_latest_report_or_none() {
     let mut kept = kept([2, 1, 100, 1 << 20]);
-    add_with_picture(&mut kept, "a");
-    let id = add_with_picture(&mut kept, "a");
-    assert_eq!(kept.picture("a").unwrap().id, id);
+    add_with_image(&mut kept, "a");
+    let id = add_with_image(&mut kept, "a");
+    assert_eq!(kept.image("a").unwrap().id, id);
     add(&mut kept, "a", 1);
-    assert!(kept.picture("a").is_none());
+    assert!(kept.image("a").is_none());
     // The image is evicted with its camera.
-    add_with_picture(&mut kept, "a");
+    add_with_image(&mut kept, "a");
     add(&mut kept, "b", 1);
     add(&mut kept, "c", 1);
-    assert!(kept.picture("a").is_none());
-    assert_eq!(kept.usage().pictures, 0);
+    assert!(kept.image("a").is_none());
+    assert_eq!(kept.usage().images, 0);
 }
 
 #[test]
 fn the_oldest_image_is_evicted_first() {
     let mut kept = kept(ROOMY);
     for camera in ["a", "b", "a", "c"] {
-        add_with_picture(&mut kept, camera);
+        add_with_image(&mut kept, camera);
     }
-    let there = ["a", "b", "c"].map(|camera| kept.picture(camera).is_some());
+    let there = ["a", "b", "c"].map(|camera| kept.image(camera).is_some());
     assert_eq!(there, [true, false, true]);
 }
 
@@ -173,24 +173,24 @@ fn reports_beyond_their_age_are_removed() {
     let mut kept = kept(ROOMY);
     // The times of these IDs are microseconds apart.
     for camera in ["lobby", "lobby", "hall"] {
-        add_with_picture(&mut kept, camera);
+        add_with_image(&mut kept, camera);
     }
     let hours = |hours| Timestamp::UNIX_EPOCH + SignedDuration::from_hours(hours);
     kept.expire(hours(23));
     assert_eq!((kept.usage().reports, kept.removed_cameras()), (3, 0));
     kept.expire(hours(25));
     assert_eq!((kept.usage().reports, kept.removed_cameras()), (0, 2));
-    assert!(kept.picture("lobby").is_none());
+    assert!(kept.image("lobby").is_none());
 }
 
 #[test]
 fn a_deleted_camera_leaves_the_others() {
     let mut kept = kept(ROOMY);
     for camera in ["lobby", "hall", "lobby"] {
-        add_with_picture(&mut kept, camera);
+        add_with_image(&mut kept, camera);
     }
     assert!(kept.delete("lobby"));
     assert!(!kept.delete("lobby"));
     assert_eq!(kept.cameras(), ["hall"]);
-    assert_eq!((kept.usage().reports, kept.usage().pictures), (1, 1));
+    assert_eq!((kept.usage().reports, kept.usage().images), (1, 1));
 }

@@ -111,7 +111,7 @@ fn wholly_masked_views_skip_inference_and_are_counted() {
     assert_eq!((none.inferred, none.masked, batches), (0, 18, 0));
     // The planned views have the same count.
     let planned = engine.planned_views(&calibration(RIGHT_HALF), Profile::Balanced);
-    assert_eq!(planned.unwrap().pictures, half.inferred - 1);
+    assert_eq!(planned.unwrap().images, half.inferred - 1);
 }
 
 /// An area on the floor around the disc at 420, 300, whose foot is at about 1.7 m, 0 m.
@@ -174,7 +174,7 @@ fn views_far_from_all_areas_skip_inference() {
     }
     let planned = engine.planned_views(&calibration(OTHER_SIDE), Profile::Balanced);
     let run = detected(&engine, OTHER_SIDE, "balanced", 1, [420.0, 300.0]);
-    assert_eq!(planned.unwrap().pictures, run.report.views.inferred);
+    assert_eq!(planned.unwrap().images, run.report.views.inferred);
 }
 
 #[test]

@@ -115,7 +115,7 @@ fn errors_name_the_file_and_the_problem() {
         ("0.5", "1.5", "visible_fraction: 1.5 is outside 0 to 1"),
         (
             "\"images\"",
-            "\"pictures\"",
+            "\"files\"",
             "not a COCO annotation file: missing field `images`",
         ),
     ] {

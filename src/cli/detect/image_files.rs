@@ -8,13 +8,13 @@ use std::{
 /// Endings of images that can be read, in lower case.
 const ENDINGS: [&str; 4] = ["jpg", "jpeg", "png", "webp"];
 /// The maximum number of images of one run.
-const MAX_PICTURES: usize = 100_000;
+const MAX_IMAGES: usize = 100_000;
 /// Most folders within each other.
 const MAX_DEPTH: usize = 32;
 
 /// An image to detect people in.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Picture {
+pub(super) struct ImageFile {
     /// Its file.
     pub path: PathBuf,
     /// Its path from the folder that was named, with `/` between its parts.
@@ -23,12 +23,12 @@ pub(super) struct Picture {
 
 /// Images that cannot be listed.
 #[derive(Debug, thiserror::Error)]
-pub(super) enum PicturesError {
+pub(super) enum ImageFilesError {
     #[error("{path}: the folder cannot be read: {source}")]
     Unreadable { path: PathBuf, source: io::Error },
     #[error("{0}: there is no .jpg, .jpeg, .png or .webp file in this folder")]
-    NoPictures(PathBuf),
-    #[error("{0}: more than {MAX_PICTURES} images at once; name fewer")]
+    NoImages(PathBuf),
+    #[error("{0}: more than {MAX_IMAGES} images at once; name fewer")]
     TooMany(PathBuf),
     #[error("{0}: folders lie more than {MAX_DEPTH} deep; name one further down")]
     TooDeep(PathBuf),
@@ -36,36 +36,36 @@ pub(super) enum PicturesError {
 
 /// The files among `paths`, and the images below the folders among them in the order of their
 /// names. Hidden files and folders are left out, and links to folders are not followed.
-pub(super) fn pictures(paths: &[PathBuf]) -> Result<Vec<Picture>, PicturesError> {
-    let mut pictures = Vec::new();
+pub(super) fn image_files(paths: &[PathBuf]) -> Result<Vec<ImageFile>, ImageFilesError> {
+    let mut image_files = Vec::new();
     for path in paths {
         if path.is_dir() {
-            let before = pictures.len();
-            walk(path, "", MAX_DEPTH, &mut pictures)?;
-            if pictures.len() == before {
-                return Err(PicturesError::NoPictures(path.clone()));
+            let before = image_files.len();
+            walk(path, "", MAX_DEPTH, &mut image_files)?;
+            if image_files.len() == before {
+                return Err(ImageFilesError::NoImages(path.clone()));
             }
         } else {
             let name = path.file_name().unwrap_or(path.as_os_str());
-            pictures.push(Picture {
+            image_files.push(ImageFile {
                 path: path.clone(),
                 name: name.to_string_lossy().into_owned(),
             });
         }
     }
-    Ok(pictures)
+    Ok(image_files)
 }
 
 fn walk(
     folder: &Path,
     prefix: &str,
     depth: usize,
-    pictures: &mut Vec<Picture>,
-) -> Result<(), PicturesError> {
+    image_files: &mut Vec<ImageFile>,
+) -> Result<(), ImageFilesError> {
     if depth == 0 {
-        return Err(PicturesError::TooDeep(folder.to_owned()));
+        return Err(ImageFilesError::TooDeep(folder.to_owned()));
     }
-    let unreadable = |source| PicturesError::Unreadable {
+    let unreadable = |source| ImageFilesError::Unreadable {
         path: folder.to_owned(),
         source,
     };
@@ -79,12 +79,12 @@ fn walk(
             continue;
         }
         if entry.file_type().map_err(unreadable)?.is_dir() {
-            walk(&path, &format!("{prefix}{name}/"), depth - 1, pictures)?;
-        } else if is_picture(&path) {
-            if pictures.len() >= MAX_PICTURES {
-                return Err(PicturesError::TooMany(folder.to_owned()));
+            walk(&path, &format!("{prefix}{name}/"), depth - 1, image_files)?;
+        } else if is_image_file(&path) {
+            if image_files.len() >= MAX_IMAGES {
+                return Err(ImageFilesError::TooMany(folder.to_owned()));
             }
-            pictures.push(Picture {
+            image_files.push(ImageFile {
                 path,
                 name: format!("{prefix}{name}"),
             });
@@ -93,7 +93,7 @@ fn walk(
     Ok(())
 }
 
-fn is_picture(path: &Path) -> bool {
+fn is_image_file(path: &Path) -> bool {
     let ending = path.extension().and_then(|ending| ending.to_str());
     ending.is_some_and(|ending| ENDINGS.contains(&ending.to_ascii_lowercase().as_str()))
         && path.is_file()
@@ -114,8 +114,11 @@ mod tests {
     }
 
     fn names(paths: &[PathBuf]) -> Vec<String> {
-        let pictures = pictures(paths).unwrap();
-        pictures.into_iter().map(|picture| picture.name).collect()
+        let image_files = image_files(paths).unwrap();
+        image_files
+            .into_iter()
+            .map(|image_file| image_file.name)
+            .collect()
     }
 
     #[test]
@@ -134,18 +137,18 @@ mod tests {
 
     #[test]
     fn a_file_is_taken_as_it_is_named() {
-        let folder = folder_with(&["sub/picture.dat"]);
-        let file = folder.path().join("sub/picture.dat");
+        let folder = folder_with(&["sub/image.dat"]);
+        let file = folder.path().join("sub/image.dat");
         assert_eq!(
             names(&[file, "nowhere.jpg".into()]),
-            ["picture.dat", "nowhere.jpg"]
+            ["image.dat", "nowhere.jpg"]
         );
     }
 
     #[test]
-    fn a_folder_without_pictures_is_refused() {
+    fn a_folder_without_images_is_refused() {
         let folder = folder_with(&["notes.txt"]);
-        let error = pictures(&[folder.path().to_owned()]).unwrap_err();
+        let error = image_files(&[folder.path().to_owned()]).unwrap_err();
         assert!(error.to_string().contains("there is no .jpg"), "{error}");
     }
 

@@ -35,10 +35,10 @@ const PRIVATE: HeaderValue = HeaderValue::from_static("private, no-cache");
 ///
 /// Returns the frame of the latest report as JPEG: upright, with the masks of the calibration, with
 /// boxes or the layers in `draw`. Images are stored only for the cameras in the setting
-/// `results.pictures`. `If-None-Match` with the `ETag` of a known image returns 304 while that is
+/// `results.images`. `If-None-Match` with the `ETag` of a known image returns 304 while that is
 /// the latest.
 #[utoipa::path(
-    get, path = "/results/{camera}/latest.jpg", tag = "results", operation_id = "get_latest_picture",
+    get, path = "/results/{camera}/latest.jpg", tag = "results", operation_id = "get_latest_image",
     params(
         ("camera" = String, Path, description = "The camera's name."),
         AnnotationQuery,
@@ -55,7 +55,7 @@ const PRIVATE: HeaderValue = HeaderValue::from_static("private, no-cache");
         (status = NOT_MODIFIED, description = "There is no newer image."),
     )
 )]
-pub(in crate::api) async fn get_picture(
+pub(in crate::api) async fn get_latest_image(
     State(state): State<ApiState>,
     _reader: RequireRead,
     deadline: Deadline,
@@ -71,12 +71,12 @@ pub(in crate::api) async fn get_picture(
     if is_unmodified(&headers, &latest.to_string())? {
         return Ok((StatusCode::NOT_MODIFIED, about(&latest.to_string())).into_response());
     }
-    let kept = state.results.picture(&camera).await?;
+    let kept = state.results.image(&camera).await?;
     let kept = kept.ok_or_else(|| none_kept(&camera))?;
     let id = kept.id.to_string();
     let frame = StoredFrame {
-        jpeg: kept.picture.frame.clone(),
-        sketch: kept.picture.sketch.clone(),
+        jpeg: kept.image.frame.clone(),
+        sketch: kept.image.sketch.clone(),
     };
     let drawing = state.workers.run(caller.ticket(), move |withdrawn| {
         frame.annotated(&options, &|| withdrawn.is_cancelled())
@@ -84,8 +84,8 @@ pub(in crate::api) async fn get_picture(
     let drawn = deadline
         .wait("the image was not drawn", "send fewer requests", drawing)
         .await?;
-    let picture = Bytes::from(drawn.map_err(|error| undrawn(&camera, error))?);
-    Ok((about(&id), [(CONTENT_TYPE, "image/jpeg")], picture).into_response())
+    let image = Bytes::from(drawn.map_err(|error| undrawn(&camera, error))?);
+    Ok((about(&id), [(CONTENT_TYPE, "image/jpeg")], image).into_response())
 }
 
 fn about(id: &str) -> [(HeaderName, HeaderValue); 2] {
@@ -106,14 +106,14 @@ fn undrawn(camera: &str, error: StoredFrameError) -> Problem {
         "the stored image of the camera {camera} cannot be used ({error}): the next frame of the \
          camera replaces it"
     );
-    Problem::new(ProblemKind::PictureNotKept, detail)
+    Problem::new(ProblemKind::ImageNotKept, detail)
 }
 
 fn none_kept(camera: &str) -> Problem {
     let camera = Quoted(camera);
     let detail = format!(
         "there is no image of the camera {camera}: images are stored from the next frame on, for the cameras in \
-         the setting results.pictures (* for all), for at most results.max_pictures cameras"
+         the setting results.images (* for all), for at most results.max_images cameras"
     );
-    Problem::new(ProblemKind::PictureNotKept, detail)
+    Problem::new(ProblemKind::ImageNotKept, detail)
 }

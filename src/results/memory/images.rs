@@ -2,16 +2,16 @@
 
 use std::{collections::HashMap, num::NonZeroUsize, sync::Arc};
 
-use crate::results::{NewPicture, ReportId, StoredPicture};
+use crate::results::{NewImage, ReportId, StoredImage};
 
 /// The images, at most `most`: the camera that was silent for longest is evicted first.
 #[derive(Debug)]
-pub(super) struct Pictures {
+pub(super) struct Images {
     most: NonZeroUsize,
-    of_cameras: HashMap<String, Arc<StoredPicture>>,
+    of_cameras: HashMap<String, Arc<StoredImage>>,
 }
 
-impl Pictures {
+impl Images {
     pub(super) fn new(most: NonZeroUsize) -> Self {
         Self {
             most,
@@ -21,11 +21,11 @@ impl Pictures {
 
     /// Replaces the camera's image by that of the report with this ID, or removes it if that report
     /// has none.
-    pub(super) fn replace(&mut self, camera: &str, id: ReportId, picture: Option<NewPicture>) {
-        let Some(picture) = picture else {
+    pub(super) fn replace(&mut self, camera: &str, id: ReportId, image: Option<NewImage>) {
+        let Some(image) = image else {
             return self.forget(camera);
         };
-        let stored = Arc::new(StoredPicture { id, picture });
+        let stored = Arc::new(StoredImage { id, image });
         self.of_cameras.insert(camera.to_owned(), stored);
         while self.of_cameras.len() > self.most.get() {
             let oldest = self.of_cameras.iter().min_by_key(|(_, stored)| stored.id);
@@ -39,7 +39,7 @@ impl Pictures {
         self.of_cameras.remove(camera);
     }
 
-    pub(super) fn of(&self, camera: &str) -> Option<Arc<StoredPicture>> {
+    pub(super) fn of(&self, camera: &str) -> Option<Arc<StoredImage>> {
         self.of_cameras.get(camera).cloned()
     }
 

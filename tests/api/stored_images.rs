@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use bytes::Bytes;
-use lookdown::results::{NewPicture, NewReport, PicturesOf, ResultStore};
+use lookdown::results::{ImagesOf, NewImage, NewReport, ResultStore};
 use lookdown_detect::imaging::{
     Frame,
     annotate::{Concealment, encode_jpeg},
@@ -18,7 +18,7 @@ const PATH: &str = "/results/hall/latest.jpg";
 /// A service that stores images of the camera `hall`.
 fn keeping() -> Service {
     Service::within(&Bounds {
-        pictures_of: PicturesOf::Some(BTreeSet::from(["hall".to_owned()])),
+        images_of: ImagesOf::Some(BTreeSet::from(["hall".to_owned()])),
         ..Bounds::default()
     })
 }
@@ -32,7 +32,7 @@ impl Service {
     }
 }
 
-fn picture(answer: &Answer) -> Frame {
+fn image_of(answer: &Answer) -> Frame {
     let told = String::from_utf8_lossy(&answer.body);
     assert_eq!(answer.status, 200, "{told}");
     assert_eq!(answer.header("content-type"), "image/jpeg");
@@ -59,9 +59,9 @@ async fn no_image_is_stored_unless_the_settings_name_its_camera() {
         let answer = service.get(&path).await;
         assert_eq!(answer.status, 404);
         let problem = answer.problem();
-        assert_eq!(problem["type"], "/problems/picture-not-kept");
+        assert_eq!(problem["type"], "/problems/image-not-kept");
         let detail = problem["detail"].as_str().unwrap();
-        assert!(detail.contains("results.pictures"), "{detail}");
+        assert!(detail.contains("results.images"), "{detail}");
     }
     let unknown = keeping().get(PATH).await.problem();
     assert_eq!(unknown["type"], "/problems/unknown-camera");
@@ -70,13 +70,13 @@ async fn no_image_is_stored_unless_the_settings_name_its_camera() {
 #[tokio::test]
 async fn all_cameras_may_have_images() {
     let service = Service::within(&Bounds {
-        pictures_of: PicturesOf::All,
+        images_of: ImagesOf::All,
         ..Bounds::default()
     });
     service.detect_in("hall").await;
-    picture(&service.get(PATH).await);
+    image_of(&service.get(PATH).await);
     let metrics = service.get("/metrics").await.text();
-    let told = "lookdown_results_pictures 1";
+    let told = "lookdown_results_images 1";
     assert!(metrics.lines().any(|line| line == told), "{metrics}");
 }
 
@@ -93,16 +93,16 @@ async fn an_image_is_drawn_as_the_request_specifies() {
         "timestamp",
         "oriented,scores",
     ] {
-        let drawn = picture(&service.get(&format!("{PATH}?draw={draw}")).await);
+        let drawn = image_of(&service.get(&format!("{PATH}?draw={draw}")).await);
         assert_eq!((drawn.width(), drawn.height()), (200, 200));
         assert!(!is_plain(&drawn) && !seen.contains(&drawn), "{draw}");
         seen.push(drawn);
     }
-    assert!(seen.last() == Some(&picture(&service.get(PATH).await)));
-    assert!(is_plain(&picture(
+    assert!(seen.last() == Some(&image_of(&service.get(PATH).await)));
+    assert!(is_plain(&image_of(
         &service.get(&format!("{PATH}?draw=none")).await
     )));
-    let small = picture(&service.get(&format!("{PATH}?width=100")).await);
+    let small = image_of(&service.get(&format!("{PATH}?width=100")).await);
     assert_eq!((small.width(), small.height()), (100, 100));
     let mut lengths = Vec::new();
     for quality in [1, 50, 100] {
@@ -158,9 +158,9 @@ async fn zones_are_drawn_and_masked_areas_are_black() {
     let put = service.put("/calibrations/lobby", &lobby.to_string()).await;
     assert_eq!(put.status, 200, "{}", put.text());
     service.detect_in("hall").await;
-    let plain = picture(&service.get(&format!("{PATH}?draw=none")).await);
+    let plain = image_of(&service.get(&format!("{PATH}?draw=none")).await);
     assert!(plain.pixel(20, 20).iter().all(|value| *value < 16));
-    let drawn = picture(&service.get(&format!("{PATH}?draw=zones")).await);
+    let drawn = image_of(&service.get(&format!("{PATH}?draw=zones")).await);
     // The left border of each zone: a meter beside the camera, 3 m below it.
     for (x, y) in [(100, 150), (79, 99)] {
         assert!(is_gray(&plain, x, y) && !is_gray(&drawn, x, y), "{x}, {y}");
@@ -177,8 +177,8 @@ async fn a_jpeg_is_stored_unchanged_unless_it_is_masked() {
     let query = "calibration=lobby&profile=fast&camera=hall";
     let kept = async || {
         service.post_raw(query, sent.clone()).await;
-        let kept = service.results.picture("hall").await.unwrap().unwrap();
-        kept.picture.frame.to_vec()
+        let kept = service.results.image("hall").await.unwrap().unwrap();
+        kept.image.frame.to_vec()
     };
     assert_eq!(kept().await, sent);
     let mut lobby = service.get("/calibrations/lobby").await.json();
@@ -195,11 +195,11 @@ async fn a_jpeg_is_stored_unchanged_unless_it_is_masked() {
 async fn stored_data_that_is_no_image_is_refused_with_404() {
     let service = keeping();
     service.detect_in("hall").await;
-    let good = service.results.picture("hall").await.unwrap().unwrap();
+    let good = service.results.image("hall").await.unwrap().unwrap();
     let garbage = Bytes::from_static(b"no\nimage");
     for (frame, sketch) in [
-        (garbage.clone(), good.picture.sketch.clone()),
-        (good.picture.frame.clone(), garbage.clone()),
+        (garbage.clone(), good.image.sketch.clone()),
+        (good.image.frame.clone(), garbage.clone()),
     ] {
         let report = NewReport {
             camera: "hall".to_owned(),
@@ -207,12 +207,12 @@ async fn stored_data_that_is_no_image_is_refused_with_404() {
             persons: 0,
             json: Bytes::from_static(b"{}"),
         };
-        let picture = NewPicture { frame, sketch };
-        service.results.publish(report, Some(picture));
+        let image = NewImage { frame, sketch };
+        service.results.publish(report, Some(image));
         let answer = service.get(PATH).await;
         assert_eq!(answer.status, 404, "{}", answer.text());
         let problem = answer.problem();
-        assert_eq!(problem["type"], "/problems/picture-not-kept");
+        assert_eq!(problem["type"], "/problems/image-not-kept");
         let detail = problem["detail"].as_str().unwrap();
         assert!(detail.contains("cannot be used"), "{detail}");
     }
@@ -225,7 +225,7 @@ async fn a_large_frame_is_stored_at_a_smaller_size() {
     let answer = service.post_raw(query, frame_of(3000, 1500)).await;
     assert_eq!(answer.status, 200, "{}", answer.text());
     for (query, width, height) in [("", 2048, 1024), ("?width=8192", 2560, 1280)] {
-        let kept = picture(&service.get(&format!("{PATH}{query}")).await);
+        let kept = image_of(&service.get(&format!("{PATH}{query}")).await);
         assert_eq!((kept.width(), kept.height()), (width, height));
     }
 }
@@ -233,14 +233,14 @@ async fn a_large_frame_is_stored_at_a_smaller_size() {
 #[tokio::test]
 async fn persons_are_concealed_in_stored_images_on_request() {
     let service = Service::within(&Bounds {
-        pictures_of: PicturesOf::All,
-        conceal_pictures: Some(Concealment::Silhouette),
+        images_of: ImagesOf::All,
+        conceal_images: Some(Concealment::Silhouette),
         ..Bounds::default()
     });
     service.detect_in("hall").await;
-    let stored = service.results.picture("hall").await.unwrap().unwrap();
-    let frame = decode(&stored.picture.frame, &DecodeLimits::default());
+    let stored = service.results.image("hall").await.unwrap().unwrap();
+    let frame = decode(&stored.image.frame, &DecodeLimits::default());
     assert!(!is_plain(&frame.unwrap().frame));
     let shown = service.get(&format!("{PATH}?draw=none")).await;
-    assert!(!is_plain(&picture(&shown)));
+    assert!(!is_plain(&image_of(&shown)));
 }

@@ -18,7 +18,7 @@ async fn accepting(service: &Service, accept: &str, query: &str) -> Answer {
     service.send(request).await
 }
 
-fn picture(answer: &Answer) -> Frame {
+fn image_of(answer: &Answer) -> Frame {
     assert_eq!(
         answer.status,
         200,
@@ -83,7 +83,7 @@ async fn an_image_is_returned_for_accept_or_format() {
 async fn boxes_are_drawn_at_the_positions_of_the_report() {
     let service = Service::start();
     let report = accepting(&service, "*/*", "").await.json();
-    let drawn = picture(&accepting(&service, "image/png", "draw=boxes").await);
+    let drawn = image_of(&accepting(&service, "image/png", "draw=boxes").await);
     let persons = report["persons"].as_array().unwrap();
     assert!(!persons.is_empty());
     let side = |person: &serde_json::Value, name: &str| person["box"][name].as_f64().unwrap();
@@ -101,7 +101,7 @@ async fn boxes_are_drawn_at_the_positions_of_the_report() {
         }
     }
     for nothing in ["draw=none", "draw=none&format=image"] {
-        let plain = picture(&accepting(&service, "image/png", nothing).await);
+        let plain = image_of(&accepting(&service, "image/png", nothing).await);
         assert!(is_plain(&plain), "{nothing}");
     }
 }
@@ -109,17 +109,17 @@ async fn boxes_are_drawn_at_the_positions_of_the_report() {
 #[tokio::test]
 async fn each_layer_changes_the_image() {
     let service = Service::start();
-    let mut pictures = Vec::new();
+    let mut images = Vec::new();
     // Persons on the axes of the frame are upright or horizontal. The oriented boxes are those of
     // the others.
     for layer in ["boxes", "boxes,oriented", "scores", "views", "timestamp"] {
         let query = format!("draw={layer}&captured_at=2026-11-21T09:30:00Z");
-        let drawn = picture(&accepting(&service, "image/png", &query).await);
-        assert!(!is_plain(&drawn) && !pictures.contains(&drawn), "{layer}");
-        pictures.push(drawn);
+        let drawn = image_of(&accepting(&service, "image/png", &query).await);
+        assert!(!is_plain(&drawn) && !images.contains(&drawn), "{layer}");
+        images.push(drawn);
     }
-    let default = picture(&accepting(&service, "image/png", "").await);
-    let named = picture(&accepting(&service, "image/png", "draw=scores,oriented").await);
+    let default = image_of(&accepting(&service, "image/png", "").await);
+    let named = image_of(&accepting(&service, "image/png", "draw=scores,oriented").await);
     assert!(default == named);
 }
 
@@ -132,7 +132,7 @@ async fn an_image_has_the_requested_width_up_to_that_of_its_frame() {
         ((300, 100), 64, (64, 21)),
     ] {
         let query = format!("profile=fast&format=image&width={width}");
-        let drawn = picture(&service.post_raw(&query, frame_of(frame.0, frame.1)).await);
+        let drawn = image_of(&service.post_raw(&query, frame_of(frame.0, frame.1)).await);
         assert_eq!(
             (drawn.width(), drawn.height()),
             expected,

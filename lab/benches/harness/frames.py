@@ -20,9 +20,9 @@ def frame(side: int = SIDE, sample: str = "office") -> Path:
     file = WORK / f"{sample}-{side}.jpg"
     if not file.exists():
         WORK.mkdir(parents=True, exist_ok=True)
-        picture = cv2.imread(str(SAMPLES / f"{sample}.jpg"))
-        way = cv2.INTER_AREA if side < picture.shape[0] else cv2.INTER_CUBIC
-        scaled = cv2.resize(picture, (side, side), interpolation=way).astype(np.float32)
+        image = cv2.imread(str(SAMPLES / f"{sample}.jpg"))
+        way = cv2.INTER_AREA if side < image.shape[0] else cv2.INTER_CUBIC
+        scaled = cv2.resize(image, (side, side), interpolation=way).astype(np.float32)
         noise = np.random.default_rng(side).normal(0.0, NOISE, (side, side, 1))
         noisy = np.clip(np.rint(scaled + noise), 0, 255).astype(np.uint8)
         written, jpeg = cv2.imencode(".jpg", noisy, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])

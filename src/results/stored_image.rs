@@ -8,14 +8,14 @@ use super::ReportId;
 
 /// An image to be kept.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct NewPicture {
+pub struct NewImage {
     /// The frame of a report.
     pub frame: Bytes,
     /// The drawings that can be added to the frame.
     pub sketch: Bytes,
 }
 
-impl NewPicture {
+impl NewImage {
     /// The memory that it takes, bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
@@ -25,23 +25,23 @@ impl NewPicture {
 
 /// A kept image: that of its camera's latest report.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct StoredPicture {
+pub struct StoredImage {
     /// The ID of its report.
     pub id: ReportId,
     /// The image.
-    pub picture: NewPicture,
+    pub image: NewImage,
 }
 
 /// The cameras whose images are kept.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum PicturesOf {
+pub enum ImagesOf {
     /// Every camera.
     All,
     /// These cameras, possibly none.
     Some(BTreeSet<String>),
 }
 
-impl PicturesOf {
+impl ImagesOf {
     /// Returns true if the image of this camera may be kept.
     #[must_use]
     pub fn include(&self, camera: &str) -> bool {
@@ -52,7 +52,7 @@ impl PicturesOf {
     }
 }
 
-impl Default for PicturesOf {
+impl Default for ImagesOf {
     /// No cameras: images show people.
     fn default() -> Self {
         Self::Some(BTreeSet::new())

@@ -13,43 +13,45 @@ fn folder(files: &[&str]) -> tempfile::TempDir {
     folder
 }
 
-fn pictures(folder: &tempfile::TempDir) -> PictureIndex {
-    Files::below(folder.path()).unwrap().pictures()
+fn image_files(folder: &tempfile::TempDir) -> ImageFileIndex {
+    Files::below(folder.path()).unwrap().image_files()
 }
 
 #[test]
 fn an_image_is_found_by_its_name_in_any_folder() {
     let folder = folder(&["deep/er/a.jpg", "b.PNG", "a.txt"]);
-    let pictures = pictures(&folder);
-    let found = pictures.by_file_name(Path::new("a.jpg")).unwrap();
+    let image_files = image_files(&folder);
+    let found = image_files.by_file_name(Path::new("a.jpg")).unwrap();
     assert!(found.ends_with("deep/er/a.jpg"));
-    let found = pictures.by_file_name(Path::new("elsewhere/b.PNG")).unwrap();
+    let found = image_files
+        .by_file_name(Path::new("elsewhere/b.PNG"))
+        .unwrap();
     assert!(found.ends_with("b.PNG"));
-    let problem = pictures.by_file_name(Path::new("c.jpg")).unwrap_err();
+    let problem = image_files.by_file_name(Path::new("c.jpg")).unwrap_err();
     assert_eq!(problem, "no image c.jpg was found");
 }
 
 #[test]
 fn equal_names_are_resolved_by_folder_or_refused() {
     let folder = folder(&["one/a.jpg", "two/a.jpg", "three/a.png"]);
-    let pictures = pictures(&folder);
-    let found = pictures.by_file_name(Path::new("two/a.jpg")).unwrap();
+    let image_files = image_files(&folder);
+    let found = image_files.by_file_name(Path::new("two/a.jpg")).unwrap();
     assert!(found.ends_with("two/a.jpg"));
-    let problem = pictures.by_file_name(Path::new("a.jpg")).unwrap_err();
+    let problem = image_files.by_file_name(Path::new("a.jpg")).unwrap_err();
     assert!(problem.contains("one/a.jpg") && problem.contains("two/a.jpg"));
     // In the folder of its annotations, an image's name is unambiguous.
     let beside = folder.path().join("three/a.xml");
     assert!(
-        pictures
+        image_files
             .named_like(&beside)
             .unwrap()
             .ends_with("three/a.png")
     );
     let like_named = folder.path().join("annotations/t_wo/a.xml");
-    let found = pictures.named_like(&like_named).unwrap();
+    let found = image_files.named_like(&like_named).unwrap();
     assert!(found.ends_with("two/a.jpg"));
     let nowhere = folder.path().join("annotations/a.xml");
-    assert!(pictures.named_like(&nowhere).is_err());
+    assert!(image_files.named_like(&nowhere).is_err());
 }
 
 #[test]
@@ -59,7 +61,7 @@ fn a_dot_in_a_name_is_part_of_the_name() {
         "omni/2015-05-12T12-42-29.jpg",
     ]);
     let annotations = folder.path().join("xml/2015-05-12T12-42-29.320Z.xml");
-    let found = pictures(&folder).named_like(&annotations).unwrap();
+    let found = image_files(&folder).named_like(&annotations).unwrap();
     assert!(found.ends_with("omni/2015-05-12T12-42-29.320Z.jpg"));
 }
 

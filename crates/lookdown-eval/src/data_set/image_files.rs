@@ -9,7 +9,7 @@ use std::{
 use super::DataSetError;
 
 /// Extensions of images that can be decoded, in lower case.
-const PICTURE_ENDINGS: [&str; 4] = ["jpg", "jpeg", "png", "webp"];
+const IMAGE_ENDINGS: [&str; 4] = ["jpg", "jpeg", "png", "webp"];
 /// Most levels of folders. The largest data sets have five.
 const MAX_DEPTH: usize = 12;
 /// Most files and folders. The largest data sets have some 300 000.
@@ -19,7 +19,7 @@ const MAX_ENTRIES: usize = 2_000_000;
 pub(super) struct Files(Vec<PathBuf>);
 
 /// Images by name.
-pub(super) struct PictureIndex {
+pub(super) struct ImageFileIndex {
     by_stem: HashMap<Box<OsStr>, Vec<PathBuf>>,
 }
 
@@ -90,18 +90,18 @@ impl Files {
     }
 
     /// The images among the files.
-    pub(super) fn pictures(&self) -> PictureIndex {
+    pub(super) fn image_files(&self) -> ImageFileIndex {
         let mut by_stem: HashMap<Box<OsStr>, Vec<PathBuf>> = HashMap::new();
-        for path in self.0.iter().filter(|path| is_picture(path)) {
+        for path in self.0.iter().filter(|path| is_image_file(path)) {
             if let Some(stem) = path.file_stem() {
                 by_stem.entry(stem.into()).or_default().push(path.clone());
             }
         }
-        PictureIndex { by_stem }
+        ImageFileIndex { by_stem }
     }
 }
 
-impl PictureIndex {
+impl ImageFileIndex {
     /// The image with the name `file_name` in annotations, with or without folders before it.
     pub(super) fn by_file_name(&self, file_name: &Path) -> Result<PathBuf, String> {
         let name = file_name.file_name();
@@ -151,10 +151,10 @@ impl PictureIndex {
 }
 
 /// The images directly in `folder`, by name.
-pub(super) fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>, DataSetError> {
-    let mut pictures = Files::below(folder)?.named(is_picture);
-    pictures.retain(|path| path.parent() == Some(folder));
-    Ok(pictures)
+pub(super) fn image_files_in(folder: &Path) -> Result<Vec<PathBuf>, DataSetError> {
+    let mut image_files = Files::below(folder)?.named(is_image_file);
+    image_files.retain(|path| path.parent() == Some(folder));
+    Ok(image_files)
 }
 
 /// The name of the folder that contains a file, without underscores.
@@ -176,10 +176,8 @@ fn the_only(found: &[&PathBuf], name: &Path) -> Result<PathBuf, String> {
     }
 }
 
-fn is_picture(path: &Path) -> bool {
-    PICTURE_ENDINGS
-        .iter()
-        .any(|ending| has_ending(path, ending))
+fn is_image_file(path: &Path) -> bool {
+    IMAGE_ENDINGS.iter().any(|ending| has_ending(path, ending))
 }
 
 fn has_ending(path: &Path, ending: &str) -> bool {
