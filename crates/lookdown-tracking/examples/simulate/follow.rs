@@ -14,7 +14,7 @@ const CELL_PX: f64 = FRAME_PX / 64.0;
 const MOVED_PX: f64 = CELL_PX / 8.0;
 /// Motion belongs to the same motion if at most these pixels lie between.
 const JOINED_PX: f64 = 2.0 * CELL_PX;
-/// What a crop shows around the expected box of its person, as a share of the larger side.
+/// The margin of a crop around the expected box of its person, as a share of the larger side.
 const CROP_MARGIN: f64 = 0.5;
 /// The least score of a box that makes a new person.
 const NEW_SCORE: f64 = 0.06;

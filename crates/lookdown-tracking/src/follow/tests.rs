@@ -101,8 +101,8 @@ fn people_without_motion_stay_as_they_were() {
 
 #[test]
 fn a_single_lucky_score_of_a_search_counts_half() {
-    let nobody = FollowedPeople::<Found>::of_search(&[], 0.0, None);
-    let people = FollowedPeople::of_search(&[Found { x: 0.0, score: 0.8 }], 1.0, Some(&nobody));
+    let no_one = FollowedPeople::<Found>::of_search(&[], 0.0, None);
+    let people = FollowedPeople::of_search(&[Found { x: 0.0, score: 0.8 }], 1.0, Some(&no_one));
     let score = people.seen().next().unwrap().score;
     assert_close(logit(score), f64::midpoint(logit(0.05), logit(0.8)));
 }

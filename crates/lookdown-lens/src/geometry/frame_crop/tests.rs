@@ -82,7 +82,7 @@ fn quarter_turns_are_clockwise_and_have_inverses() {
 }
 
 #[test]
-fn a_mirrored_crop_exchanges_left_and_right_and_shows_the_same_part() {
+fn a_mirrored_crop_exchanges_left_and_right_of_the_same_part() {
     let crop = FrameCrop {
         turn: QuarterTurn::Right,
         is_mirrored: false,
