@@ -103,8 +103,8 @@ fn few_edges_are_refused() {
     assert_eq!(refusal, Err(FitRefusal::TooFewEdges { edges: few.len() }));
 }
 
-#[test]
-fn edges_without_order_are_refused() {
+/// Short edges in random directions all over the image.
+fn clutter(count: usize) -> Vec<EdgeCurve> {
     let mut state = 7_u64;
     let mut random = || {
         state = state
@@ -112,7 +112,7 @@ fn edges_without_order_are_refused() {
             .wrapping_add(1);
         f64::from(u32::try_from(state >> 40).unwrap()) / f64::from(1 << 24)
     };
-    let curves: Vec<EdgeCurve> = (0..200)
+    (0..count)
         .map(|_| {
             let ([x, y], turn) = (
                 [200.0 + 800.0 * random(), 200.0 + 800.0 * random()],
@@ -125,6 +125,38 @@ fn edges_without_order_are_refused() {
                     .collect(),
             }
         })
-        .collect();
-    assert!(RoomFit::of(&[curves], &[circle()], KnownLens::default()).is_err());
+        .collect()
+}
+
+#[test]
+fn edges_without_order_are_refused() {
+    for count in [200, 1500] {
+        let fit = RoomFit::of(&[clutter(count)], &[circle()], KnownLens::default());
+        assert!(
+            matches!(fit, Err(FitRefusal::NoDirections { .. })),
+            "{count} edges: {fit:?}"
+        );
+    }
+}
+
+#[test]
+fn room_with_more_clutter_than_walls_is_fitted() {
+    let room = Rotation3::from_euler_angles(0.14, -0.09, 0.4);
+    let all = [edges(&room), clutter(700)].concat();
+    let fit = RoomFit::of(&[all], &[circle()], KnownLens::default()).unwrap();
+    assert!(fit.explained < 0.45, "{}", fit.explained);
+    let level = fit.directions[0].angle(&(room * Ray::z())).to_degrees();
+    assert!(level < 0.2, "{level}° off level");
+}
+
+#[test]
+fn many_exact_edges_leave_the_uncertainty_of_the_lens() {
+    let room = Rotation3::from_euler_angles(0.14, -0.09, 0.4);
+    let many = vec![edges(&room); 15].concat();
+    let fit = RoomFit::of(&[many], &[circle()], KnownLens::default()).unwrap();
+    assert!(
+        (0.003..0.004).contains(&fit.uncertainty.radius),
+        "{}",
+        fit.uncertainty.radius
+    );
 }
