@@ -3,6 +3,7 @@
 
 pub mod annotate;
 mod buffer_pool;
+mod cell_motion;
 pub mod decode;
 pub mod edge_curves;
 pub mod frame;
@@ -17,8 +18,9 @@ pub mod room_fit;
 mod thumbnail;
 mod view_signature;
 
+pub use cell_motion::{MovedCell, NEW_LEVELS, is_noise};
 pub use frame::{Frame, FrameError};
-pub use frame_signature::{FrameSignature, MovedCell};
+pub use frame_signature::FrameSignature;
 pub use letterbox::Letterbox;
 pub use masked_pixels::MaskedPixels;
 pub use network_input::{ChannelOrder, NetworkInput, ViewBatch};

@@ -1,6 +1,9 @@
 //! Coarse signature of a frame for motion detection without any view.
 
-use super::{Frame, view_signature::MOVED_LEVELS};
+use super::{
+    Frame,
+    cell_motion::{MOVED_LEVELS, MovedCell},
+};
 
 /// Most cells along the longer side of a frame: a person at the rim still fills a good part of one.
 const MOST_CELLS: u32 = 64;
@@ -8,15 +11,6 @@ const MOST_CELLS: u32 = 64;
 const MIN_CELL: u32 = 8;
 /// Rows from one that is read to the next.
 const ROW_STEP: usize = 2;
-
-/// A cell with motion.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MovedCell {
-    /// The box `[x_min, y_min, x_max, y_max]`, corner-origin frame pixels.
-    pub bounds: [f64; 4],
-    /// The greatest change of a mean level.
-    pub levels: u8,
-}
 
 /// Mean levels (0 to 255) of the cells of a frame, for each color channel.
 #[derive(Debug, Clone, PartialEq, Eq)]

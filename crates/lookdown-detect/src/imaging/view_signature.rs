@@ -1,17 +1,24 @@
 //! Coarse signature of a rendered view for motion detection.
 
-use super::NetworkInput;
+use super::{
+    NetworkInput,
+    cell_motion::{MOVED_LEVELS, MovedCell, is_noise},
+};
 
 /// Sides of the averaged cells, in view pixels. 256 pixels average out the noise of a sensor and of
 /// JPEG, and a detectable person fills a good part of one cell.
 const CELL: usize = 16;
-/// Least change of a cell's mean, in gray levels (0 to 255), that counts as motion. The noise of a
-/// mean is below 1. A person's clothes differ from the floor by tens.
-pub(super) const MOVED_LEVELS: u8 = 4;
+/// The planes of a view.
+const CHANNELS: usize = 3;
 
 /// Mean levels (0 to 255) of the cells of a view, for each color channel.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ViewSignature(Vec<u8>);
+pub struct ViewSignature {
+    /// Cells in a row.
+    across: usize,
+    /// The cells of one channel after the other.
+    levels: Vec<u8>,
+}
 
 impl ViewSignature {
     /// Computes the signature of a view rendered for `input`, from its slot `[3, height, width]`.
@@ -19,7 +26,7 @@ impl ViewSignature {
     pub fn of(slot: &[f32], input: &NetworkInput) -> Self {
         let (width, height) = (input.width as usize, input.height as usize);
         let (across, down) = (width.div_ceil(CELL), height.div_ceil(CELL));
-        let mut levels = Vec::with_capacity(3 * across * down);
+        let mut levels = Vec::with_capacity(CHANNELS * across * down);
         let planes = slot.chunks_exact(input.plane_len()).zip(&input.scale);
         for ((plane, scale), offset) in planes.zip(&input.offset) {
             for rows in plane.chunks(width * CELL) {
@@ -38,14 +45,33 @@ impl ViewSignature {
                 }
             }
         }
-        Self(levels)
+        Self { across, levels }
     }
 
-    /// Returns true if there is motion between two signatures of the same view.
+    /// Returns true if there is motion between two signatures of the same view, not only noise.
     #[must_use]
     pub fn differs_from(&self, other: &Self) -> bool {
-        let mut pairs = self.0.iter().zip(&other.0);
-        self.0.len() != other.0.len() || pairs.any(|(a, b)| a.abs_diff(*b) >= MOVED_LEVELS)
+        if self.across != other.across || self.levels.len() != other.levels.len() {
+            return true;
+        }
+        let count = self.levels.len() / CHANNELS;
+        let difference = |index: usize| {
+            let channels = (index..self.levels.len()).step_by(count);
+            let changes = channels.map(|at| self.levels[at].abs_diff(other.levels[at]));
+            changes.max().unwrap_or_default()
+        };
+        let cells = (0..count).map(|index| MovedCell {
+            bounds: self.cell(index),
+            levels: difference(index),
+        });
+        let moved: Vec<_> = cells.filter(|cell| cell.levels >= MOVED_LEVELS).collect();
+        !is_noise(&moved)
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "at most a few thousand cells")]
+    fn cell(&self, index: usize) -> [f64; 4] {
+        let (x, y) = ((index % self.across) as f64, (index / self.across) as f64);
+        [x, y, x + 1.0, y + 1.0].map(|at| at * CELL as f64)
     }
 }
 
@@ -90,10 +116,18 @@ mod tests {
     #[test]
     fn a_small_object_that_comes_or_goes_is_motion_anywhere() {
         let empty = view(100.0, [0, 0], 0, 0.0);
-        for corner in [[0, 0], [10, 10], [34, 27], [36, 0]] {
-            let person = view(100.0, corner, 6, 160.0);
+        for corner in [[0, 0], [10, 10], [11, 9], [30, 23], [30, 0]] {
+            let person = view(100.0, corner, 10, 160.0);
             assert!(empty.differs_from(&person) && person.differs_from(&empty));
         }
+    }
+
+    #[test]
+    fn a_weak_cell_alone_is_noise_and_with_another_is_motion() {
+        let still = view(100.0, [0, 0], 0, 0.0);
+        assert!(!still.differs_from(&view(100.0, [0, 0], 16, 105.0)));
+        assert!(still.differs_from(&view(100.0, [0, 0], 16, 110.0)));
+        assert!(still.differs_from(&view(100.0, [0, 0], 32, 105.0)));
     }
 
     #[test]

@@ -13,7 +13,7 @@ use jiff::{SignedDuration, Timestamp};
 use lookdown_lens::geometry::{
     OrientedBox, crop_placement::CropTarget, oriented_box::vertical_in_frame,
 };
-use lookdown_tracking::follow::{FollowedPeople, FoundPerson, overlap, widened};
+use lookdown_tracking::follow::{FollowedPeople, FoundPerson};
 use nalgebra::Point2;
 use parking_lot::Mutex;
 
@@ -22,7 +22,7 @@ use super::{
 };
 use crate::{
     detection::RefinementParameters,
-    imaging::{Frame, FrameSignature, MovedCell},
+    imaging::{Frame, FrameSignature, MovedCell, NEW_LEVELS, is_noise},
     inference::Model,
 };
 
@@ -32,12 +32,6 @@ const SEARCH_EVERY: SignedDuration = SignedDuration::from_millis(900);
 const MAX_MOVING: usize = 32;
 /// Cells with motion belong to the same motion if at most this many cells less one lie between them.
 const JOINED_CELLS: f64 = 2.0;
-/// Least change of a cell's mean by a person who was not there. Clothes differ from the floor by tens,
-/// parted ends of shadows by less than this.
-const NEW_LEVELS: u8 = 10;
-/// Most cells that noise of a video encoder changes, each by less than `NEW_LEVELS` and none beside
-/// another one.
-const MAX_NOISY_CELLS: usize = 8;
 /// If more than one of this many cells has moved, the light has changed: the frame is searched.
 const MOST_MOVED: usize = 4;
 /// Least score of boxes of crops, before they get the odds of their persons.
@@ -271,43 +265,10 @@ fn seconds(at: Timestamp) -> f64 {
     at.as_duration().as_secs_f64()
 }
 
-/// Returns true if cells with motion are few, weak and apart from each other.
-fn is_noise(moved: &[MovedCell]) -> bool {
-    let touches = |index: usize, one: &MovedCell| {
-        let reach = widened(one.bounds, 1.0);
-        let mut others = moved.iter().skip(index + 1);
-        others.any(|other| overlap(&reach, &other.bounds))
-    };
-    moved.len() <= MAX_NOISY_CELLS
-        && moved.iter().all(|cell| cell.levels < NEW_LEVELS)
-        && !(moved.iter().enumerate()).any(|(index, one)| touches(index, one))
-}
-
 /// Returns the cells of a frame whose middle can show a person.
 fn visible_cells(signature: &FrameSignature, rig: &CameraRig) -> Arc<[bool]> {
     let middles = signature.cells().map(|[x_min, y_min, x_max, y_max]| {
         Point2::new(f64::midpoint(x_min, x_max), f64::midpoint(y_min, y_max))
     });
     middles.map(|middle| rig.shows(middle)).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn cell(x: f64, levels: u8) -> MovedCell {
-        MovedCell {
-            bounds: [x, 0.0, x + 15.0, 15.0],
-            levels,
-        }
-    }
-
-    #[test]
-    fn weak_cells_apart_from_each_other_are_noise() {
-        assert!(is_noise(&[cell(0.0, 4), cell(30.0, 5), cell(300.0, 4)]));
-        assert!(!is_noise(&[cell(0.0, 4), cell(15.0, 4)]));
-        assert!(!is_noise(&[cell(0.0, NEW_LEVELS)]));
-        let many = (0..9).map(|index| cell(f64::from(index) * 30.0, 4));
-        assert!(!is_noise(&many.collect::<Vec<_>>()));
-    }
 }
