@@ -6,6 +6,7 @@
 //! to its first crop. The caller detects motion, places crops and finds people in them.
 
 mod boxes;
+mod found_person;
 mod score;
 mod target;
 
@@ -17,21 +18,9 @@ use self::{
 };
 pub use self::{
     boxes::{overlap, widened},
+    found_person::FoundPerson,
     score::{from_logit, logit},
 };
-
-/// A person that was found in a frame.
-pub trait FoundPerson: Clone {
-    /// The box `[x_min, y_min, x_max, y_max]`, corner-origin frame pixels.
-    fn bounds(&self) -> [f64; 4];
-    /// The oriented box in the frame.
-    fn oriented_box(&self) -> OrientedBox;
-    /// The score, a probability.
-    fn score(&self) -> f64;
-    /// Returns the person with another score.
-    #[must_use]
-    fn with_score(self, score: f64) -> Self;
-}
 
 /// The people of a camera since the last search of its frame.
 #[derive(Debug, Clone)]

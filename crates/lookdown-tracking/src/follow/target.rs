@@ -4,8 +4,8 @@ use lookdown_lens::geometry::OrientedBox;
 use nalgebra::Vector2;
 
 use super::{
-    FoundPerson,
     boxes::{hull, iou, widened},
+    found_person::FoundPerson,
     score::{from_logit, logit},
 };
 
