@@ -15,6 +15,7 @@ import contextlib
 import json
 import os
 import re
+import shutil
 import subprocess
 import tempfile
 import time
@@ -22,8 +23,9 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
+from harness.camera_forms import Installation, metric, one_process, pss_bytes, reports_of, three_processes
 from harness.places import LOOKDOWN, ROOT
-from harness.processes import BenchError, Server, free_ports, running
+from harness.processes import BenchError, Server, free_ports
 
 CLIP = ROOT / "tests" / "real" / "walks"
 RTSP_SERVER = ROOT / "tests" / "real" / "rtsp_server.py"
@@ -86,7 +88,7 @@ def rtsp_server(folder: Path) -> Iterator[int]:
 def measured(options: argparse.Namespace, binary: Path, folder: Path, source: int) -> dict:
     """A window with this binary."""
     form = one_process if options.form == "run" else three_processes
-    with form(options, binary.resolve(), folder, source) as servers:
+    with form(installation(options, binary, folder, source)) as servers:
         deadline = time.monotonic() + 60
         while reports_of(servers[0]) < options.cameras:
             if time.monotonic() > deadline:
@@ -118,19 +120,6 @@ def measured(options: argparse.Namespace, binary: Path, folder: Path, source: in
             "pss_mib": [round(pss_bytes(server.pid) / 2**20, 1) for server in servers],
             "pss_of_ffmpeg_mib": round(sum(map(pss_bytes, children(servers))) / 2**20, 1),
         }
-
-
-def metric(server: Server, start: str) -> dict[str, float]:
-    """The values of the metrics whose lines begin like this."""
-    lines = server.get("/metrics").decode().splitlines()
-    found = (line.rpartition(" ") for line in lines if line.startswith(start))
-    return {name: float(value) for name, _, value in found}
-
-
-def reports_of(server: Server) -> float:
-    """The number of frames that were detected."""
-    requests = metric(server, "lookdown_http_requests_total{")
-    return sum(count for name, count in requests.items() if "/detect" in name)
 
 
 def searches_of(server: Server) -> dict[str, float]:
@@ -165,61 +154,26 @@ def children(servers: list[Server]) -> list[int]:
     return [int(child) for task in tasks for child in (task / "children").read_text(encoding="ascii").split()]
 
 
-def pss_bytes(pid: int) -> int:
-    """The proportional set size of a process."""
-    lines = (PROC / str(pid) / "smaps_rollup").read_text(encoding="ascii").splitlines()
-    (pss,) = [line.split()[1] for line in lines if line.startswith("Pss:")]
-    return 1024 * int(pss)
-
-
-def settings(options: argparse.Namespace, folder: Path, source: int, **more: dict) -> Path:
-    """Writes the settings of all parts."""
+def installation(options: argparse.Namespace, binary: Path, folder: Path, source: int) -> Installation:
+    """The cameras of a window, all of the same stream."""
     calibrations = folder / "calibrations"
     calibrations.mkdir()
-    calibration = (CLIP / "calibration.json").read_text(encoding="utf-8")
-    (calibrations / "walks.json").write_text(calibration, encoding="utf-8")
-    tables = {
-        "calibrations": {"path": str(calibrations)},
-        "shutdown": {"grace_millis": 0},
-        "counts": {"path": str(folder / "counts.sqlite")} | more.pop("counts", {}),
-        "state": {"path": str(folder)},
-        "camera_defaults": {"profile": "fast", "every": f"{1000 // WANTED_RATE}ms", "calibration": "walks"}
-        | {"follow": options.follow},
-    } | more
-    lines = []
-    for table, keys in tables.items():
-        lines += [f"[{table}]", *(f"{key} = {json.dumps(value)}" for key, value in keys.items())]
-    for number in range(options.cameras):
-        lines += ["[[cameras]]", f'name = "walks{number}"', f'url = "rtsp://127.0.0.1:{source}/stream"']
-        lines.append("parameters = { score_threshold = 0.06 }")
-    file = folder / "lookdown.toml"
-    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return file
-
-
-@contextlib.contextmanager
-def one_process(options: argparse.Namespace, binary: Path, folder: Path, source: int) -> Iterator[list[Server]]:
-    """Runs `lookdown run`."""
-    (port,) = free_ports(1)
-    file = settings(options, folder, source, server={"listen": f"127.0.0.1:{port}"})
-    with running("one", [str(binary), "run", str(file)], port, "/readyz", {}) as server:
-        yield [server]
-
-
-@contextlib.contextmanager
-def three_processes(options: argparse.Namespace, binary: Path, folder: Path, source: int) -> Iterator[list[Server]]:
-    """Runs `lookdown serve`, `watch` and `count`."""
-    port, watch_port, count_port = free_ports(3)
-    upstream, counts = {"url": f"http://127.0.0.1:{port}"}, {"listen": f"127.0.0.1:{count_port}"}
-    own = {"listen": f"127.0.0.1:{port}"}
-    file = str(settings(options, folder, source, server=own, upstream=upstream, counts=counts))
-    watching = [str(binary), "watch", file, "--metrics-listen", f"127.0.0.1:{watch_port}"]
-    with (
-        running("serve", [str(binary), "serve", "--config", file], port, "/readyz", {}) as server,
-        running("count", [str(binary), "count", file], count_port, "/livez", {}) as count,
-        running("watch", watching, watch_port, "/metrics", {}) as watch,
-    ):
-        yield [server, watch, count]
+    shutil.copy(CLIP / "calibration.json", calibrations / "walks.json")
+    every = f"{1000 // WANTED_RATE}ms"
+    return Installation(
+        binary=binary.resolve(),
+        folder=folder,
+        calibrations=calibrations,
+        camera_defaults={"profile": "fast", "every": every, "calibration": "walks", "follow": options.follow},
+        cameras=[
+            {
+                "name": f"walks{number}",
+                "url": f"rtsp://127.0.0.1:{source}/stream",
+                "parameters.score_threshold": 0.06,
+            }
+            for number in range(options.cameras)
+        ],
+    )
 
 
 if __name__ == "__main__":

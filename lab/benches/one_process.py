@@ -15,11 +15,11 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
+from harness.camera_forms import Installation, one_process, pss_bytes, reports_of, three_processes
 from harness.places import LOOKDOWN, SAMPLES
-from harness.processes import Server, free_ports, running
+from harness.processes import Server
 
 CAMERAS = ("north", "east", "south", "west")
 RATES = (1, 5)
@@ -54,8 +54,10 @@ def main(seconds: float, rounds: int) -> None:
     for number in range(rounds):
         for rate in RATES:
             for form in (one_process, three_processes):
-                with tempfile.TemporaryDirectory() as folder, form(Path(folder), source.server_port, rate) as servers:
-                    window = measure(servers, seconds)
+                with tempfile.TemporaryDirectory() as folder:
+                    cameras = installation(Path(folder), source.server_port, rate)
+                    with form(cameras) as servers:
+                        window = measure(servers, seconds)
                 print(json.dumps({"round": number, "form": form.__name__, "rate": rate} | window), flush=True)
 
 
@@ -73,16 +75,6 @@ def measure(servers: list[Server], seconds: float) -> dict:
     }
 
 
-def reports_of(server: Server) -> float:
-    """The number of frames that were detected."""
-    lines = server.get("/metrics").decode().splitlines()
-    return sum(
-        float(line.split()[-1])
-        for line in lines
-        if line.startswith("lookdown_http_requests_total{") and "/detect" in line
-    )
-
-
 def cpu_seconds(servers: list[Server]) -> float:
     """The CPU time of the processes."""
     fields = [
@@ -91,54 +83,15 @@ def cpu_seconds(servers: list[Server]) -> float:
     return sum(int(field[11]) + int(field[12]) for field in fields) / TICKS_PER_SECOND
 
 
-def pss_bytes(pid: int) -> int:
-    """The proportional set size of a process."""
-    lines = Path(f"/proc/{pid}/smaps_rollup").read_text(encoding="ascii").splitlines()
-    (pss,) = [line.split()[1] for line in lines if line.startswith("Pss:")]
-    return 1024 * int(pss)
-
-
-def settings(folder: Path, source: int, rate: int, **more: str) -> Path:
-    """Writes the settings of all parts."""
-    tables = {"calibrations": {"path": str(SAMPLES / "calibrations")}, "shutdown": {"grace_millis": 0}}
-    tables |= {
-        "counts": {"path": str(folder / "counts.sqlite")} | more.pop("counts", {}),
-        "state": {"path": str(folder)},
-    }
-    tables |= {"camera_defaults": {"profile": "fast", "every": f"{1000 // rate}ms", "calibration": "office"}} | more
-    lines = []
-    for table, keys in tables.items():
-        lines += [f"[{table}]", *(f"{key} = {json.dumps(value)}" for key, value in keys.items())]
-    for name in CAMERAS:
-        lines += ["[[cameras]]", f'name = "{name}"', f'url = "http://127.0.0.1:{source}/{name}"']
-    file = folder / "lookdown.toml"
-    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return file
-
-
-@contextlib.contextmanager
-def one_process(folder: Path, source: int, rate: int) -> Iterator[list[Server]]:
-    """Runs `lookdown run`."""
-    (port,) = free_ports(1)
-    file = settings(folder, source, rate, server={"listen": f"127.0.0.1:{port}"})
-    with running("one", [str(LOOKDOWN), "run", str(file)], port, "/readyz", {}) as server:
-        yield [server]
-
-
-@contextlib.contextmanager
-def three_processes(folder: Path, source: int, rate: int) -> Iterator[list[Server]]:
-    """Runs `lookdown serve`, `watch` and `count`."""
-    port, watch_port, count_port = free_ports(3)
-    upstream = {"url": f"http://127.0.0.1:{port}"}
-    counts = {"listen": f"127.0.0.1:{count_port}"}
-    file = str(settings(folder, source, rate, server={"listen": f"127.0.0.1:{port}"}, upstream=upstream, counts=counts))
-    watching = [str(LOOKDOWN), "watch", file, "--metrics-listen", f"127.0.0.1:{watch_port}"]
-    with (
-        running("serve", [str(LOOKDOWN), "serve", "--config", file], port, "/readyz", {}) as server,
-        running("count", [str(LOOKDOWN), "count", file], count_port, "/livez", {}) as count,
-        running("watch", watching, watch_port, "/metrics", {}) as watch,
-    ):
-        yield [server, watch, count]
+def installation(folder: Path, source: int, rate: int) -> Installation:
+    """The four cameras of a window."""
+    return Installation(
+        binary=LOOKDOWN,
+        folder=folder,
+        calibrations=SAMPLES / "calibrations",
+        camera_defaults={"profile": "fast", "every": f"{1000 // rate}ms", "calibration": "office"},
+        cameras=[{"name": name, "url": f"http://127.0.0.1:{source}/{name}"} for name in CAMERAS],
+    )
 
 
 if __name__ == "__main__":

@@ -22,6 +22,11 @@ pub use self::{
     score::{from_logit, logit},
 };
 
+/// Time from a search to the next one, seconds: a little less than a second, because frames jitter.
+pub const SEARCH_EVERY_S: f64 = 0.9;
+/// Cells with motion belong to the same motion if at most this many cells less one lie between them.
+pub const JOINED_CELLS: f64 = 2.0;
+
 /// The people of a camera since the last search of its frame.
 #[derive(Debug, Clone)]
 pub struct FollowedPeople<P> {

@@ -9,11 +9,11 @@ use std::{
     time::Duration,
 };
 
-use jiff::{SignedDuration, Timestamp};
+use jiff::Timestamp;
 use lookdown_lens::geometry::{
     OrientedBox, crop_placement::CropTarget, oriented_box::vertical_in_frame,
 };
-use lookdown_tracking::follow::{FollowedPeople, FoundPerson};
+use lookdown_tracking::follow::{FollowedPeople, FoundPerson, JOINED_CELLS, SEARCH_EVERY_S};
 use nalgebra::Point2;
 use parking_lot::Mutex;
 
@@ -26,12 +26,8 @@ use crate::{
     inference::Model,
 };
 
-/// Time from a search to the next one, a little less than a second: frames jitter.
-const SEARCH_EVERY: SignedDuration = SignedDuration::from_millis(900);
 /// Most persons in motion that are followed. With more, every frame is searched.
 const MAX_MOVING: usize = 32;
-/// Cells with motion belong to the same motion if at most this many cells less one lie between them.
-const JOINED_CELLS: f64 = 2.0;
 /// If more than one of this many cells has moved, the light has changed: the frame is searched.
 const MOST_MOVED: usize = 4;
 /// Least score of boxes of crops, before they get the odds of their persons.
@@ -124,7 +120,7 @@ impl Followed {
         let moved = signature.moved_since(&self.searched, &self.visible)?;
         let moved = if is_noise(&moved) { Vec::new() } else { moved };
         let is_still = moved.is_empty() && self.people.are_all_seen();
-        if age >= SEARCH_EVERY && !(is_still && self.origin.skips_still_frames) {
+        if age.as_secs_f64() >= SEARCH_EVERY_S && !(is_still && self.origin.skips_still_frames) {
             return None;
         }
         if moved.len() > self.visible.len() / MOST_MOVED || !self.explains(&moved, at) {

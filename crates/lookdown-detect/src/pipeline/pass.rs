@@ -45,10 +45,11 @@ pub(super) fn detections(passes: &[Pass]) -> impl Iterator<Item = PassDetection<
     numbered.flat_map(|(first, pass)| {
         let views = pass.per_view.iter().enumerate();
         views.flat_map(move |(view, found)| {
+            let vote = first + pass.rig.voter(view);
             found.iter().map(move |detection| PassDetection {
                 pass,
                 view,
-                vote: first + pass.rig.voter(view),
+                vote,
                 detection,
             })
         })

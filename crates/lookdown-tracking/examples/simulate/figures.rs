@@ -2,6 +2,8 @@
 //!
 //! `lab/benches/count/measure_detector.py` derives them from detections of `lookdown eval`, with `fusion`.
 
+use lookdown_tracking::follow::logit;
+
 /// Scores at which the recall is measured.
 const SCORES: [f64; 10] = [0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
 /// Least score of a simulated person: the tracker ignores those below 0.06.
@@ -224,10 +226,6 @@ impl FalseAlarms {
         let share = distribution(-normal).max(f64::MIN_POSITIVE);
         logit(SCORE_FLOOR) - self.logit * share.ln()
     }
-}
-
-fn logit(probability: f64) -> f64 {
-    (probability / (1.0 - probability)).ln()
 }
 
 /// The distribution function of the standard normal distribution (Abramowitz and Stegun (1964),

@@ -2,18 +2,16 @@
 //! stand for the cells with motion.
 
 use lookdown_lens::geometry::OrientedBox;
-use lookdown_tracking::follow::{FollowedPeople, FoundPerson, from_logit, logit, overlap, widened};
+use lookdown_tracking::follow::{
+    FollowedPeople, FoundPerson, JOINED_CELLS, SEARCH_EVERY_S, from_logit, logit, overlap, widened,
+};
 
 use crate::detector::{Camera, FRAME_PX, Found, Shown, bounds};
 
-/// Time from a search to the next one, seconds.
-const SEARCH_EVERY_S: f64 = 0.9;
 /// Side of a cell of the motion detection, pixels.
 const CELL_PX: f64 = FRAME_PX / 64.0;
 /// Least shift of a person that changes a cell, pixels.
 const MOVED_PX: f64 = CELL_PX / 8.0;
-/// Motion belongs to the same motion if at most these pixels lie between.
-const JOINED_PX: f64 = 2.0 * CELL_PX;
 /// The margin of a crop around the expected box of its person, as a share of the larger side.
 const CROP_MARGIN: f64 = 0.5;
 /// The least score of a box that makes a new person.
@@ -116,7 +114,9 @@ impl State {
             return None;
         }
         let moved = self.motion(shown);
-        let others = self.people.unexplained(&moved, JOINED_PX, at_s);
+        let others = self
+            .people
+            .unexplained(&moved, JOINED_CELLS * CELL_PX, at_s);
         others.is_empty().then(|| self.people.moving(&moved, at_s))
     }
 
