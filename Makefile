@@ -60,7 +60,8 @@ test: ## set up, then check formatting, lints, tests and documentation; needs on
 	.setup/venv/bin/python -m unittest discover -s scripts/convert/tests -t scripts
 	$(PYTHON) -m unittest discover -s lab/benches/tests -t lab/benches
 	$(PYTHON) -m unittest discover -s tests/reliability/tests -t tests/reliability
-	cargo test --workspace --locked
+	@# Many tests wait: for servers, timeouts and processes.
+	RUST_TEST_THREADS=$$(( 3 * $$(nproc) )) cargo test --workspace --locked
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --document-private-items --locked
 
 audit: ## check the licenses, sources and bans of all dependencies (deny.toml)

@@ -1,8 +1,9 @@
-"""A frame of a room with rectangles on its walls, as a tilted ceiling camera sees it."""
+"""A frame of a room with rectangles on its walls, as a tilted ceiling camera sees it, and one without a room."""
 
 import math
 import struct
 import zlib
+from collections.abc import Callable
 
 SIDE = 560
 """Pixels of the frame."""
@@ -15,7 +16,17 @@ WALLS = ((-3.1, 3.7), (-2.6, 3.2), (-0.2, 2.6))
 
 def rendered_room() -> bytes:
     """Returns the frame as a PNG."""
-    fine = [[_brightness(x / 2 + 0.25, y / 2 + 0.25) for x in range(2 * SIDE)] for y in range(2 * SIDE)]
+    return _image(_brightness)
+
+
+def plain_disc() -> bytes:
+    """Returns a frame without a room, a gray disc, as a PNG."""
+    return _image(lambda x, y: 120 * (math.hypot(x - SIDE / 2, y - SIDE / 2) <= RADIUS))
+
+
+def _image(brightness: Callable[[float, float], float]) -> bytes:
+    """Returns a gray PNG of the mean brightness in the quarters of each pixel."""
+    fine = [[brightness(x / 2 + 0.25, y / 2 + 0.25) for x in range(2 * SIDE)] for y in range(2 * SIDE)]
     rows = bytearray()
     for upper, lower in zip(fine[::2], fine[1::2], strict=True):
         rows.append(0)

@@ -6,12 +6,25 @@ Each test starts the release binary, or the one that `LOOKDOWN_BINARY` names, an
 
 import signal
 import sys
+import time
 import unittest
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 for folder in (HERE, HERE.parent / "reliability", HERE.parents[1] / "lab/benches"):
     sys.path.insert(0, str(folder))
+
+
+class TimedResult(unittest.TextTestResult):
+    """Prints the seconds of each test after its outcome."""
+
+    def startTest(self, test: unittest.TestCase) -> None:
+        self._started = time.monotonic()
+        super().startTest(test)
+
+    def stopTest(self, test: unittest.TestCase) -> None:
+        self.stream.writeln(f"  {time.monotonic() - self._started:.1f} s")
+        super().stopTest(test)
 
 
 def main(parts: list[str]) -> int:
@@ -24,7 +37,7 @@ def main(parts: list[str]) -> int:
     # Started servers are stopped on exit.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     tests = unittest.defaultTestLoader.loadTestsFromNames([f"test_{part}" for part in parts or there])
-    result = unittest.TextTestRunner(verbosity=2).run(tests)
+    result = unittest.TextTestRunner(verbosity=2, resultclass=TimedResult).run(tests)
     return 0 if result.wasSuccessful() and result.testsRun else 1
 
 

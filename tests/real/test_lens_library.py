@@ -42,7 +42,7 @@ class LensLibrary(unittest.TestCase):
             self.assertAlmostEqual(y, CY, places=9)
 
     def test_the_libraries_can_be_packaged(self):
-        chosen = [f"--package=lookdown-{name}" for name in ("common", "lens", "detect", "eval")]
+        chosen = [f"--package=lookdown-{name}" for name in ("common", "lens", "tracking", "detect", "eval")]
         said = cargo("package", "--allow-dirty", "--no-verify", "--offline", *chosen, cwd=ROOT)
         self.assertEqual(said.count("Packaged"), len(chosen), said)
 

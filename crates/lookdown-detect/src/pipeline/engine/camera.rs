@@ -29,20 +29,29 @@ use crate::{
 /// of one camera to one rig; a quarter of a percent does not move boxes visibly.
 const CIRCLE_STEP_SHARE: f64 = 1.0 / 400.0;
 
-/// Returns the rig key of the assumed camera with the rounded circle.
+/// Returns the rig key of the assumed camera, and the rounded circle. The rig must be built of the
+/// latter: all circles with this key then get the same answers, whichever came first.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "steps within a bounded frame"
 )]
-fn rounded(circle: &LensCircle) -> RigCamera {
+fn rounded(circle: &LensCircle) -> (RigCamera, LensCircle) {
     // The step of the radius grows with the radius; the center uses the same step.
-    let radius = (circle.radius.max(1.0).ln() / CIRCLE_STEP_SHARE).round();
-    let step = ((radius * CIRCLE_STEP_SHARE).exp() * CIRCLE_STEP_SHARE).max(0.5);
-    RigCamera::Assumed {
-        cx: (circle.cx / step).round() as i64,
-        cy: (circle.cy / step).round() as i64,
-        radius: radius as i64,
-    }
+    let radius_steps = (circle.radius.max(1.0).ln() / CIRCLE_STEP_SHARE).round();
+    let radius = (radius_steps * CIRCLE_STEP_SHARE).exp();
+    let step = (radius * CIRCLE_STEP_SHARE).max(0.5);
+    let (cx_steps, cy_steps) = ((circle.cx / step).round(), (circle.cy / step).round());
+    let camera = RigCamera::Assumed {
+        cx: cx_steps as i64,
+        cy: cy_steps as i64,
+        radius: radius_steps as i64,
+    };
+    let circle = LensCircle {
+        cx: cx_steps * step,
+        cy: cy_steps * step,
+        radius,
+    };
+    (camera, circle)
 }
 
 /// The rig of a frame's camera, with the calibration that the report names.
@@ -111,7 +120,7 @@ impl Engine {
     ) -> Result<FrameCamera, PipelineError> {
         let found = find_lens_circle(frame);
         let circle = found.unwrap_or_else(|| assumed_circle(frame.width(), frame.height()));
-        let camera = rounded(&circle);
+        let (camera, circle) = rounded(&circle);
         let lens = Lens::equidistant_circle(circle.cx, circle.cy, circle.radius, FRAC_PI_2)
             .map_err(|error| internal(anyhow::Error::new(error)))?;
         warnings.push(Warning::new(
@@ -173,15 +182,33 @@ mod tests {
 
     #[test]
     fn different_circles_are_different_cameras() {
-        let camera = rounded(&circle(840.0, 840.0, 830.0));
-        assert_ne!(rounded(&circle(800.0, 800.0, 790.476)), camera);
-        assert_ne!(rounded(&circle(846.0, 840.0, 830.0)), camera);
-        assert_ne!(rounded(&circle(840.0, 840.0, 836.0)), camera);
+        let (camera, _) = rounded(&circle(840.0, 840.0, 830.0));
+        for other in [
+            circle(800.0, 800.0, 790.476),
+            circle(846.0, 840.0, 830.0),
+            circle(840.0, 840.0, 836.0),
+        ] {
+            assert_ne!(rounded(&other).0, camera);
+        }
     }
 
     #[test]
-    fn a_jittering_circle_is_one_camera() {
+    fn a_jittering_circle_is_one_camera_with_one_circle() {
         let camera = rounded(&circle(840.0, 840.0, 830.0));
         assert_eq!(rounded(&circle(840.2, 839.8, 830.2)), camera);
+    }
+
+    #[test]
+    fn a_rounded_circle_moves_by_half_a_step_at_most() {
+        let found = circle(839.3, 841.9, 830.7);
+        let (_, used) = rounded(&found);
+        let most = found.radius * CIRCLE_STEP_SHARE * 0.51;
+        for (used, found) in [
+            (used.cx, found.cx),
+            (used.cy, found.cy),
+            (used.radius, found.radius),
+        ] {
+            assert!((used - found).abs() <= most, "{used} {found}");
+        }
     }
 }
