@@ -121,8 +121,7 @@ real: ## test with a browser, Redis, brokers, clients ..., or only PARTS: tests/
 
 reliability: ## kill, flood, starve and soak the server (an hour), or only PARTS: docs/lab/reliability.md
 	@$(PYTHON) scripts/setup.py toolchain runtime model reliability
-	cargo build --release --locked --target-dir target
-	cargo build --release --locked --example load --target-dir target
+	cargo build --release --locked --package lookdown --package lookdown-load --target-dir target
 	$(PYTHON) tests/reliability/run.py $(FORM) $(PARTS)
 
 bench: ## run short benchmarks against other servers (a few minutes): lab/benches/RESULTS.md
@@ -132,8 +131,7 @@ bench-full: BENCH = full
 bench bench-full:
 	@scripts/packages.sh haproxy
 	@$(PYTHON) scripts/setup.py toolchain runtime model benches
-	cargo build --release --locked --target-dir target
-	cargo build --release --locked --example load --target-dir target
+	cargo build --release --locked --package lookdown --package lookdown-load --target-dir target
 	.setup/benches/benches/bin/python lab/benches/run.py $(BENCH) $(PARTS)
 
 ci: ## run the continuous integration

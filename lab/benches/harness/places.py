@@ -17,7 +17,7 @@ WORK = PYTHONS / "work"
 
 LOOKDOWN = Path(os.environ.get("LOOKDOWN_BINARY") or ROOT / "target" / "release" / "lookdown")
 """The release binary, or the one that the environment names."""
-LOAD = ROOT / "target" / "release" / "examples" / "load"
+LOAD = ROOT / "target" / "release" / "load"
 
 
 def model(name: str) -> Path:

@@ -18,7 +18,7 @@ pub const CRATES: [(&str, &str); 12] = [
     ("lookdown-count", "crates/lookdown-count/src"),
     ("lookdown", "src"),
     ("lookdown-python", "crates/lookdown-python/src"),
-    ("load", "lab/benches/load"),
+    ("lookdown-load", "lab/benches/load"),
     ("simulate", "crates/lookdown-tracking/examples/simulate"),
 ];
 

@@ -40,15 +40,15 @@ fn rounded(circle: &LensCircle) -> (RigCamera, LensCircle) {
     let radius_steps = (circle.radius.max(1.0).ln() / CIRCLE_STEP_SHARE).round();
     let radius = (radius_steps * CIRCLE_STEP_SHARE).exp();
     let step = (radius * CIRCLE_STEP_SHARE).max(0.5);
-    let (cx_steps, cy_steps) = ((circle.cx / step).round(), (circle.cy / step).round());
+    let [cx, cy] = [circle.cx, circle.cy].map(|center| (center / step).round());
     let camera = RigCamera::Assumed {
-        cx: cx_steps as i64,
-        cy: cy_steps as i64,
+        cx: cx as i64,
+        cy: cy as i64,
         radius: radius_steps as i64,
     };
     let circle = LensCircle {
-        cx: cx_steps * step,
-        cy: cy_steps * step,
+        cx: cx * step,
+        cy: cy * step,
         radius,
     };
     (camera, circle)
