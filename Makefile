@@ -116,7 +116,8 @@ real: ## test with a browser, Redis, brokers, clients ..., or only PARTS: tests/
 	@command -v npm > /dev/null || scripts/packages.sh npm
 	@$(PYTHON) scripts/setup.py toolchain runtime model real-parts wheel
 	cargo build --release --locked --target-dir target
-	LOOKDOWN_COMMIT=$(LOOKDOWN_COMMIT) $(PYTHON) scripts/wheel.py
+	@# Half the time of the wheel that `make wheel` builds.
+	LOOKDOWN_COMMIT=$(LOOKDOWN_COMMIT) $(PYTHON) scripts/wheel.py quick
 	$(PYTHON) tests/real/run.py $(PARTS)
 
 reliability: ## kill, flood, starve and soak the server (an hour), or only PARTS: docs/lab/reliability.md

@@ -1,7 +1,8 @@
-"""Builds the Python wheel into target/wheels: `wheel.py`, after the set-up with the steps `model` and `wheel`.
+"""Builds the Python wheel: `wheel.py [PROFILE]`, after the set-up with the steps `model` and `wheel`.
 
-The wheel has the default models inside and takes ONNX Runtime from its own package. It is linked for glibc 2.28 with
-zig, so that it runs on every distribution since 2018.
+`PROFILE` is one of Cargo.toml, by default `release`, into target/wheels. Any other one is for tests, and its wheel goes
+into target/PROFILE/wheels. The wheel has the default models inside and takes ONNX Runtime from its own package. It is
+linked for glibc 2.28 with zig, so that it runs on every distribution since 2018.
 """
 
 import os
@@ -15,22 +16,22 @@ from dist import ROOT, default_model_files
 
 CRATE = ROOT / "crates" / "lookdown-python"
 TOOLS = ROOT / ".setup" / "wheel" / "bin"
-WHEELS = ROOT / "target" / "wheels"
 PLATFORM = "manylinux_2_28"
 
 
-def main() -> int:
+def main(profile: str = "release") -> int:
     """Collects the models, builds the wheel, and checks its platform."""
+    wheels = ROOT / "target" / ("wheels" if profile == "release" else f"{profile}/wheels")
     collect_models(CRATE / "python" / "lookdown")
     for text in ("LICENSE", "NOTICE"):
         shutil.copyfile(ROOT / text, CRATE / text)
-    shutil.rmtree(WHEELS, ignore_errors=True)
+    shutil.rmtree(wheels, ignore_errors=True)
     environment = os.environ | {"PATH": f"{TOOLS}:{os.environ['PATH']}"}
-    flags = ["--release", "--locked", "--zig", "--compatibility", PLATFORM, "--out", WHEELS]
+    flags = ["--profile", profile, "--locked", "--zig", "--compatibility", PLATFORM, "--out", wheels]
     built = subprocess.run([TOOLS / "maturin", "build", *flags], cwd=CRATE, env=environment, check=False)
     if built.returncode != 0:
         return built.returncode
-    (wheel,) = WHEELS.glob("*.whl")
+    (wheel,) = wheels.glob("*.whl")
     shown = subprocess.run([TOOLS / "auditwheel", "show", wheel], stdout=subprocess.PIPE, text=True, check=True).stdout
     if f'"{PLATFORM}_x86_64"' not in shown.replace("\n", " "):
         print(f"{wheel.name}: auditwheel does not find it fit for {PLATFORM}:\n{shown}", file=sys.stderr)
@@ -50,4 +51,4 @@ def collect_models(package: Path) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(*sys.argv[1:]))

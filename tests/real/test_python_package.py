@@ -26,7 +26,7 @@ class PythonPackage(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        (wheel,) = (ROOT / "target" / "wheels").glob("*.whl")
+        (wheel,) = (ROOT / "target" / "quick" / "wheels").glob("*.whl")
         folder = Path(cls.enterClassContext(tempfile.TemporaryDirectory()))
         cls.folder = folder
         started = time.monotonic()
