@@ -4,7 +4,7 @@ use std::path::Path;
 
 use ort::{
     environment::Environment,
-    ep::{CUDA, ExecutionProvider, ExecutionProviderDispatch, TensorRT},
+    ep::{CUDA, ExecutionProvider, ExecutionProviderDispatch, TensorRT, cuda::ConvAlgorithmSearch},
     session::{Session, builder::SessionBuilder},
 };
 
@@ -56,6 +56,9 @@ fn providers(device: Device) -> (Vec<ExecutionProviderDispatch>, bool) {
     let cuda = |number| {
         CUDA::default()
             .with_device_id(number)
+            // The default measures all algorithms for each new size of a batch, about a second each
+            // time, and the number of crops changes from frame to frame.
+            .with_conv_algorithm_search(ConvAlgorithmSearch::Heuristic)
             .build()
             .error_on_failure()
     };
