@@ -5,9 +5,9 @@ use std::{path::Path, sync::Arc};
 use anyhow::anyhow;
 use lookdown_detect::{
     inference::{
-        CandidateOptions, Int8Use, Model, ModelFolder, ModelLoader, ModelManifest, ModelRepository,
-        OnnxOptions, RemoteDetector, RemoteOptions, RemoteServer, RepositoryOptions, is_fetched,
-        onnx_loader,
+        CandidateOptions, Device, Int8Use, Model, ModelFolder, ModelLoader, ModelManifest,
+        ModelRepository, OnnxOptions, RemoteDetector, RemoteOptions, RemoteServer,
+        RepositoryOptions, is_fetched, onnx_loader,
     },
     metrics::{DetectMetrics, replace_info},
     parameters::Profile,
@@ -117,9 +117,11 @@ fn remote_options(remote: &RemoteSettings, called: String) -> RemoteOptions {
 
 /// The settings of the ONNX runtime.
 pub(crate) fn onnx_options(settings: &Settings) -> OnnxOptions {
+    let device = settings.inference.device;
     OnnxOptions {
-        device: settings.inference.device,
+        device,
         threads: settings.threads.per_session,
+        views_per_run: (device != Device::Cpu).then_some(settings.threads.batch_views),
         candidates: candidate_options(settings),
     }
 }

@@ -27,7 +27,7 @@ settings! {
         library_path: PathBuf = DEFAULT_LIBRARY.into() => path();
         /// The device that runs models: `cpu`, or a GPU by its number as `cuda:0` or `tensorrt:0`.
         /// For a GPU, `inference.library_path` must be the `libonnxruntime.so` of the package
-        /// `onnxruntime-gpu`. TensorRT is experimental: it has not been tested.
+        /// `onnxruntime-gpu`. `tensorrt` is experimental: it has not been tested.
         device: Device = Device::Cpu => device();
         /// The precision of the default models on the CPU. `auto`: 8-bit integers for upright
         /// crops and all profiles, for `balanced` and `quality` only if the CPU has instructions

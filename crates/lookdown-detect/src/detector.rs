@@ -83,6 +83,7 @@ impl Detector {
         let onnx = OnnxOptions {
             device: options.device,
             threads: NonZeroUsize::MIN,
+            views_per_run: None,
             candidates: CandidateOptions::DEFAULT,
         };
         let engine_options = EngineOptions::new(default_models, options.threads);

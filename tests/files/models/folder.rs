@@ -33,6 +33,7 @@ pub(crate) fn options() -> OnnxOptions {
     OnnxOptions {
         device: Device::Cpu,
         threads: NonZeroUsize::new(2).unwrap(),
+        views_per_run: None,
         candidates: CandidateOptions {
             score_floor: 0.01,
             max_detections_per_view: 100,

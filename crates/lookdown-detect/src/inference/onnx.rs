@@ -130,7 +130,7 @@ impl OnnxDetector {
         let detector = |session| Self {
             session,
             description: description.clone(),
-            staging: Staging::new(&signature),
+            staging: Staging::new(&signature, options.views_per_run),
             options: options.clone(),
         };
         let others = others.into_iter().map(detector).collect();

@@ -57,7 +57,7 @@ impl RemoteDetector {
         let session = || Self {
             server: Arc::clone(server),
             understood: Arc::clone(&understood),
-            staging: Staging::new(&understood.signature),
+            staging: Staging::new(&understood.signature, None),
             options,
         };
         let others = (1..count.get()).map(|_| session()).collect();

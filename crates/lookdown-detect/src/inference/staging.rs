@@ -22,11 +22,12 @@ pub(super) struct Staged<'a> {
 }
 
 impl Staging {
-    pub(super) fn new(signature: &Signature) -> Self {
+    /// Staging for a model; `views_per_run` is for one that takes any number of views.
+    pub(super) fn new(signature: &Signature, views_per_run: Option<NonZeroUsize>) -> Self {
         Self {
             input_name: signature.input_name.clone(),
             layout: signature.layout,
-            views_per_run: signature.views_per_run,
+            views_per_run: signature.views_per_run.or(views_per_run),
             values: Vec::new(),
         }
     }
@@ -85,13 +86,17 @@ mod tests {
     use super::*;
 
     fn staging(layout: Layout, views_per_run: usize) -> Staging {
-        Staging::new(&Signature {
+        Staging::new(&signature(layout, views_per_run), None)
+    }
+
+    fn signature(layout: Layout, views_per_run: usize) -> Signature {
+        Signature {
             input_name: "images".to_owned(),
             layout,
             views_per_run: NonZeroUsize::new(views_per_run),
             width: 2,
             height: 1,
-        })
+        }
     }
 
     /// Values 1, 2, 3, … in views of 2×1 pixels.
@@ -133,6 +138,18 @@ mod tests {
         assert_eq!(last.shape, [2, 3, 1, 2]);
         assert_eq!(last.values[..6], batch.values()[12..]);
         assert_eq!(last.values[6..], [0.0; 6]);
+    }
+
+    #[test]
+    fn an_open_batch_is_padded_to_the_number_of_the_options() {
+        let (batch, input) = batch(3);
+        let mut staging = Staging::new(&signature(Layout::Nchw, 0), NonZeroUsize::new(4));
+        let pieces: Vec<_> = staging.pieces(&batch, &input).collect();
+        assert_eq!(pieces, [batch.values()]);
+        let staged = staging.stage(pieces[0], &input);
+        assert_eq!(staged.shape, [4, 3, 1, 2]);
+        assert_eq!(staged.values[..18], *batch.values());
+        assert_eq!(staged.values[18..], [0.0; 6]);
     }
 
     #[test]

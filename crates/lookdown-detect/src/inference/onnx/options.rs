@@ -11,6 +11,10 @@ pub struct OnnxOptions {
     pub device: Device,
     /// Threads within one run of the network.
     pub threads: NonZeroUsize,
+    /// Views of every run of a network that takes any number; black views take the place of missing
+    /// ones. A GPU needs it: it prepares a network for each new number, which takes longer than a
+    /// run. `None`: as many as there are.
+    pub views_per_run: Option<NonZeroUsize>,
     /// Limits on the candidates that are kept.
     pub candidates: CandidateOptions,
 }
