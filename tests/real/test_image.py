@@ -8,6 +8,7 @@ import stat
 import subprocess
 import tempfile
 import time
+import tomllib
 import unittest
 from fnmatch import fnmatch
 from pathlib import Path
@@ -87,6 +88,14 @@ class ContainerImage(unittest.TestCase):
         for source in sources:
             parts = [source, *map(str, Path(source).parents)]
             self.assertTrue(any(fnmatch(part, pattern) for part in parts for pattern in let_in), source)
+
+    def test_each_member_of_the_workspace_is_copied(self):
+        # Cargo reads the manifests of all members, also of those that it does not build.
+        members = tomllib.loads((ROOT / "Cargo.toml").read_text(encoding="utf-8"))["workspace"]["members"]
+        dockerfile = (ROOT / "docker" / "Dockerfile").read_text(encoding="utf-8")
+        copied = re.findall(r"^COPY (\S+) \1$", dockerfile, re.MULTILINE)
+        for member in members:
+            self.assertIn(member.removesuffix("/*"), copied)
 
     def test_it_serves_read_only_and_its_health_check_works(self):
         (port,) = free_ports(1)
