@@ -32,7 +32,8 @@ settings! {
         /// the cores.
         threads: Option<NonZeroUsize> = None => count();
         /// The most views in one run of the network, of one or several frames. 0: one on a CPU,
-        /// where more is not faster, eight on a GPU or another server.
+        /// where more is not faster, eight on a GPU or another server. On a GPU every run has as
+        /// many: black views take the place of missing ones.
         max_batch_views: Option<NonZeroUsize> = None => count();
     }
 }
