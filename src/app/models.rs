@@ -5,9 +5,9 @@ use std::{path::Path, sync::Arc};
 use anyhow::anyhow;
 use lookdown_detect::{
     inference::{
-        CandidateOptions, Device, Int8Use, Model, ModelFolder, ModelLoader, ModelManifest,
-        ModelRepository, OnnxOptions, RemoteDetector, RemoteOptions, RemoteServer,
-        RepositoryOptions, is_fetched, onnx_loader,
+        CandidateOptions, Int8Use, Model, ModelFolder, ModelLoader, ModelManifest, ModelRepository,
+        OnnxOptions, RemoteDetector, RemoteOptions, RemoteServer, RepositoryOptions, is_fetched,
+        onnx_loader,
     },
     metrics::{DetectMetrics, replace_info},
     parameters::Profile,
@@ -121,7 +121,7 @@ pub(crate) fn onnx_options(settings: &Settings) -> OnnxOptions {
     OnnxOptions {
         device,
         threads: settings.threads.per_session,
-        views_per_run: (device != Device::Cpu).then_some(settings.threads.batch_views),
+        views_per_run: (!device.is_processor()).then_some(settings.threads.batch_views),
         candidates: candidate_options(settings),
     }
 }

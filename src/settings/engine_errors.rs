@@ -34,7 +34,7 @@ pub fn explain(error: &InferenceError) -> String {
 
 #[cfg(test)]
 mod tests {
-    use lookdown_detect::inference::Device;
+    use lookdown_detect::inference::{Device, OpenVinoDevice};
 
     use super::*;
 
@@ -63,6 +63,17 @@ mod tests {
                     "inference.device",
                     "inference.library_path: cuda:0 ",
                     "onnxruntime-gpu",
+                ],
+            ),
+            (
+                InferenceError::NoProvider {
+                    device: Device::OpenVino(OpenVinoDevice::Gpu),
+                    path: path(),
+                },
+                [
+                    "inference.device",
+                    "inference.library_path: openvino:gpu ",
+                    "onnxruntime-openvino",
                 ],
             ),
             (

@@ -25,9 +25,11 @@ settings! {
         /// the repository that it was built in, and in `/usr/lib/lookdown`, never in the current
         /// folder.
         library_path: PathBuf = DEFAULT_LIBRARY.into() => path();
-        /// The device that runs models: `cpu`, or a GPU by its number as `cuda:0` or `tensorrt:0`.
-        /// For a GPU, `inference.library_path` must be the `libonnxruntime.so` of the package
-        /// `onnxruntime-gpu`. `tensorrt` is experimental: it has not been tested.
+        /// The device that runs models: `cpu`, an NVIDIA GPU by its number as `cuda:0` or
+        /// `tensorrt:0`, or a device of Intel as `openvino:gpu`, `openvino:npu` or `openvino:cpu`.
+        /// For all but `cpu`, `inference.library_path` must be the `libonnxruntime.so` of the
+        /// package `onnxruntime-gpu` or `onnxruntime-openvino`. `tensorrt`, `openvino:gpu` and
+        /// `openvino:npu` are experimental: they have not been tested.
         device: Device = Device::Cpu => device();
         /// The precision of the default models on the CPU. `auto`: 8-bit integers for upright
         /// crops and all profiles, for `balanced` and `quality` only if the CPU has instructions
@@ -51,7 +53,7 @@ settings! {
 fn device() -> Form<Device> {
     let parse = |name: &str| name.parse();
     parsed(
-        "`cpu`, `cuda:N` or `tensorrt:N`",
+        "`cpu`, `cuda:N`, `tensorrt:N`, `openvino:cpu`, `openvino:gpu` or `openvino:npu`",
         move |name| parse(name).map_err(|error: UnknownDevice| Refusal::Shown(error.to_string())),
         Device::to_string,
     )

@@ -57,9 +57,10 @@ enum Computing {
 
 impl Computing {
     fn of(device: Device, is_remote: bool) -> Self {
-        match device {
-            Device::Cpu if !is_remote => Self::Here,
-            _ => Self::Elsewhere,
+        if device.is_processor() && !is_remote {
+            Self::Here
+        } else {
+            Self::Elsewhere
         }
     }
 }

@@ -19,7 +19,7 @@ mod signature;
 mod staging;
 
 pub use detector::Detector;
-pub use device::{Device, UnknownDevice};
+pub use device::{Device, OpenVinoDevice, UnknownDevice};
 pub use error::InferenceError;
 pub use fetch::{FetchError, Installed, ModelSource, Sha256Sum, fetch_upstream, fetch_weights};
 pub use guess::{GuessedHead, INPUTS, guess_head, guess_size};

@@ -2,7 +2,9 @@
 
 use std::{fs, os::unix::fs::symlink};
 
-use lookdown_detect::inference::{Device, InferenceError, OnnxDetector, OnnxOptions};
+use lookdown_detect::inference::{
+    Device, InferenceError, OnnxDetector, OnnxOptions, OpenVinoDevice,
+};
 use tempfile::TempDir;
 
 use crate::models::folder::{fixture, library, load, options, refusal, write};
@@ -197,8 +199,12 @@ fn a_file_that_is_not_onnx_is_refused() {
 }
 
 #[test]
-fn a_library_without_gpu_support_refuses_a_gpu() {
-    for device in [Device::Cuda(0), Device::TensorRt(1)] {
+fn a_library_without_the_provider_of_a_device_refuses_it() {
+    for device in [
+        Device::Cuda(0),
+        Device::TensorRt(1),
+        Device::OpenVino(OpenVinoDevice::Cpu),
+    ] {
         let options = OnnxOptions {
             device,
             ..options()
@@ -210,7 +216,7 @@ fn a_library_without_gpu_support_refuses_a_gpu() {
             matches!(error, InferenceError::NoProvider { .. }),
             "{error}"
         );
-        let parts = [&device.to_string(), "onnxruntime-gpu", "use cpu"];
+        let parts = [&device.to_string(), device.package(), "use cpu"];
         assert_says(&error.to_string(), &parts);
     }
 }

@@ -172,7 +172,7 @@ const UNUSABLE: [(&str, &str, &str, &str); 48] = [
         "INFERENCE__DEVICE",
         "gpu",
         "inference.device",
-        "cpu, cuda:N or tensorrt:N",
+        "cpu, cuda:N or tensorrt:N, with N the GPU's number from 0, or openvino:cpu",
     ),
     (
         "INFERENCE__BACKEND",

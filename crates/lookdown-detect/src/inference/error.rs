@@ -20,7 +20,8 @@ pub enum InferenceError {
     /// The library has no support for the device.
     #[error(
         "{device} needs a library that can use it, and {path} cannot; use the libonnxruntime.so \
-         of the package onnxruntime-gpu, or use cpu"
+         of the package {}, or use cpu",
+        .device.package()
     )]
     NoProvider {
         /// The configured device.
@@ -30,8 +31,8 @@ pub enum InferenceError {
     },
     /// The device or its driver is missing.
     #[error(
-        "{device} cannot be used: {detail}; check the GPU's number and its driver, CUDA and cuDNN \
-         libraries, or use cpu"
+        "{device} cannot be used: {detail}; check {}, or use cpu",
+        .device.requirements()
     )]
     NoDevice {
         /// The configured device.

@@ -50,17 +50,14 @@ impl Int8Use {
     }
 
     /// Returns the models that are in INT8 on this machine. ONNX Runtime has integer kernels for
-    /// them on CPUs only.
+    /// them on CPUs only; on GPUs and neural processing units they were not measured.
     #[must_use]
     pub fn on(device: Device, choice: PrecisionChoice) -> Self {
-        match (device, choice) {
-            (Device::Cpu, PrecisionChoice::Auto) if !cpu_has_integer_dot_product() => {
-                Self::SmallProfiles
-            }
-            (Device::Cpu, PrecisionChoice::Auto | PrecisionChoice::Int8) => Self::All,
-            (Device::Cpu, PrecisionChoice::Fp32) | (Device::Cuda(_) | Device::TensorRt(_), _) => {
-                Self::None
-            }
+        match choice {
+            _ if !device.is_processor() => Self::None,
+            PrecisionChoice::Fp32 => Self::None,
+            PrecisionChoice::Auto if !cpu_has_integer_dot_product() => Self::SmallProfiles,
+            PrecisionChoice::Auto | PrecisionChoice::Int8 => Self::All,
         }
     }
 }

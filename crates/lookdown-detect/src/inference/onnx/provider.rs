@@ -1,10 +1,13 @@
 //! Sessions on the configured device.
 
-use std::path::Path;
+use std::{num::NonZeroUsize, path::Path};
 
 use ort::{
     environment::Environment,
-    ep::{CUDA, ExecutionProvider, ExecutionProviderDispatch, TensorRT, cuda::ConvAlgorithmSearch},
+    ep::{
+        CUDA, ExecutionProvider, ExecutionProviderDispatch, OpenVINO, TensorRT,
+        cuda::ConvAlgorithmSearch,
+    },
     session::{Session, builder::SessionBuilder},
 };
 
@@ -27,7 +30,7 @@ pub(super) fn builder(
     options: &OnnxOptions,
 ) -> Result<Builder, InferenceError> {
     let device = options.device;
-    let (providers, available) = providers(device);
+    let (providers, available) = providers(device, options.threads);
     if !available {
         return Err(InferenceError::NoProvider {
             device,
@@ -52,7 +55,7 @@ pub(super) fn builder(
 
 /// The device's execution providers in order of preference, and true if the library has them. The
 /// CPU is always the last choice, for operators without GPU code.
-fn providers(device: Device) -> (Vec<ExecutionProviderDispatch>, bool) {
+fn providers(device: Device, threads: NonZeroUsize) -> (Vec<ExecutionProviderDispatch>, bool) {
     let cuda = |number| {
         CUDA::default()
             .with_device_id(number)
@@ -69,6 +72,14 @@ fn providers(device: Device) -> (Vec<ExecutionProviderDispatch>, bool) {
             let tensor_rt = TensorRT::default().with_device_id(number).build();
             let providers = vec![tensor_rt.error_on_failure(), cuda(number)];
             (providers, has::<TensorRT>() && has::<CUDA>())
+        }
+        Device::OpenVino(kind) => {
+            let open_vino = OpenVINO::default()
+                .with_device_type(<&str>::from(kind).to_uppercase())
+                .with_num_threads(threads.get())
+                .with_num_streams(1)
+                .build();
+            (vec![open_vino.error_on_failure()], has::<OpenVINO>())
         }
     }
 }
