@@ -23,6 +23,15 @@ use std::{
     process::{Command, Output, Stdio},
 };
 
+/// The variable of a network that loads at once, for servers that are asked for no detections.
+pub(crate) const SMALL_MODEL: (&str, &str) = (
+    "LOOKDOWN__MODEL__PATH",
+    concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/tests/fixtures/models/any_batch.onnx"
+    ),
+);
+
 pub(crate) fn lookdown(arguments: &[&str], environment: &[(&str, &str)]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_lookdown"));
     command

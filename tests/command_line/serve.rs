@@ -8,6 +8,8 @@ use std::{
     process::{Child, ChildStderr, Command, Output, Stdio},
 };
 
+use crate::SMALL_MODEL;
+
 const LOOKDOWN: &str = env!("CARGO_BIN_EXE_lookdown");
 const FREE_ADDRESS: (&str, &str) = ("LOOKDOWN__SERVER__LISTEN", "127.0.0.1:0");
 pub(super) const NO_GRACE: (&str, &str) = ("LOOKDOWN__SHUTDOWN__GRACE_MILLIS", "0");
@@ -287,7 +289,7 @@ impl Server {
     fn listening(preparation: &str, environment: &[(&str, &str)]) -> Self {
         let mut process = Command::new("sh")
             .args(["-c", &format!("{preparation}\nexec {LOOKDOWN} serve")])
-            .envs([FREE_ADDRESS])
+            .envs([FREE_ADDRESS, SMALL_MODEL])
             .envs(environment.iter().copied())
             .stderr(Stdio::piped())
             .spawn()

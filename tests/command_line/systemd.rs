@@ -6,6 +6,8 @@ use std::{
     time::Duration,
 };
 
+use crate::SMALL_MODEL;
+
 /// Longest time for a message of the server. Models are loaded before the first.
 const PATIENCE: Duration = Duration::from_mins(1);
 
@@ -40,6 +42,7 @@ fn systemd_is_notified_of_readiness_watchdog_and_stop() {
         .arg("serve")
         .env("NOTIFY_SOCKET", &path)
         .env("WATCHDOG_USEC", "200000")
+        .envs([SMALL_MODEL])
         .env("LOOKDOWN__SERVER__LISTEN", "127.0.0.1:0")
         .env("LOOKDOWN__SHUTDOWN__GRACE_MILLIS", "0")
         .stderr(Stdio::null())

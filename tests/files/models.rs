@@ -3,7 +3,7 @@
 mod custom_models;
 mod darknet;
 mod families;
-mod folder;
+pub(crate) mod folder;
 mod lifecycle;
 mod manifest_keys;
 mod refusals;

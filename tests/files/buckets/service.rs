@@ -9,7 +9,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::buckets::s3_server::variables;
+use crate::{buckets::s3_server::variables, models::folder::fixture};
 
 const PATIENCE: Duration = Duration::from_mins(1);
 /// Pause between two looks.
@@ -32,6 +32,8 @@ pub(crate) fn command(s3: SocketAddr) -> Command {
         .env("LOOKDOWN__SERVER__LISTEN", "127.0.0.1:0")
         .env("LOOKDOWN__CALIBRATIONS__PATH", "s3://cameras/ceiling")
         .env("LOOKDOWN__CALIBRATIONS__POLL_SECONDS", "1")
+        // Loads at once: nobody asks for detections.
+        .env("LOOKDOWN__MODEL__PATH", fixture("any_batch"))
         .env("LOOKDOWN__INFERENCE__THREADS", "1")
         .stdin(Stdio::null())
         .stderr(Stdio::piped());
