@@ -8,7 +8,7 @@ mkdir -p "$root/usr/bin" "$root/usr/lib" "$root/usr/lib64" "$root/etc/ssl/certs"
     "$root/var/lib/lookdown" "$root/tmp" "$root/opt/lookdown/calibrations"
 ln -s usr/bin usr/lib usr/lib64 "$root"
 
-# Copies what a package says about itself: its licence, and its entry for vulnerability scanners.
+# Copies what a package says about itself: its license, and its entry for vulnerability scanners.
 describe() {
     install -D --mode=644 "/usr/share/doc/$1/copyright" "$root/usr/share/doc/$1/copyright"
     dpkg-query --status "$1" > "$root/var/lib/dpkg/status.d/$1"

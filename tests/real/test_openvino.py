@@ -35,7 +35,7 @@ def detect(settings: dict[str, str]) -> subprocess.CompletedProcess[str]:
 class OpenVino(unittest.TestCase):
     """The processor is the one device of OpenVINO that every machine has."""
 
-    def test_the_processor_detects_the_persons_that_onnx_runtime_alone_detects(self) -> None:
+    def test_the_processor_detects_the_same_persons(self) -> None:
         alone, with_open_vino = detect(HERE), detect(device("cpu"))
         self.assertEqual(with_open_vino.returncode, 0, with_open_vino.stderr)
         assert_same(self, json.loads(with_open_vino.stdout), json.loads(alone.stdout))

@@ -32,7 +32,7 @@ pub(crate) fn command(s3: SocketAddr) -> Command {
         .env("LOOKDOWN__SERVER__LISTEN", "127.0.0.1:0")
         .env("LOOKDOWN__CALIBRATIONS__PATH", "s3://cameras/ceiling")
         .env("LOOKDOWN__CALIBRATIONS__POLL_SECONDS", "1")
-        // Loads at once: nobody asks for detections.
+        // Loads at once: no test of this server sends frames.
         .env("LOOKDOWN__MODEL__PATH", fixture("any_batch"))
         .env("LOOKDOWN__INFERENCE__THREADS", "1")
         .stdin(Stdio::null())
