@@ -14,7 +14,7 @@ use secrecy::SecretString;
 use tokio::{
     net::TcpListener,
     sync::watch,
-    task::spawn_blocking,
+    task::{JoinError, spawn_blocking},
     time::{Instant, timeout},
 };
 
@@ -55,6 +55,9 @@ pub enum CountError {
     /// The store cannot be used.
     #[error(transparent)]
     Store(#[from] StoreError),
+    /// The task that opens the store panicked.
+    #[error("the store cannot be opened because of an internal error: {0}")]
+    StoreTask(#[from] JoinError),
     /// The metrics cannot be created.
     #[error("the metrics cannot be created: {0}")]
     Metrics(#[from] prometheus::Error),
@@ -89,9 +92,7 @@ pub async fn count(
         let resumed = store.resumed()?;
         Ok::<_, StoreError>((store, resumed))
     });
-    let (store, resumed) = opened
-        .await
-        .map_err(|error| CountError::Address(error.to_string()))??;
+    let (store, resumed) = opened.await??;
     let calibrations = Calibrations::resumed(resumed.calibrations);
     let counting = CountingOptions {
         longest_gap_ms: i64::try_from(options.longest_gap.as_millis()).unwrap_or(i64::MAX),
