@@ -10,7 +10,7 @@ use axum::{
 use lookdown_http::problem::Problem;
 use lookdown_tracking::Plane;
 
-use super::shared::{Shared, check_known, not_found, now_ms};
+use super::shared::{Shared, blocking, check_known, not_found, now_ms};
 use crate::{scene::Scene, sums::Owner};
 
 /// Least extent around a camera, meters.
@@ -31,15 +31,18 @@ pub(super) async fn svg(
 ) -> Result<Response, Problem> {
     let owner = Owner::Site(site.clone());
     check_known(&api, &owner).await?;
-    let counter = api.counter.lock();
-    let Some(scene) = counter.site(&site) else {
-        let detail = "the site has no camera now: send frames of its cameras";
-        return Err(not_found(detail));
-    };
-    let last = scene.presence().last_ms;
-    let is_current = last.is_some_and(|last| now_ms() - last <= counter.longest_gap_ms());
-    let content_type = [(CONTENT_TYPE, "image/svg+xml")];
-    Ok((content_type, drawn(scene, is_current)).into_response())
+    blocking(move || {
+        let counter = api.counter.lock();
+        let Some(scene) = counter.site(&site) else {
+            let detail = "the site has no camera now: send frames of its cameras";
+            return Err(not_found(detail));
+        };
+        let last = scene.presence().last_ms;
+        let is_current = last.is_some_and(|last| now_ms() - last <= counter.longest_gap_ms());
+        let content_type = [(CONTENT_TYPE, "image/svg+xml")];
+        Ok((content_type, drawn(scene, is_current)).into_response())
+    })
+    .await
 }
 
 /// Draws the site. Names of the calibration have no characters that XML would need to escape; those
