@@ -6,6 +6,7 @@ mod floor;
 mod frame_heat_map;
 mod furniture;
 mod heat_map;
+mod heat_map_image;
 mod operation;
 mod shared;
 mod suggested_area;

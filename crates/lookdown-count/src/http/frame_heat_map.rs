@@ -10,7 +10,8 @@ use lookdown_http::problem::Problem;
 use lookdown_tracking::heat_map::Cell;
 
 use super::{
-    heat_map::{Parameters, color, image, stored},
+    heat_map::{Parameters, stored},
+    heat_map_image::{color, image},
     shared::{Shared, blocking, not_found},
     time::TimeParameters,
 };

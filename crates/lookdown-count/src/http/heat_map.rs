@@ -5,8 +5,7 @@ use std::collections::BTreeMap;
 use axum::{
     Json,
     extract::{Path, Query, State, rejection::QueryRejection},
-    http::header::CONTENT_TYPE,
-    response::{IntoResponse, Response},
+    response::Response,
 };
 use jiff::Timestamp;
 use lookdown_http::problem::Problem;
@@ -16,6 +15,7 @@ use utoipa::ToSchema;
 
 use super::{
     counts::unusable_query,
+    heat_map_image::draw,
     shared::{Shared, blocking, check_known, query},
     time::TimeParameters,
 };
@@ -26,8 +26,6 @@ use crate::{
 
 /// Most cells along a side of an answer: those with the most time decide.
 const MAX_SIDE: i64 = 400;
-/// Pixels of a cell.
-const CELL_PX: usize = 8;
 
 /// Presence on the floor.
 #[derive(Serialize, ToSchema)]
@@ -194,68 +192,5 @@ fn grid(cells: &BTreeMap<Cell, u64>) -> (Cell, Vec<Vec<f64>>) {
 }
 
 async fn png(map: HeatMap) -> Result<Response, Problem> {
-    blocking(move || drawn(&map)).await
-}
-
-/// Draws the map: transparent without presence, from blue to red with the logarithm of the time.
-fn drawn(map: &HeatMap) -> Result<Response, Problem> {
-    let columns = map.seconds.first().map_or(1, Vec::len);
-    let rows = map.seconds.len().max(1);
-    let most = map.seconds.iter().flatten().copied().fold(0.0, f64::max);
-    let mut pixels = vec![0; columns * rows * CELL_PX * CELL_PX * 4];
-    let width = columns * CELL_PX;
-    for (row, cells) in map.seconds.iter().enumerate() {
-        for (column, seconds) in cells.iter().enumerate() {
-            let color = color(*seconds, most);
-            for y in row * CELL_PX..(row + 1) * CELL_PX {
-                let start = (y * width + column * CELL_PX) * 4;
-                for pixel in pixels[start..start + CELL_PX * 4].chunks_exact_mut(4) {
-                    pixel.copy_from_slice(&color);
-                }
-            }
-        }
-    }
-    image(&pixels, width, rows * CELL_PX)
-}
-
-/// Returns pixels with red, green, blue and alpha as a PNG.
-pub(super) fn image(pixels: &[u8], width: usize, height: usize) -> Result<Response, Problem> {
-    let file = encoded(pixels, width, height).map_err(|problem| {
-        tracing::error!("the heat map cannot be encoded: {problem}");
-        Problem::internal()
-    })?;
-    Ok(([(CONTENT_TYPE, "image/png")], file).into_response())
-}
-
-fn encoded(pixels: &[u8], width: usize, height: usize) -> Result<Vec<u8>, png::EncodingError> {
-    let mut file = Vec::new();
-    let side = |pixels: usize| u32::try_from(pixels).unwrap_or(u32::MAX);
-    let mut encoder = png::Encoder::new(&mut file, side(width), side(height));
-    encoder.set_color(png::ColorType::Rgba);
-    encoder.set_depth(png::BitDepth::Eight);
-    encoder.write_header()?.write_image_data(pixels)?;
-    Ok(file)
-}
-
-/// Returns the color of a time of presence, with the most of any cell.
-pub(super) fn color(seconds: f64, most: f64) -> [u8; 4] {
-    if seconds <= 0.0 {
-        return [0; 4];
-    }
-    let share = (1.0 + seconds).ln() / (1.0 + most).ln();
-    let channel = |value: f64| {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "clamped"
-        )]
-        let channel = (value.clamp(0.0, 1.0) * 255.0).round() as u8;
-        channel
-    };
-    [
-        channel(2.0 * share - 0.6),
-        channel(1.2 - (2.4 * share - 1.2).abs()),
-        channel(1.0 - 1.6 * share),
-        channel(0.35 + 0.5 * share),
-    ]
+    blocking(move || draw(&map.seconds)).await
 }
