@@ -1,5 +1,5 @@
 //! The engine: converts the bytes of a frame to its report. The calling thread decodes the frame
-//! and merges detections; the network threads render views and run inference.
+//! and merges detections; the inference threads render views and run inference.
 
 mod camera;
 mod first_pass;
@@ -28,7 +28,7 @@ use super::{
     inference_cache::{FrameKey, InferenceCache},
     merge,
     motion_cache::{CameraViews, MotionCache},
-    network::Network,
+    network::InferenceThreads,
     report::{ModelUsed, ZoneCount},
     rig_cache::RigCache,
 };
@@ -55,7 +55,7 @@ pub struct EngineOptions {
     pub default_models: DefaultModels,
     /// Options for batches of views.
     pub batches: BatchOptions,
-    /// Number of network threads, equal to the number of sessions of each model.
+    /// Number of inference threads, equal to the number of sessions of each model.
     pub sessions: NonZeroUsize,
     /// Number of threads that build remap tables and render batches of several views.
     pub remap_threads: NonZeroUsize,
@@ -100,7 +100,7 @@ impl EngineOptions {
 /// Finds persons in frames.
 pub struct Engine {
     models: Arc<ModelRegistry>,
-    network: Network,
+    inference: InferenceThreads,
     remappers: Arc<ThreadPool>,
     calibrations: Option<Arc<dyn CalibrationLookup>>,
     rigs: RigCache,
@@ -133,7 +133,7 @@ impl Engine {
         start_at_zero(&metrics.frame_searches, Search::VARIANTS);
         Ok(Self {
             models,
-            network: Network::start(options.sessions, options.batches, &remappers)?,
+            inference: InferenceThreads::start(options.sessions, options.batches, &remappers)?,
             remappers,
             calibrations,
             rigs: RigCache::new(options.rig_cache_bytes, Arc::clone(&metrics)),
@@ -303,7 +303,7 @@ impl Engine {
             }
         }
         timeline.enter(Stage::Queue, Instant::now());
-        let first = self.network.queue_pass(
+        let first = self.inference.queue_pass(
             Arc::clone(&observation.camera.rig),
             Arc::clone(&observation.model),
             Arc::clone(&observation.frame),

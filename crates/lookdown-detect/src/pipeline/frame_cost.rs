@@ -4,7 +4,7 @@
 //! network, and each 8 megapixels that are drawn add 1. A frame with more pixels than the limit also
 //! costs 1, because its header is enough to refuse it. No frame costs more than a client may use.
 
-use super::{DetectJob, ViewsJob};
+use super::{ClientViewsJob, DetectJob};
 
 /// Pixels, decoded or drawn, that add 1. With the default limits, two of the largest frames are
 /// decoded side by side, which keeps the memory below 2 GiB.
@@ -27,7 +27,7 @@ pub(super) fn of_frame(job: &DetectJob, max_pixels: u64) -> usize {
 }
 
 /// Returns the cost of views rendered by the client.
-pub(super) fn of_views(job: &ViewsJob) -> usize {
+pub(super) fn of_views(job: &ClientViewsJob) -> usize {
     let input = job.model.input();
     let values = (*job.pixels).as_ref().len();
     cost((0, 0), 0, values / input.view_len().max(1))

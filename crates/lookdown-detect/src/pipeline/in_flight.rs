@@ -42,7 +42,7 @@ struct Work {
 
 /// The permits of some work. Dropping it ends the work.
 #[derive(Debug)]
-pub(super) struct WorkGuard {
+pub(super) struct InFlightGuard {
     in_flight: Arc<InFlight>,
     number: u64,
     /// The end of the work, unless the guard is just dropped.
@@ -77,7 +77,7 @@ impl InFlight {
         ticket: &Ticket,
         permits: BudgetShare,
         now: Instant,
-    ) -> WorkGuard {
+    ) -> InFlightGuard {
         let mut state = self.state();
         if state.work.is_empty() {
             state.progress(now);
@@ -90,7 +90,7 @@ impl InFlight {
             has_begun: false,
         };
         state.work.insert(number, work);
-        WorkGuard {
+        InFlightGuard {
             in_flight: Arc::clone(self),
             number,
             ended: None,
@@ -172,7 +172,7 @@ impl Work {
     }
 }
 
-impl WorkGuard {
+impl InFlightGuard {
     /// Records that a worker has taken the work.
     pub(super) fn begin(&self, now: Instant) {
         let mut state = self.in_flight.state();
@@ -188,7 +188,7 @@ impl WorkGuard {
     }
 }
 
-impl Drop for WorkGuard {
+impl Drop for InFlightGuard {
     fn drop(&mut self) {
         let mut state = self.in_flight.state();
         state.work.remove(&self.number);

@@ -104,7 +104,7 @@ impl DetectJob {
 }
 
 /// Views rendered by a client, for inference without changes.
-pub struct ViewsJob {
+pub struct ClientViewsJob {
     /// The time at which the whole request was in memory.
     pub arrived: Instant,
     /// The priority of the job and its cancellation state.

@@ -5,12 +5,12 @@
 //! reads them, and no core waits for another. Only batches of several views are rendered in
 //! parallel by the thread pool.
 
+mod batch_cost;
 mod batch_options;
 mod claim;
 mod pass_task;
 mod run;
 mod view_queue;
-mod work;
 
 use std::{
     num::NonZeroUsize,
@@ -34,35 +34,35 @@ use crate::{
     inference::Model,
 };
 
+pub(super) use batch_cost::BatchCost;
 pub(super) use pass_task::PassTask;
-pub(super) use work::Work;
 
 /// The inference threads and their queue. Dropping it ends the threads after the queued views are
 /// processed.
-pub(super) struct Network {
+pub(super) struct InferenceThreads {
     queue: Arc<ViewQueue>,
     threads: Vec<JoinHandle<()>>,
 }
 
-impl Network {
+impl InferenceThreads {
     /// Starts one thread per session of the models.
     pub(super) fn start(
         sessions: NonZeroUsize,
         options: BatchOptions,
         remappers: &Arc<ThreadPool>,
     ) -> std::io::Result<Self> {
-        let mut network = Self {
+        let mut inference = Self {
             queue: Arc::new(ViewQueue::new(options)),
             threads: Vec::with_capacity(sessions.get()),
         };
         for session in 0..sessions.get() {
-            let (queue, remappers) = (Arc::clone(&network.queue), Arc::clone(remappers));
+            let (queue, remappers) = (Arc::clone(&inference.queue), Arc::clone(remappers));
             let thread = std::thread::Builder::new()
                 .name(format!("network-{session}"))
                 .spawn(move || serve(&queue, session, &remappers))?;
-            network.threads.push(thread);
+            inference.threads.push(thread);
         }
-        Ok(network)
+        Ok(inference)
     }
 
     /// Queues the views of a rig. [`PassTask::wait`] returns their detections. Views without motion
@@ -81,7 +81,7 @@ impl Network {
     }
 }
 
-impl Drop for Network {
+impl Drop for InferenceThreads {
     fn drop(&mut self) {
         self.queue.close();
         for thread in self.threads.drain(..) {

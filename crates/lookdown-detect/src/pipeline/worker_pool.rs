@@ -14,11 +14,11 @@ use tokio::sync::oneshot;
 use tokio_util::sync::CancellationToken;
 
 use super::{
-    DetectJob, DetectedFrame, Engine, PipelineError, Stage, Stall, Ticket, ViewsJob,
+    ClientViewsJob, DetectJob, DetectedFrame, Engine, PipelineError, Stage, Stall, Ticket,
     error::internal,
     frame_cost,
     frame_queue::FrameQueue,
-    in_flight::{InFlight, WorkGuard},
+    in_flight::{InFlight, InFlightGuard},
     service_rate::ServiceRate,
 };
 use crate::{
@@ -28,7 +28,7 @@ use crate::{
 };
 
 /// The whole work on a frame, including the channel that returns the result to the caller.
-type Work = Box<dyn FnOnce(&Engine) -> Done + Send>;
+type QueuedJob = Box<dyn FnOnce(&Engine) -> Done + Send>;
 
 /// The outcome of a frame.
 struct Done {
@@ -40,11 +40,11 @@ struct Done {
 /// A frame in the queue.
 struct Entry {
     ticket: Ticket,
-    work: Work,
+    job: QueuedJob,
     /// The tracing span to which the log lines of the work belong.
     request: tracing::Span,
     /// The permits, held until the work has ended, even when its client has disconnected.
-    guard: WorkGuard,
+    guard: InFlightGuard,
 }
 
 /// Named threads that run the engine on a bounded number of frames.
@@ -134,7 +134,7 @@ impl WorkerPool {
     /// The same as [`WorkerPool::detect`].
     pub async fn infer_and<T: Send + 'static>(
         &self,
-        job: ViewsJob,
+        job: ClientViewsJob,
         finish: impl FnOnce(HeadOutput) -> T + Send + 'static,
     ) -> Result<T, PipelineError> {
         let ticket = job.ticket.clone();
@@ -175,7 +175,7 @@ impl WorkerPool {
         self.shared.rate().began(Instant::now());
         let entry = Entry {
             ticket: ticket.clone(),
-            work: Box::new(|engine| {
+            job: Box::new(|engine| {
                 let outcome = catch_unwind(AssertUnwindSafe(|| work(engine)));
                 let panicked = || internal(anyhow::anyhow!("a worker panicked on a frame"));
                 let outcome = outcome.unwrap_or_else(|_| Err(panicked()));
@@ -265,20 +265,20 @@ impl Shared {
         while let Some(entry) = self.queue.pop() {
             let Entry {
                 ticket,
-                work,
+                job,
                 request,
                 guard,
             } = entry;
             let _in_request = request.enter();
             if ticket.withdrawn.is_cancelled() {
                 self.metrics.withdrawn_frames.inc();
-                drop(work);
+                drop(job);
                 guard.end(Instant::now());
                 self.rate().given_up(self.pending());
                 continue;
             }
             guard.begin(Instant::now());
-            let done = work(&self.engine);
+            let done = job(&self.engine);
             // A client that sends the next frame after this answer must find the permit free.
             guard.end(Instant::now());
             self.rate().ended(Instant::now(), self.pending());

@@ -6,7 +6,7 @@ use lookdown_detect::{
     inference::{HeadOutput, Model},
     open_inference::{Datatype, metadata::ModelMetadata},
     parameters::{DetectParameters, Interface, ParameterError},
-    pipeline::ViewsJob,
+    pipeline::ClientViewsJob,
 };
 
 use super::{
@@ -54,7 +54,7 @@ pub(super) async fn infer(
     let parameters = view_parameters(&request)?;
     let ticket = context.caller.ticket_at(parameters.priority)?;
     let timeline = ticket.timeline.clone();
-    let job = ViewsJob {
+    let job = ClientViewsJob {
         arrived,
         ticket,
         model: Arc::clone(&model),

@@ -67,7 +67,7 @@ impl Engine {
         job.ticket.timeline.enter(Stage::Queue, Instant::now());
         let ticket = job.ticket.clone();
         let task = self
-            .network
+            .inference
             .queue_pass(Arc::new(crops), model, frame, ticket, None);
         FirstPass::Crops(task)
     }

@@ -6,16 +6,16 @@ use super::Engine;
 use crate::{
     imaging::ViewBatch,
     inference::HeadOutput,
-    pipeline::{PipelineError, Stage, ViewsJob, error::of_inference},
+    pipeline::{ClientViewsJob, PipelineError, Stage, error::of_inference},
 };
 
 impl Engine {
     /// Detects persons in views without further processing, in batches of the usual size. Blocks:
-    /// it waits for a session, as the network threads do.
+    /// it waits for a session, as the inference threads do.
     ///
     /// # Errors
     /// Returns a [`PipelineError`], which distinguishes client and server faults.
-    pub fn infer_views(&self, job: &ViewsJob) -> Result<HeadOutput, PipelineError> {
+    pub fn infer_views(&self, job: &ClientViewsJob) -> Result<HeadOutput, PipelineError> {
         let input = job.model.input();
         let views = job.model.batch_of(self.options.batches.max_views).get();
         let session = self.next_session.fetch_add(1, Ordering::Relaxed);

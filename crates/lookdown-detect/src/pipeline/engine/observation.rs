@@ -91,20 +91,20 @@ impl Observation {
     /// span is divided between these stages in proportion to their work.
     pub(super) fn wait_for(&mut self, task: &PassTask) -> Result<(), PipelineError> {
         let output = task.wait()?;
-        let work = output.work;
+        let cost = output.cost;
         self.passes.push(Pass {
             rig: Arc::clone(&task.rig),
             model: Arc::clone(&task.model),
             per_view: output.per_view,
         });
-        self.batch_count += work.runs;
-        self.unchanged_views += work.still_views;
-        self.non_finite += work.non_finite;
-        let span = work.ended.saturating_duration_since(work.began);
-        let remap = span.mul_f64(work.remap_share());
-        self.timeline.enter(Stage::Remap, work.began);
-        self.timeline.enter(Stage::Inference, work.began + remap);
-        self.timeline.leave(work.ended);
+        self.batch_count += cost.runs;
+        self.unchanged_views += cost.still_views;
+        self.non_finite += cost.non_finite;
+        let span = cost.ended.saturating_duration_since(cost.began);
+        let remap = span.mul_f64(cost.remap_share());
+        self.timeline.enter(Stage::Remap, cost.began);
+        self.timeline.enter(Stage::Inference, cost.began + remap);
+        self.timeline.leave(cost.ended);
         Ok(())
     }
 }

@@ -44,7 +44,7 @@ impl Engine {
         let frame = Arc::clone(&observation.frame);
         let ticket = job.ticket.clone();
         let task = self
-            .network
+            .inference
             .queue_pass(rig, model, frame, ticket, cached_views);
         Some(task)
     }

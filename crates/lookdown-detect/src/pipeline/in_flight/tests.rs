@@ -22,7 +22,7 @@ impl InFlightFixture {
         self.start + Duration::from_secs(seconds)
     }
 
-    fn add(&self, request_id: &str, seconds: u64) -> (WorkGuard, Ticket) {
+    fn add(&self, request_id: &str, seconds: u64) -> (InFlightGuard, Ticket) {
         let ticket = Ticket {
             request_id: request_id.to_owned(),
             ..Ticket::default()

@@ -4,7 +4,7 @@ use std::{ops::Range, sync::Arc, time::Instant};
 
 use parking_lot::{Condvar, Mutex, MutexGuard};
 
-use super::Work;
+use super::BatchCost;
 use crate::{
     imaging::Frame,
     inference::{Model, ViewDetection},
@@ -31,14 +31,14 @@ pub(in crate::pipeline) struct PassTask {
 pub(in crate::pipeline) struct PassOutput {
     /// The detections in each view.
     pub(in crate::pipeline) per_view: Vec<Vec<ViewDetection>>,
-    /// The work that the pass took.
-    pub(in crate::pipeline) work: Work,
+    /// The cost of the pass.
+    pub(in crate::pipeline) cost: BatchCost,
 }
 
 struct Progress {
     per_view: Vec<Vec<ViewDetection>>,
     missing: usize,
-    work: Option<Work>,
+    cost: Option<BatchCost>,
     failed: bool,
     failure: Option<PipelineError>,
 }
@@ -63,7 +63,7 @@ impl PassTask {
             progress: Mutex::new(Progress {
                 per_view: vec![Vec::new(); views],
                 missing: views,
-                work: None,
+                cost: None,
                 failed: false,
                 failure: None,
             }),
@@ -81,7 +81,9 @@ impl PassTask {
         }
         Ok(PassOutput {
             per_view: std::mem::take(&mut progress.per_view),
-            work: progress.work.unwrap_or_else(|| Work::none(self.queued)),
+            cost: progress
+                .cost
+                .unwrap_or_else(|| BatchCost::none(self.queued)),
         })
     }
 
@@ -107,15 +109,15 @@ impl PassTask {
         &self,
         views: Range<usize>,
         found: impl Iterator<Item = Vec<ViewDetection>>,
-        work: Work,
+        cost: BatchCost,
     ) {
-        self.ticket.timeline.progress(work.ended);
+        self.ticket.timeline.progress(cost.ended);
         let mut progress = self.lock();
         progress.missing -= views.len();
         for (slot, found) in progress.per_view[views].iter_mut().zip(found) {
             *slot = found;
         }
-        progress.work = Some(progress.work.map_or(work, |before| before.and(work)));
+        progress.cost = Some(progress.cost.map_or(cost, |before| before.and(cost)));
         let over = progress.is_over();
         drop(progress);
         if over {

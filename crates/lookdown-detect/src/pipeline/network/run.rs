@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use rayon::{ThreadPool, prelude::*};
 
-use super::{Claim, PassTask, Work};
+use super::{BatchCost, Claim, PassTask};
 use crate::{
     imaging::{NetworkInput, ViewBatch, ViewSignature},
     inference::{InferenceError, ViewDetection},
@@ -28,8 +28,8 @@ struct SeenView {
     is_still: bool,
 }
 
-/// A view of a batch before inference.
-struct ViewJob<'a> {
+/// The slot of one view in a batch, before inference.
+struct BatchSlot<'a> {
     task: &'a PassTask,
     view: usize,
     /// The signature for motion detection, when the camera uses the motion cache.
@@ -38,12 +38,12 @@ struct ViewJob<'a> {
     still: Option<Vec<ViewDetection>>,
 }
 
-impl ViewJob<'_> {
-    fn render(&mut self, input: &NetworkInput, slot: &mut [f32]) {
+impl BatchSlot<'_> {
+    fn render(&mut self, input: &NetworkInput, planes: &mut [f32]) {
         let (task, view) = (self.task, self.view);
-        task.rig.render_view(view, &task.frame, input, slot);
+        task.rig.render_view(view, &task.frame, input, planes);
         if let Some(seen_before) = &task.seen_before {
-            let signature = ViewSignature::of(slot, input);
+            let signature = ViewSignature::of(planes, input);
             self.still = seen_before.lookup(view, &signature);
             self.signature = Some(signature);
         }
@@ -78,16 +78,16 @@ pub(super) fn execute(
     let began = Instant::now();
     let model = &claims[0].task.model;
     let input = model.input();
-    let mut jobs: Vec<_> = claims.iter().flat_map(Claim::jobs).collect();
-    let slots = batch.prepare(jobs.len(), input);
-    let mut pairs: Vec<_> = jobs.iter_mut().zip(slots).collect();
-    let render = |(job, slot): (&mut ViewJob, &mut [f32])| job.render(input, slot);
+    let mut slots: Vec<_> = claims.iter().flat_map(Claim::slots).collect();
+    let planes = batch.prepare(slots.len(), input);
+    let mut pairs: Vec<_> = slots.iter_mut().zip(planes).collect();
+    let render = |(slot, planes): (&mut BatchSlot, &mut [f32])| slot.render(input, planes);
     match pairs.pop() {
         Some(only) if pairs.is_empty() => render(only),
         last => remappers.install(|| pairs.into_par_iter().chain(last).for_each(render)),
     }
-    if jobs.iter().any(|job| job.still.is_some()) {
-        let moved: Vec<_> = jobs.iter().map(|job| job.still.is_none()).collect();
+    if slots.iter().any(|slot| slot.still.is_some()) {
+        let moved: Vec<_> = slots.iter().map(|slot| slot.still.is_none()).collect();
         batch.retain(&moved);
     }
     let rendered = Instant::now();
@@ -100,8 +100,8 @@ pub(super) fn execute(
     };
     let ended = Instant::now();
     let mut found = per_view.into_iter();
-    let seen = jobs.into_iter();
-    let views = seen.map(|job| job.seen(|| found.next().unwrap_or_default()));
+    let seen = slots.into_iter();
+    let views = seen.map(|slot| slot.seen(|| found.next().unwrap_or_default()));
     Ok(Run {
         views: views.collect(),
         non_finite,
@@ -113,8 +113,8 @@ pub(super) fn execute(
 }
 
 impl Claim {
-    fn jobs(&self) -> impl Iterator<Item = ViewJob<'_>> {
-        self.views.clone().map(|view| ViewJob {
+    fn slots(&self) -> impl Iterator<Item = BatchSlot<'_>> {
+        self.views.clone().map(|view| BatchSlot {
             task: &self.task,
             view,
             signature: None,
@@ -135,7 +135,7 @@ impl Run {
             #[expect(clippy::cast_precision_loss, reason = "far below 2^52 views")]
             let share = seen.len() as f64 / total as f64;
             let (runs, non_finite) = std::mem::take(&mut undivided);
-            let work = Work {
+            let cost = BatchCost {
                 began: self.began,
                 ended: self.ended,
                 remap: (self.rendered - self.began).mul_f64(share),
@@ -145,7 +145,7 @@ impl Run {
                 non_finite,
             };
             let found = seen.into_iter().map(|view| view.found);
-            claim.task.finish(claim.views.clone(), found, work);
+            claim.task.finish(claim.views.clone(), found, cost);
         }
     }
 }

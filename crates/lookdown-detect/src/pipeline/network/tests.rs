@@ -49,14 +49,14 @@ impl Detector for Gated {
 }
 
 struct Bench {
-    network: Network,
+    inference: InferenceThreads,
     model: Arc<Model>,
     rig: Arc<CameraRig>,
     begins: Receiver<(usize, f32)>,
     go: SyncSender<()>,
 }
 
-/// A network of `sessions` threads with four views per frame.
+/// `sessions` inference threads with four views per frame.
 fn bench(sessions: usize, max_views: usize, max_delay: Duration) -> Bench {
     let input = NetworkInput::plain(8, 8);
     let (begun, begins) = sync_channel(64);
@@ -90,7 +90,8 @@ fn bench(sessions: usize, max_views: usize, max_delay: Duration) -> Bench {
     };
     let sessions = NonZeroUsize::new(sessions).unwrap();
     Bench {
-        network: Network::start(sessions, options, &Arc::new(remappers.unwrap())).unwrap(),
+        inference: InferenceThreads::start(sessions, options, &Arc::new(remappers.unwrap()))
+            .unwrap(),
         model: Arc::new(Model::of_boxed(first, gated)),
         rig: Arc::new(rig),
         begins,
@@ -103,7 +104,7 @@ impl Bench {
     fn submit(&self, brightness: u8, ticket: Ticket) -> Arc<PassTask> {
         let frame = Frame::new(64, 64, vec![brightness; 64 * 64 * 3]).unwrap();
         let (rig, model) = (Arc::clone(&self.rig), Arc::clone(&self.model));
-        self.network
+        self.inference
             .queue_pass(rig, model, Arc::new(frame), ticket, None)
     }
 
@@ -136,7 +137,7 @@ fn a_batch_is_filled_with_views_of_the_next_frame() {
     let outputs = [first.wait().unwrap(), second.wait().unwrap()];
     assert!(outputs.iter().all(|output| output.per_view.len() == 4));
     // The shared run counts once.
-    assert_eq!(outputs.map(|output| output.work.runs), [1, 1]);
+    assert_eq!(outputs.map(|output| output.cost.runs), [1, 1]);
 }
 
 #[test]
@@ -176,7 +177,7 @@ fn sessions_process_views_of_one_frame_in_parallel() {
     bench.next_run();
     bench.next_run();
     bench.let_go(4);
-    assert_eq!(task.wait().unwrap().work.runs, 4);
+    assert_eq!(task.wait().unwrap().cost.runs, 4);
 }
 
 #[test]
@@ -197,6 +198,6 @@ fn a_partial_batch_runs_after_the_maximum_delay() {
     bench.let_go(1);
     assert_eq!(bench.next_run(), (4, 10.0));
     assert!(
-        task.wait().unwrap().work.began.duration_since(task.queued) >= Duration::from_millis(20)
+        task.wait().unwrap().cost.began.duration_since(task.queued) >= Duration::from_millis(20)
     );
 }

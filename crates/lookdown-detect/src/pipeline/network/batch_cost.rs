@@ -1,10 +1,10 @@
-//! Work counters and times of inference for one frame.
+//! Counters and times of the inference for one frame.
 
 use std::time::{Duration, Instant};
 
-/// Work counters and times of inference for one frame.
+/// Counters and times of the inference for one frame.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::pipeline) struct Work {
+pub(in crate::pipeline) struct BatchCost {
     /// The start of the first view.
     pub(in crate::pipeline) began: Instant,
     /// The end of the last view.
@@ -21,8 +21,8 @@ pub(in crate::pipeline) struct Work {
     pub(in crate::pipeline) non_finite: usize,
 }
 
-impl Work {
-    /// Returns no work, as for a rig without views.
+impl BatchCost {
+    /// Returns no cost, as for a rig without views.
     pub(super) fn none(queued: Instant) -> Self {
         Self {
             began: queued,
