@@ -166,10 +166,10 @@ impl Follower {
                 self.metrics.reports.inc();
                 if let Some(scene) = counter.scene_of(&report.camera) {
                     let at_ms = report.at_ms(definition.site.is_some());
-                    let times = (at_ms, now.unix_ms);
-                    let messages =
-                        self.conditions
-                            .of_report(id, &report.camera, times, &crossings, scene);
+                    let camera = &report.camera;
+                    let messages = self
+                        .conditions
+                        .of_report(id, camera, at_ms, now, &crossings, scene);
                     self.messages.extend(messages);
                 }
             }

@@ -35,6 +35,7 @@ mod scene_camera;
 mod snapshot;
 mod store;
 mod sums;
+mod time_span;
 mod webhooks;
 
 pub use event_image::latest_image;

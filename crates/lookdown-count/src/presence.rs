@@ -2,7 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::sums::{MINUTE_MS, Owner, Sums, minutes};
+use crate::{
+    scene::ReportTime,
+    sums::{MINUTE_MS, Owner, Sums},
+    time_span::TimeSpan,
+};
 
 /// The last report and its number of persons.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -14,27 +18,29 @@ pub(crate) struct Presence {
 impl Presence {
     /// Returns the time since the last report if it is known: positive, and no longer than the
     /// longest gap.
-    pub(crate) fn known_since(&self, at_ms: i64, longest_gap_ms: i64) -> Option<i64> {
-        let last = self.last_ms?;
-        (last < at_ms && at_ms - last <= longest_gap_ms).then_some(last)
+    pub(crate) fn known(&self, time: ReportTime) -> Option<TimeSpan> {
+        let (from_ms, to_ms) = (self.last_ms?, time.at_ms);
+        let is_known = from_ms < to_ms && to_ms - from_ms <= time.longest_gap_ms;
+        is_known.then_some(TimeSpan { from_ms, to_ms })
     }
 
     /// Adds the time since the last report to the sums, and sets the number of persons.
     pub(crate) fn advance(
         &mut self,
         owner: &Owner,
-        (at_ms, longest_gap_ms): (i64, i64),
+        time: ReportTime,
         persons: u64,
         sums: &mut Sums,
     ) {
-        if let Some(last) = self.known_since(at_ms, longest_gap_ms) {
-            for (minute, length_ms) in minutes(last, at_ms) {
+        if let Some(known) = self.known(time) {
+            for (minute, length_ms) in known.minutes() {
                 let sum = sums.presence.entry((owner.clone(), minute)).or_default();
                 sum.known_ms += length_ms;
                 sum.person_ms += length_ms * self.persons;
                 sum.most = sum.most.max(self.persons);
             }
         }
+        let at_ms = time.at_ms;
         if self.last_ms.is_none_or(|last| last < at_ms) {
             let minute = at_ms.div_euclid(MINUTE_MS);
             let sum = sums.presence.entry((owner.clone(), minute)).or_default();

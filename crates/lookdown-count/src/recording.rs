@@ -199,9 +199,9 @@ impl Recording {
         step_minutes: u32,
     ) -> Result<Option<String>, StoreError> {
         let span = Span {
-            from: from.as_millisecond().div_euclid(MINUTE_MS),
-            to: (to.as_millisecond() + MINUTE_MS - 1).div_euclid(MINUTE_MS),
-            step: i64::from(step_minutes.max(1)),
+            from_minute: from.as_millisecond().div_euclid(MINUTE_MS),
+            to_minute: (to.as_millisecond() + MINUTE_MS - 1).div_euclid(MINUTE_MS),
+            step_minutes: i64::from(step_minutes.max(1)),
         };
         let owner = Owner::Camera(self.camera.clone());
         let Some(sums) = self.store.steps(&owner, span, MAX_VALUES)? else {

@@ -163,14 +163,9 @@ impl Scene {
         persons: &[Observation],
         sums: &mut Sums,
     ) -> Result<Vec<NamedCrossing>, RefusedReport> {
-        let ReportTime {
-            at_ms,
-            longest_gap_ms,
-            now,
-        } = time;
-        let elapsed_s = self.cameras[camera].elapsed_s(now);
+        let elapsed_s = self.cameras[camera].elapsed_s(time.now);
         self.tracker
-            .update_after(elapsed_s, camera, seconds(at_ms), persons)?;
+            .update_after(elapsed_s, camera, seconds(time.at_ms), persons)?;
         let tracks: Vec<&Track> = self.tracker.tracks().collect();
         let mut crossings = Vec::new();
         // A line at the edge of an area counts those who cross it from the margin.
@@ -181,17 +176,16 @@ impl Scene {
         }
         let tracks = counted;
         self.heat_map.update(tracks.iter().copied());
-        let day = at_ms.div_euclid(DAY_MS);
+        let day = time.at_ms.div_euclid(DAY_MS);
         for (cell, milliseconds) in self.heat_map.take() {
             let key = (self.owner.clone(), day, cell);
             *sums.cells.entry(key).or_default() += milliseconds;
         }
         let tracked = tracks.len() as u64;
-        let time = (at_ms, longest_gap_ms);
         let is_site = matches!(self.owner, Owner::Site(_));
         let reporting = &mut self.cameras[camera];
         reporting.late_since = None;
-        reporting.advance_zones(at_ms, longest_gap_ms, sums);
+        reporting.advance_zones(time, sums);
         let own = if is_site {
             let own = tracks
                 .iter()

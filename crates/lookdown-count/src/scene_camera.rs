@@ -19,7 +19,9 @@ use crate::{
     now::{LogPause, Now},
     presence::Presence,
     report::ReportKey,
-    sums::{LineDirection, MINUTE_MS, Sums, ZoneOf, minutes},
+    scene::ReportTime,
+    sums::{LineDirection, MINUTE_MS, Sums, ZoneOf},
+    time_span::TimeSpan,
 };
 
 /// Reports of a camera that are late for this long mean that a clock was set back: tracks begin again
@@ -214,21 +216,21 @@ impl SceneCamera {
     }
 
     /// Adds the time since the last report of this camera to its zones.
-    pub(crate) fn advance_zones(&mut self, at_ms: i64, longest_gap_ms: i64, sums: &mut Sums) {
-        let since = self.presence.known_since(at_ms, longest_gap_ms);
+    pub(crate) fn advance_zones(&mut self, time: ReportTime, sums: &mut Sums) {
+        let known = self.presence.known(time);
         let occupancy = self.zones.occupancy();
         for (index, persons) in occupancy.into_iter().enumerate() {
             let persons = persons as u64;
             let zone = self.zone_of(index);
             let before = std::mem::replace(&mut self.zone_persons[index], persons);
-            let parts = since.map(|since| minutes(since, at_ms));
+            let parts = known.map(TimeSpan::minutes);
             for (minute, length_ms) in parts.into_iter().flatten().filter(|_| before > 0) {
                 let sum = sums.zones.entry((zone.clone(), minute)).or_default();
                 sum.person_ms += length_ms * before;
                 sum.most = sum.most.max(before);
             }
             if persons > 0 {
-                let minute = at_ms.div_euclid(MINUTE_MS);
+                let minute = time.at_ms.div_euclid(MINUTE_MS);
                 let sum = sums.zones.entry((zone, minute)).or_default();
                 sum.most = sum.most.max(persons);
             }

@@ -141,28 +141,3 @@ impl Sums {
         }
     }
 }
-
-/// Splits a time into its parts per minute: the minute and the milliseconds in it.
-pub(crate) fn minutes(from_ms: i64, to_ms: i64) -> impl Iterator<Item = (Period, u64)> {
-    let first = from_ms.div_euclid(MINUTE_MS);
-    let last = to_ms.div_euclid(MINUTE_MS);
-    (first..=last).filter_map(move |minute| {
-        let start = from_ms.max(minute * MINUTE_MS);
-        let end = to_ms.min((minute + 1) * MINUTE_MS);
-        let length = u64::try_from(end - start).ok()?;
-        (length > 0).then_some((minute, length))
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_time_is_split_at_the_minutes() {
-        let parts: Vec<_> = minutes(59_000, 181_000).collect();
-        assert_eq!(parts, [(0, 1_000), (1, 60_000), (2, 60_000), (3, 1_000)]);
-        assert_eq!(minutes(60_000, 120_000).collect::<Vec<_>>(), [(1, 60_000)]);
-        assert_eq!(minutes(5, 5).count(), 0);
-    }
-}

@@ -32,6 +32,7 @@ use crate::{
     now::time_of,
     store::{Span, Step},
     sums::{MINUTE_MS, Owner},
+    time_span::TimeSpan,
 };
 
 /// Most values of an answer: steps times directions of lines and zones. An answer has 12 MB at most.
@@ -228,7 +229,8 @@ fn counts(owner: Owner, span: Span, sums: &BTreeMap<i64, Step>, names: Names) ->
         lines.extend(step.crossings.keys().cloned());
         zones.extend(step.zones.keys().cloned());
     }
-    let count = (span.to - span.from + span.step - 1) / span.step;
+    let (time, step_ms) = (span.time(), span.step_minutes * MINUTE_MS);
+    let count = (time.to_ms - time.from_ms + step_ms - 1) / step_ms;
     let columns = 1 + lines.len() + zones.len();
     let values = usize::try_from(count).ok()?.saturating_mul(columns);
     if values > MAX_VALUES {
@@ -236,15 +238,16 @@ fn counts(owner: Owner, span: Span, sums: &BTreeMap<i64, Step>, names: Names) ->
     }
     let nothing = Step::default();
     let steps = (0..count).map(|number| {
-        let from = span.from + number * span.step;
-        let to = (from + span.step).min(span.to);
+        let from_ms = time.from_ms + number * step_ms;
+        let to_ms = (from_ms + step_ms).min(time.to_ms);
+        let time = TimeSpan { from_ms, to_ms };
         let step = sums.get(&number).unwrap_or(&nothing);
-        step_counts(step, (from, to), (&lines, &zones), &owner)
+        step_counts(step, time, (&lines, &zones), &owner)
     });
     Some(Counts {
-        from: time(span.from),
-        to: time(span.to),
-        step_seconds: span.step * 60,
+        from: time_of(time.from_ms),
+        to: time_of(time.to_ms),
+        step_seconds: span.step_minutes * 60,
         steps: steps.collect(),
         camera: match &owner {
             Owner::Camera(name) => Some(name.clone()),
@@ -259,7 +262,7 @@ fn counts(owner: Owner, span: Span, sums: &BTreeMap<i64, Step>, names: Names) ->
 
 fn step_counts(
     step: &Step,
-    (from, to): (i64, i64),
+    time: TimeSpan,
     (lines, zones): (&BTreeSet<(String, String)>, &BTreeSet<String>),
     owner: &Owner,
 ) -> StepCounts {
@@ -287,8 +290,8 @@ fn step_counts(
         (zone.clone(), counts)
     });
     StepCounts {
-        from: time(from),
-        to: time(to),
+        from: time_of(time.from_ms),
+        to: time_of(time.to_ms),
         known_seconds: ratio(known_ms, 1000),
         persons: is_known.then(|| PersonCounts {
             mean: thousandths(ratio(step.presence.person_ms, known_ms)),
@@ -346,10 +349,6 @@ fn cell(text: &mut String, value: Option<impl std::fmt::Display>) {
     }
 }
 
-fn time(minute: i64) -> Timestamp {
-    time_of(minute * MINUTE_MS)
-}
-
 #[expect(
     clippy::cast_precision_loss,
     reason = "exact for centuries of milliseconds"
@@ -374,9 +373,9 @@ mod tests {
     fn steps_times_columns_are_bounded() {
         let owner = || Owner::Camera("hall".to_owned());
         let span = |steps| Span {
-            from: 0,
-            to: steps,
-            step: 1,
+            from_minute: 0,
+            to_minute: steps,
+            step_minutes: 1,
         };
         let names = |zones: usize| {
             let zones = (0..zones).map(|number| format!("zone {number}"));

@@ -21,7 +21,8 @@ use super::{
 };
 use crate::{
     now::time_of,
-    sums::{DAY_MS, MINUTE_MS, Owner},
+    sums::{DAY_MS, Owner},
+    time_span::TimeSpan,
 };
 
 /// Most cells along a side of an answer: those with the most time decide.
@@ -119,8 +120,8 @@ async fn heat_map(api: &Shared, owner: Owner, parameters: Parameters) -> Result<
     let day = |milliseconds: i64| time_of(milliseconds.div_euclid(DAY_MS) * DAY_MS);
     let (origin, seconds) = blocking(move || Ok(grid(&cells))).await?;
     Ok(HeatMap {
-        from: day(time.0),
-        to: day(time.1 + DAY_MS - 1),
+        from: day(time.from_ms),
+        to: day(time.to_ms + DAY_MS - 1),
         cell_m: CELL_M,
         origin_m: origin.corner_m(),
         seconds,
@@ -132,11 +133,10 @@ pub(super) async fn stored(
     api: &Shared,
     owner: Owner,
     parameters: Parameters,
-) -> Result<((i64, i64), BTreeMap<Cell, u64>), Problem> {
+) -> Result<(TimeSpan, BTreeMap<Cell, u64>), Problem> {
     let Query(parameters) = parameters.map_err(|refused| unusable_query(&refused))?;
-    let span = parameters.span()?;
+    let time = parameters.span()?.time();
     check_known(api, &owner).await?;
-    let time = (span.from * MINUTE_MS, span.to * MINUTE_MS);
     // A camera of a site shares the floor of the site.
     let owner = match &owner {
         Owner::Camera(camera) => {

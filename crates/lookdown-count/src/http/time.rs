@@ -73,7 +73,11 @@ impl TimeParameters {
             let fault = "the time has more than 10000 steps: give a later time, or a longer step";
             return Err(Problem::of_parameter("from", fault));
         }
-        Ok(Span { from, to, step })
+        Ok(Span {
+            from_minute: from,
+            to_minute: to,
+            step_minutes: step,
+        })
     }
 
     fn zone(&self) -> Result<TimeZone, Problem> {

@@ -9,7 +9,10 @@ use super::{STATE_VERSION, Store, StoreError};
 use crate::{
     message::{HeldCondition, Message},
     scene::SceneState,
-    sums::{DAY_MS, LineDirection, Owner, PresenceSum, Totals, ZoneOf, ZoneSum, ZoneTotal},
+    sums::{
+        DAY_MS, LineDirection, MINUTE_MS, Owner, PresenceSum, Totals, ZoneOf, ZoneSum, ZoneTotal,
+    },
+    time_span::TimeSpan,
 };
 
 /// The content of the store at the start.
@@ -28,12 +31,20 @@ pub(crate) type StoredCalibrations = BTreeMap<String, (String, Option<Vec<u8>>)>
 /// A time in whole minutes, in steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Span {
-    /// First minute.
-    pub(crate) from: i64,
+    pub(crate) from_minute: i64,
     /// Minute after the last.
-    pub(crate) to: i64,
-    /// Minutes of a step.
-    pub(crate) step: i64,
+    pub(crate) to_minute: i64,
+    pub(crate) step_minutes: i64,
+}
+
+impl Span {
+    /// Returns its first and last moment.
+    pub(crate) fn time(self) -> TimeSpan {
+        TimeSpan {
+            from_ms: self.from_minute * MINUTE_MS,
+            to_ms: self.to_minute * MINUTE_MS,
+        }
+    }
 }
 
 /// The sums of a step.
@@ -75,7 +86,11 @@ impl Store {
     ) -> Result<Option<BTreeMap<i64, Step>>, StoreError> {
         let mut values = 0;
         let connection = self.reader.lock();
-        let Span { from, to, step } = span;
+        let Span {
+            from_minute: from,
+            to_minute: to,
+            step_minutes: step,
+        } = span;
         let mut steps = BTreeMap::<i64, Step>::new();
         let mut statement = connection.prepare_cached(
             "SELECT (minute - ?2) / ?4, sum(known_ms), sum(person_ms), max(most) FROM presence
@@ -135,7 +150,7 @@ impl Store {
     pub(crate) fn cells(
         &self,
         owner: &Owner,
-        (from_ms, to_ms): (i64, i64),
+        time: TimeSpan,
     ) -> Result<BTreeMap<Cell, u64>, StoreError> {
         let connection = self.reader.lock();
         let mut statement = connection.prepare_cached(
@@ -143,8 +158,8 @@ impl Store {
              WHERE owner = ? AND day >= ? AND day < ? GROUP BY 1, 2",
         )?;
         let days = (
-            from_ms.div_euclid(DAY_MS),
-            (to_ms + DAY_MS - 1).div_euclid(DAY_MS),
+            time.from_ms.div_euclid(DAY_MS),
+            (time.to_ms + DAY_MS - 1).div_euclid(DAY_MS),
         );
         let mut rows = statement.query(params![owner.key(), days.0, days.1])?;
         let mut cells = BTreeMap::new();

@@ -5,6 +5,7 @@ use crate::{
     batch::Batch,
     message::Message,
     sums::{DAY_MS, LineDirection, MINUTE_MS, Owner, PresenceSum, Sums, Totals, ZoneOf, ZoneSum},
+    time_span::TimeSpan,
 };
 
 fn batch(minute: i64, last_event: u64) -> Batch {
@@ -50,9 +51,9 @@ fn sums_of_batches_add_up_over_steps() {
     }
     let hall = Owner::Camera("hall".to_owned());
     let span = |step| Span {
-        from: 0,
-        to: 30,
-        step,
+        from_minute: 0,
+        to_minute: 30,
+        step_minutes: step,
     };
     let steps = store.steps(&hall, span(15), 100).unwrap().unwrap();
     assert_eq!(steps.keys().copied().collect::<Vec<_>>(), [0, 1]);
@@ -69,7 +70,11 @@ fn sums_of_batches_add_up_over_steps() {
         (whole.zones["till"].entries, whole.zones["till"].most),
         (4, 1)
     );
-    let cells = store.cells(&hall, (0, 1)).unwrap();
+    let time = TimeSpan {
+        from_ms: 0,
+        to_ms: 1,
+    };
+    let cells = store.cells(&hall, time).unwrap();
     assert_eq!(cells[&Cell { column: -3, row: 4 }], 2_000);
     let resumed = store.resumed().unwrap();
     assert_eq!(resumed.last_event, 7);
@@ -93,9 +98,9 @@ fn old_sums_expire_and_totals_stay() {
     store.expire(60 * 60_000).unwrap();
     let hall = Owner::Camera("hall".to_owned());
     let span = Span {
-        from: 0,
-        to: 200,
-        step: 200,
+        from_minute: 0,
+        to_minute: 200,
+        step_minutes: 200,
     };
     assert_eq!(
         store.steps(&hall, span, 100).unwrap().unwrap()[&0]
@@ -126,9 +131,9 @@ fn a_clock_that_is_ahead_removes_one_day_at_most() {
     let hall = Owner::Camera("hall".to_owned());
     let known_days = || {
         let span = Span {
-            from: 0,
-            to: 4 * day,
-            step: day,
+            from_minute: 0,
+            to_minute: 4 * day,
+            step_minutes: day,
         };
         let steps = store.steps(&hall, span, 100).unwrap().unwrap();
         let known = steps

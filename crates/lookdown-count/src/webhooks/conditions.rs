@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::{Condition, Webhook};
 use crate::{
     message::{HeldCondition, Message},
-    now::time_of,
+    now::{Now, time_of},
     scene::Scene,
     scene_camera::NamedCrossing,
 };
@@ -68,12 +68,13 @@ impl Conditions {
         Some(held.collect())
     }
 
-    /// Returns the messages of a counted report of the time `at_ms`, which arrived at `now_ms`.
+    /// Returns the messages of a counted report of the time `at_ms`, which arrived now.
     pub(crate) fn of_report(
         &mut self,
         event: u64,
         camera: &str,
-        (at_ms, now_ms): (i64, i64),
+        at_ms: i64,
+        now: Now,
         crossings: &[NamedCrossing],
         scene: &Scene,
     ) -> Vec<Message> {
@@ -136,7 +137,8 @@ impl Conditions {
                 Condition::Occupancy { .. } | Condition::Silent { .. } => {}
             }
         }
-        self.reports.insert(camera.to_owned(), at_ms.min(now_ms));
+        self.reports
+            .insert(camera.to_owned(), at_ms.min(now.unix_ms));
         messages
     }
 
