@@ -10,7 +10,7 @@ use jiff::Timestamp;
 use lookdown_detect::fairness::Client;
 use parking_lot::{Mutex, MutexGuard};
 
-use self::kept::Kept;
+use self::kept::BoundedReports;
 use super::{
     Cameras, FollowedNumber, ListenError, Listeners, Listening, NewImage, NewReport, ReportId,
     ResultLimits, ResultStore, ResultUse, StoreHealth, StoredImage, StoredReport, Unreachable,
@@ -20,7 +20,7 @@ use crate::metrics::Metrics;
 /// Keeps reports in memory, within limits. They are lost when the process ends.
 #[derive(Debug)]
 pub struct MemoryResults {
-    kept: Mutex<Kept>,
+    kept: Mutex<BoundedReports>,
     /// The followed numbers of the cameras.
     followed: Mutex<BTreeMap<String, FollowedNumber>>,
     listeners: Arc<Listeners>,
@@ -34,7 +34,7 @@ impl MemoryResults {
         metrics.results_store_up.set(1);
         Self {
             listeners: Arc::new(Listeners::new(limits.max_listeners, Arc::clone(&metrics))),
-            kept: Mutex::new(Kept::new(limits)),
+            kept: Mutex::new(BoundedReports::new(limits)),
             followed: Mutex::default(),
             metrics,
         }
@@ -53,7 +53,7 @@ impl MemoryResults {
     }
 
     /// The reports that are not too old.
-    fn kept(&self) -> MutexGuard<'_, Kept> {
+    fn kept(&self) -> MutexGuard<'_, BoundedReports> {
         // No change can panic before it is complete.
         let mut kept = self.kept.lock();
         let before = kept.removed_cameras();
@@ -62,7 +62,7 @@ impl MemoryResults {
         kept
     }
 
-    fn note_removals(&self, kept: &Kept, before: u64) {
+    fn note_removals(&self, kept: &BoundedReports, before: u64) {
         if kept.removed_cameras() > before {
             let cameras = kept.cameras();
             self.followed

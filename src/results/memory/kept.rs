@@ -13,9 +13,10 @@ use crate::results::{
     Cameras, NewImage, NewReport, ReportId, ResultLimits, ResultUse, StoredImage, StoredReport,
 };
 
-/// Every report is in `cameras`, and in exactly one of `latest` and `earlier`.
+/// Reports within the limits. Every report is in `cameras`, and in exactly one of `latest` and
+/// `earlier`.
 #[derive(Debug)]
-pub(super) struct Kept {
+pub(super) struct BoundedReports {
     limits: ResultLimits,
     /// The reports of each camera, oldest first, at least one.
     cameras: HashMap<String, VecDeque<Arc<StoredReport>>>,
@@ -30,7 +31,7 @@ pub(super) struct Kept {
     removed_cameras: u64,
 }
 
-impl Kept {
+impl BoundedReports {
     pub(super) fn new(limits: ResultLimits) -> Self {
         Self {
             images: Images::new(limits.max_images),

@@ -8,9 +8,9 @@ use super::*;
 
 const ROOMY: [usize; 4] = [1000, 1000, 1000, 1 << 20];
 
-fn kept([max_cameras, history_per_camera, max_reports, max_bytes]: [usize; 4]) -> Kept {
+fn kept([max_cameras, history_per_camera, max_reports, max_bytes]: [usize; 4]) -> BoundedReports {
     let count = |number| NonZeroUsize::new(number).unwrap();
-    Kept::new(ResultLimits {
+    BoundedReports::new(ResultLimits {
         max_cameras: count(max_cameras),
         history_per_camera: count(history_per_camera),
         max_reports: count(max_reports),
@@ -21,7 +21,7 @@ fn kept([max_cameras, history_per_camera, max_reports, max_bytes]: [usize; 4]) -
     })
 }
 
-fn add_with_image(kept: &mut Kept, camera: &str) -> ReportId {
+fn add_with_image(kept: &mut BoundedReports, camera: &str) -> ReportId {
     let report = NewReport {
         camera: camera.to_owned(),
         received_at: Timestamp::UNIX_EPOCH,
@@ -35,7 +35,7 @@ fn add_with_image(kept: &mut Kept, camera: &str) -> ReportId {
     kept.add(report, Some(image), Timestamp::UNIX_EPOCH).id
 }
 
-fn add(kept: &mut Kept, camera: &str, length: usize) -> ReportId {
+fn add(kept: &mut BoundedReports, camera: &str, length: usize) -> ReportId {
     let report = NewReport {
         camera: camera.to_owned(),
         received_at: Timestamp::UNIX_EPOCH,
@@ -45,7 +45,7 @@ fn add(kept: &mut Kept, camera: &str, length: usize) -> ReportId {
     kept.add(report, None, Timestamp::UNIX_EPOCH).id
 }
 
-fn ids(kept: &Kept, cameras: &Cameras, after: ReportId) -> Vec<ReportId> {
+fn ids(kept: &BoundedReports, cameras: &Cameras, after: ReportId) -> Vec<ReportId> {
     let found = kept.since(cameras, after, usize::MAX);
     found.iter().map(|report| report.id).collect()
 }
