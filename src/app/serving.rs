@@ -25,8 +25,8 @@ use crate::{
     settings::Settings,
 };
 
-/// Longest time that the shutdown waits for the MQTT broker.
-const FAREWELL: Duration = Duration::from_secs(3);
+/// Longest time, 3 seconds, that the shutdown waits for the MQTT broker.
+const MQTT_SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(3);
 /// Longest time that the shutdown waits for a model that is being loaded.
 const LONGEST_LOAD: Duration = Duration::from_secs(10);
 /// Interval of the checks during that wait.
@@ -77,7 +77,7 @@ impl App {
             spawn_blocking(move || workers.shut_down()).await?;
             if let Some(publishing) = publishing {
                 // The results have ended. If the broker takes too long, it publishes the will.
-                let _ = timeout(FAREWELL, publishing).await;
+                let _ = timeout(MQTT_SHUTDOWN_TIMEOUT, publishing).await;
             }
             self.results.flush().await;
             tracing::info!("stopped");

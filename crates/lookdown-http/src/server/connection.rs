@@ -26,12 +26,13 @@ use crate::Shutdown;
 /// The connection passes heads of up to this multiple of the limit to the service, which refuses
 /// them with a description.
 const HEAD_LIMIT_FACTOR: usize = 2;
-/// Longest wait for the first request on a connection that was accepted just before draining.
-const LAST_CALL: Duration = Duration::from_millis(500);
-/// Longest time, and most bytes, for which input is discarded after a request that could not be
-/// parsed.
-const LINGER: Duration = Duration::from_secs(1);
-const LINGER_BYTES: u64 = 4 << 20;
+/// Longest wait, 500 milliseconds, for the first request on a connection that was accepted just before
+/// draining.
+const FIRST_REQUEST_DRAIN_TIMEOUT: Duration = Duration::from_millis(500);
+/// Longest time, 1 second, for which input is discarded after a request that could not be parsed.
+const DISCARD_TIMEOUT: Duration = Duration::from_secs(1);
+/// Most bytes, 4 MiB, that are discarded then.
+const MAX_DISCARDED_BYTES: u64 = 4 << 20;
 
 /// The rules of a connection.
 pub(super) struct Rules {
@@ -91,7 +92,7 @@ where
                 () = shutdown.draining() => {}
             }
             if timeouts.awaits_first_request()
-                && let Ok(ended) = timeout(LAST_CALL, connection.as_mut()).await
+                && let Ok(ended) = timeout(FIRST_REQUEST_DRAIN_TIMEOUT, connection.as_mut()).await
             {
                 return ended;
             }
@@ -110,7 +111,7 @@ where
         }
     };
     if was_refused {
-        let _ = timeout(LINGER, discard_rest(stream)).await;
+        let _ = timeout(DISCARD_TIMEOUT, discard_rest(stream)).await;
     }
 }
 
@@ -118,7 +119,7 @@ where
 /// connection and lose the response.
 async fn discard_rest(mut stream: impl AsyncRead + AsyncWrite + Unpin) -> io::Result<()> {
     stream.shutdown().await?;
-    let mut rest = stream.take(LINGER_BYTES);
+    let mut rest = stream.take(MAX_DISCARDED_BYTES);
     tokio::io::copy(&mut rest, &mut tokio::io::sink()).await?;
     Ok(())
 }
