@@ -11,7 +11,7 @@ use crate::settings::Settings;
 
 /// Longest time for the answer, including the connection: shorter than the timeouts of container
 /// engines.
-const PATIENCE: Duration = Duration::from_secs(3);
+const TIMEOUT: Duration = Duration::from_secs(3);
 
 /// The kind of health check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -65,7 +65,7 @@ pub async fn ask(settings: &Settings, probe: Probe) -> Result<String, ProbeError
     // Fails when there is one already, which is as good.
     let _ = rustls::crypto::ring::default_provider().install_default();
     let client = Client::builder()
-        .timeout(PATIENCE)
+        .timeout(TIMEOUT)
         .redirect(redirect::Policy::none())
         .no_proxy()
         // The certificate is for the names that clients use, not for this address. Nothing secret

@@ -111,7 +111,7 @@ fn remote_options(remote: &RemoteSettings, called: String) -> RemoteOptions {
         token: remote.token.clone(),
         model: remote.model.clone().unwrap_or_else(|| called.clone()),
         called,
-        patience: remote.timeout,
+        timeout: remote.timeout,
     }
 }
 

@@ -69,26 +69,26 @@ impl Calibrations {
         Ok(calibrations)
     }
 
-    /// Like [`Calibrations::open`], but waits for at most `patience`. After that, the rest is read
+    /// Like [`Calibrations::open`], but waits for at most `timeout`. After that, the rest is read
     /// in the background ([`Calibrations::is_read`]), and a failure is reported by
     /// [`Calibrations::health`].
     ///
     /// # Errors
-    /// Those of [`Calibrations::open`] within `patience`.
+    /// Those of [`Calibrations::open`] within `timeout`.
     pub fn open_within(
         store: Box<dyn CalibrationStore>,
         writable: bool,
-        patience: Duration,
+        timeout: Duration,
         metrics: Arc<Metrics>,
     ) -> Result<Arc<Self>, StoreError> {
-        Self::open_with(store, writable, FileReader::default(), patience, metrics)
+        Self::open_with(store, writable, FileReader::default(), timeout, metrics)
     }
 
     fn open_with(
         store: Box<dyn CalibrationStore>,
         writable: bool,
         reader: FileReader,
-        patience: Duration,
+        timeout: Duration,
         metrics: Arc<Metrics>,
     ) -> Result<Arc<Self>, StoreError> {
         let calibrations = Arc::new(Self::unread(store, writable, reader, metrics));
@@ -107,7 +107,7 @@ impl Calibrations {
             place: calibrations.store.place(),
             problem: format!("the operating system gives no thread: {error}"),
         })?;
-        if let Ok(outcome) = outcome.recv_timeout(patience) {
+        if let Ok(outcome) = outcome.recv_timeout(timeout) {
             outcome?;
         } else {
             let place = calibrations.store.place();

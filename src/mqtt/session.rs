@@ -24,7 +24,7 @@ use crate::tls::ClientTls;
 const KEEP_ALIVE_SECONDS: u16 = 30;
 const KEEP_ALIVE: Duration = Duration::from_secs(KEEP_ALIVE_SECONDS as u64);
 /// Longest time for connecting, or for sending a message to the broker.
-const PATIENCE: Duration = Duration::from_secs(10);
+const BROKER_TIMEOUT: Duration = Duration::from_secs(10);
 /// Most bytes of an incoming packet: only statuses are expected.
 const MAX_INCOMING: usize = 64 * 1024;
 /// Most bytes of an outgoing packet: much more than the largest report.
@@ -167,7 +167,7 @@ impl Session {
 async fn in_time<T>(
     work: impl Future<Output = Result<T, SessionError>>,
 ) -> Result<T, SessionError> {
-    timeout(PATIENCE, work)
+    timeout(BROKER_TIMEOUT, work)
         .await
         .map_err(|_| SessionError::Silent)?
 }
@@ -240,7 +240,7 @@ mod tests {
             let began = Instant::now();
             let error = failure(start, rest, Duration::from_millis(100)).await;
             assert!(matches!(error, SessionError::Silent), "{error:?}");
-            assert!(began.elapsed() < PATIENCE + 2 * KEEP_ALIVE);
+            assert!(began.elapsed() < BROKER_TIMEOUT + 2 * KEEP_ALIVE);
         }
     }
 }

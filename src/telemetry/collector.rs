@@ -13,7 +13,7 @@ use reqwest::{Client, redirect};
 use tokio::runtime::Handle;
 
 /// Longest time for one delivery.
-const PATIENCE: Duration = Duration::from_secs(5);
+const DELIVERY_TIMEOUT: Duration = Duration::from_secs(5);
 /// Most bytes of a response that are read.
 const MAX_ANSWER_BYTES: usize = 64 * 1024;
 
@@ -36,7 +36,7 @@ impl Collector {
         // Fails if a provider is already installed, which is equally good.
         let _ = rustls::crypto::ring::default_provider().install_default();
         let client = Client::builder()
-            .timeout(PATIENCE)
+            .timeout(DELIVERY_TIMEOUT)
             .redirect(redirect::Policy::none())
             .build()?;
         Ok(Self {

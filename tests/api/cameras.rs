@@ -19,7 +19,7 @@ use tokio::{
 use crate::service::{Bounds, Service};
 
 const CAMERA: &str = r#"{ "url": "rtsp://127.0.0.1:9/" }"#;
-const PATIENCE: Duration = Duration::from_mins(1);
+const TIMEOUT: Duration = Duration::from_mins(1);
 /// Most requests that wait for the folder.
 const MAX_WAITING: usize = 32;
 
@@ -63,7 +63,7 @@ async fn a_folder_of_cameras_that_hangs_keeps_few_threads() {
             service.put(&path, CAMERA).await.status
         });
     }
-    let statuses = timeout(PATIENCE, requests.join_all()).await.unwrap();
+    let statuses = timeout(TIMEOUT, requests.join_all()).await.unwrap();
     let with = |status| statuses.iter().filter(|other| **other == status).count();
     let timeouts = with(StatusCode::GATEWAY_TIMEOUT);
     let refusals = with(StatusCode::TOO_MANY_REQUESTS);
@@ -82,6 +82,6 @@ async fn a_folder_of_cameras_that_hangs_keeps_few_threads() {
         }
         service.put("/cameras/gate", CAMERA).await.status
     };
-    let stored = timeout(PATIENCE, again).await.unwrap();
+    let stored = timeout(TIMEOUT, again).await.unwrap();
     assert_eq!(stored, StatusCode::CREATED);
 }

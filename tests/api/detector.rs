@@ -13,7 +13,7 @@ use lookdown_detect::{
 };
 
 /// A test that waits longer than this has failed.
-const PATIENCE: Duration = Duration::from_secs(20);
+const TIMEOUT: Duration = Duration::from_secs(20);
 
 /// Returns a person in every view.
 pub(crate) struct EagerDetector {
@@ -96,9 +96,9 @@ impl Gate {
         let state = self.state.lock().unwrap();
         let (mut state, waited) = self
             .changed
-            .wait_timeout_while(state, PATIENCE, |state| !reached(state))
+            .wait_timeout_while(state, TIMEOUT, |state| !reached(state))
             .unwrap();
-        assert!(!waited.timed_out(), "nothing happened within {PATIENCE:?}");
+        assert!(!waited.timed_out(), "nothing happened within {TIMEOUT:?}");
         std::mem::take(&mut state.panics)
     }
 }

@@ -104,11 +104,11 @@ async fn the_second_request_to_stop_ends_at_once() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn draining_ends_at_its_timeout() {
-    for patience in [
+    for setting in [
         ("SHUTDOWN__DRAIN_TIMEOUT_MILLIS", "200"),
         ("SERVER__REQUEST_TIMEOUT_MILLIS", "200"),
     ] {
-        let server = Server::start(&[patience]).await;
+        let server = Server::start(&[setting]).await;
         // In the middle of a request, and never closed.
         let stuck = server.connect(b"GET /livez HTTP/1.1\r\n");
         assert!(server.get("/livez").await.contains("200 OK"));

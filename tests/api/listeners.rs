@@ -36,12 +36,12 @@ pub(crate) const KEY: &str = "0123456789abcdef";
 const SILENT: usize = 600;
 
 /// Longest wait for a connection, and for the end of an answer: longer than the timeouts of heads.
-const PATIENCE: Duration = Duration::from_secs(20);
+const TIMEOUT: Duration = Duration::from_secs(20);
 
 /// Sends bytes and reads until the listener closes the connection.
 pub(crate) fn answer(address: SocketAddr, request: &str) -> String {
-    let mut connection = TcpStream::connect_timeout(&address, PATIENCE).unwrap();
-    connection.set_read_timeout(Some(PATIENCE)).unwrap();
+    let mut connection = TcpStream::connect_timeout(&address, TIMEOUT).unwrap();
+    connection.set_read_timeout(Some(TIMEOUT)).unwrap();
     connection.write_all(request.as_bytes()).unwrap();
     let mut bytes = Vec::new();
     // Bytes received before a reset count.
@@ -222,7 +222,7 @@ pub(crate) async fn accepts(address: SocketAddr) {
             sleep(Duration::from_millis(20)).await;
         }
     };
-    timeout(PATIENCE, connected).await.unwrap();
+    timeout(TIMEOUT, connected).await.unwrap();
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 4)]

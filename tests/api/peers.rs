@@ -134,7 +134,7 @@ fn responses_of_an_inference_server_are_bounded() {
         score_floor: 0.1,
         max_detections_per_view: 10,
     };
-    let patience = Duration::from_secs(3);
+    let timeout = Duration::from_secs(3);
     for evil in every_kind() {
         let name = evil.name;
         let peer = EvilServer::start(evil);
@@ -143,7 +143,7 @@ fn responses_of_an_inference_server_are_bounded() {
             token: None,
             model: "there".to_owned(),
             called: "here".to_owned(),
-            patience,
+            timeout,
         };
         let server = Arc::new(RemoteServer::new(options, Arc::default()).unwrap());
         let began = Instant::now();
@@ -156,7 +156,7 @@ fn responses_of_an_inference_server_are_bounded() {
         );
         assert!(!error.to_string().contains('\n'), "{name}: {error}");
         // A request that fails before its response is sent once more.
-        assert!(began.elapsed() < 2 * patience, "{name}");
+        assert!(began.elapsed() < 2 * timeout, "{name}");
         assert!(peer.sent() < (64 << 20) + 2 * SOCKET_BYTES, "{name}");
     }
 }
@@ -203,7 +203,7 @@ async fn provisional_responses_alone() {
             token: None,
             model: "there".to_owned(),
             called: "here".to_owned(),
-            patience: Duration::from_secs(3),
+            timeout: Duration::from_secs(3),
         };
         RemoteServer::new(options, Arc::default()).unwrap()
     };

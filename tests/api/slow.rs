@@ -54,9 +54,9 @@ async fn a_stalled_body_is_refused_after_seconds_on_every_route() {
         let answer = service.send(request).await;
         assert_too_slow(&answer, "1024 bytes per second");
         let waited = began.elapsed();
-        let patience = Duration::from_secs(5);
+        let timeout = Duration::from_secs(5);
         assert!(
-            (patience..patience * 2).contains(&waited),
+            (timeout..timeout * 2).contains(&waited),
             "{path}: {waited:?}"
         );
     }

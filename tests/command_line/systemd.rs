@@ -9,7 +9,7 @@ use std::{
 use crate::SMALL_MODEL;
 
 /// Longest time for a message of the server. Models are loaded before the first.
-const PATIENCE: Duration = Duration::from_mins(1);
+const TIMEOUT: Duration = Duration::from_mins(1);
 
 /// A server, which is killed if a test fails.
 struct Service(Child);
@@ -26,7 +26,7 @@ fn systemd_is_notified_of_readiness_watchdog_and_stop() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("notify");
     let socket = UnixDatagram::bind(&path).unwrap();
-    socket.set_read_timeout(Some(PATIENCE)).unwrap();
+    socket.set_read_timeout(Some(TIMEOUT)).unwrap();
     let waits_for = |expected: &str| {
         let mut message = [0; 64];
         loop {

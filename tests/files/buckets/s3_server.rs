@@ -14,7 +14,7 @@ use tempfile::TempDir;
 
 /// Must never appear in any output.
 pub(crate) const SECRET: &str = "kept-to-itself-7f3a";
-const PATIENCE: Duration = Duration::from_mins(1);
+const TIMEOUT: Duration = Duration::from_mins(1);
 
 /// A server with the bucket `cameras`. Its log lists the requests.
 pub(crate) struct S3Server {
@@ -58,7 +58,7 @@ impl S3Server {
                 break address.trim().parse().unwrap();
             }
             assert!(
-                begun.elapsed() < PATIENCE,
+                begun.elapsed() < TIMEOUT,
                 "the S3 server does not start: {log}"
             );
             assert_eq!(server.process.try_wait().unwrap(), None, "{log}");

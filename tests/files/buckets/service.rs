@@ -11,7 +11,7 @@ use std::{
 
 use crate::{buckets::s3_server::variables, models::folder::fixture};
 
-const PATIENCE: Duration = Duration::from_mins(1);
+const TIMEOUT: Duration = Duration::from_mins(1);
 /// Pause between two looks.
 const POLL: Duration = Duration::from_millis(20);
 
@@ -94,7 +94,7 @@ impl Service {
             if is_right(&answer) {
                 return answer;
             }
-            assert!(begun.elapsed() < PATIENCE, "still {answer}; {}", self.log());
+            assert!(begun.elapsed() < TIMEOUT, "still {answer}; {}", self.log());
             thread::sleep(POLL);
         }
     }
@@ -107,7 +107,7 @@ impl Service {
             if log.contains(expected) {
                 return log;
             }
-            assert!(begun.elapsed() < PATIENCE, "no {expected:?} in {log}");
+            assert!(begun.elapsed() < TIMEOUT, "no {expected:?} in {log}");
             thread::sleep(POLL);
         }
     }

@@ -6,7 +6,7 @@ use tokio::{
 
 use super::*;
 
-const PATIENCE: Duration = Duration::from_secs(20);
+const TIMEOUT: Duration = Duration::from_secs(20);
 
 /// Starts a peer that answers one request with these bytes, `repeated` without end.
 async fn peer(first: String, repeated: &'static [u8]) -> Url {
@@ -37,7 +37,7 @@ async fn send(url: Url, limit: Option<Duration>) -> Result<Response, HttpError> 
         Some(limit) => request.timeout(limit),
         None => request,
     };
-    timeout(PATIENCE, client.send(request)).await.unwrap()
+    timeout(TIMEOUT, client.send(request)).await.unwrap()
 }
 
 #[tokio::test]
@@ -60,7 +60,7 @@ async fn a_body_that_does_not_end_fails_at_the_timeout() {
     let head = "HTTP/1.1 200 OK\r\ncontent-length: 2\r\n\r\no".to_owned();
     let url = peer(head, b"").await;
     let response = send(url, Some(Duration::from_millis(300))).await.unwrap();
-    let failed = timeout(PATIENCE, response.text()).await.unwrap();
+    let failed = timeout(TIMEOUT, response.text()).await.unwrap();
     assert!(with_causes(&failed.unwrap_err()).contains("within 300ms"));
 }
 

@@ -6,9 +6,9 @@ use std::{num::NonZeroU64, time::Duration};
 use tokio::time::Instant;
 
 /// Longest time without any bytes.
-const PATIENCE: Duration = Duration::from_secs(5);
+const MAX_SILENCE: Duration = Duration::from_secs(5);
 
-/// The time to wait for the next bytes. Each byte extends it, up to [`PATIENCE`].
+/// The time to wait for the next bytes. Each byte extends it, up to [`MAX_SILENCE`].
 pub(in crate::api) struct MinimumUploadRate {
     /// Least rate; `None` for no limit.
     least_bytes_per_second: Option<NonZeroU64>,
@@ -19,7 +19,7 @@ impl MinimumUploadRate {
     pub(in crate::api) fn begin(least_bytes_per_second: Option<NonZeroU64>) -> Self {
         Self {
             least_bytes_per_second,
-            late_at: Instant::now() + PATIENCE,
+            late_at: Instant::now() + MAX_SILENCE,
         }
     }
 
@@ -37,8 +37,8 @@ impl MinimumUploadRate {
         let Some(least) = self.least_bytes_per_second else {
             return;
         };
-        let extension = (bytes as f64 / least.get() as f64).min(PATIENCE.as_secs_f64());
-        let longest = Instant::now() + PATIENCE;
+        let extension = (bytes as f64 / least.get() as f64).min(MAX_SILENCE.as_secs_f64());
+        let longest = Instant::now() + MAX_SILENCE;
         self.late_at = (self.late_at + Duration::from_secs_f64(extension)).min(longest);
     }
 }

@@ -45,9 +45,9 @@ fn slow_files(time_limit: Duration) -> SlowFiles {
 const LONG: Duration = Duration::from_mins(1);
 const SHORT: Duration = Duration::from_millis(400);
 
-fn open_slow(folder: &Path, reader: FileReader, patience: Duration) -> Arc<Calibrations> {
+fn open_slow(folder: &Path, reader: FileReader, timeout: Duration) -> Arc<Calibrations> {
     let store = Box::new(FolderStore::new(folder));
-    Calibrations::open_with(store, true, reader, patience, Arc::default()).unwrap()
+    Calibrations::open_with(store, true, reader, timeout, Arc::default()).unwrap()
 }
 
 #[test]

@@ -20,7 +20,7 @@ use url::Url;
 use super::error::FetchError;
 
 /// Longest time for a connection, and without a byte of the answer.
-const PATIENCE: Duration = Duration::from_secs(30);
+const TIMEOUT: Duration = Duration::from_secs(30);
 /// Most redirections.
 const MAX_REDIRECTIONS: usize = 5;
 
@@ -110,7 +110,7 @@ pub(super) fn get(place: String, redirect: Policy) -> Result<(String, Box<dyn Re
     let _ = rustls::crypto::ring::default_provider().install_default();
     let client = Client::builder()
         // For the connection and for each read, not for the whole file.
-        .timeout(PATIENCE)
+        .timeout(TIMEOUT)
         .redirect(redirect)
         .build();
     let response = client.and_then(|client| client.get(&place).send());

@@ -30,7 +30,7 @@ const MAX_RETRY_AFTER: Duration = Duration::from_mins(1);
 pub(super) struct Connection {
     client: Client,
     address: Url,
-    patience: Duration,
+    timeout: Duration,
 }
 
 /// Response of a server.
@@ -66,7 +66,7 @@ impl Connection {
         let headers = token.map(|token| (AUTHORIZATION, token.authorization()));
         let client = Client::builder()
             .default_headers(headers.into_iter().collect())
-            .connect_timeout(CONNECT_TIMEOUT.min(options.patience))
+            .connect_timeout(CONNECT_TIMEOUT.min(options.timeout))
             .pool_idle_timeout(IDLE_TIMEOUT)
             .redirect(redirect::Policy::none())
             .no_proxy()
@@ -74,7 +74,7 @@ impl Connection {
         Ok(Self {
             client,
             address: options.url.clone(),
-            patience: options.patience,
+            timeout: options.timeout,
         })
     }
 
@@ -83,8 +83,8 @@ impl Connection {
     }
 
     /// Sends a GET request to the path with the given segments.
-    pub(super) fn get(&self, path: &[&str], patience: Duration) -> Result<Reply, String> {
-        let request = || self.client.get(self.at(path)).timeout(patience);
+    pub(super) fn get(&self, path: &[&str], timeout: Duration) -> Result<Reply, String> {
+        let request = || self.client.get(self.at(path)).timeout(timeout);
         reply(request, MAX_METADATA_BYTES)
     }
 
@@ -96,7 +96,7 @@ impl Connection {
         head_length: Option<usize>,
     ) -> Result<Reply, String> {
         let request = || {
-            let request = self.client.post(self.at(path)).timeout(self.patience);
+            let request = self.client.post(self.at(path)).timeout(self.timeout);
             let request = match head_length {
                 Some(length) => request
                     .header(HEAD_LENGTH, length)

@@ -19,5 +19,5 @@ pub struct RemoteOptions {
     /// both.
     pub called: String,
     /// Timeout of one inference request.
-    pub patience: Duration,
+    pub timeout: Duration,
 }

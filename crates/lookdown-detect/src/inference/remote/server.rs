@@ -108,7 +108,7 @@ impl RemoteServer {
 
     /// Sends a GET request to a path.
     pub(super) fn get(&self, path: &[&str]) -> Result<Reply, InferenceError> {
-        let reply = self.connection.get(path, self.options.patience);
+        let reply = self.connection.get(path, self.options.timeout);
         reply.map_err(|detail| self.unavailable(detail))
     }
 

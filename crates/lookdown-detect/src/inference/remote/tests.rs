@@ -29,7 +29,7 @@ fn server_with_token(fake: &FakeServer, token: Option<&str>) -> Arc<RemoteServer
         token: token.map(|token| token.parse().unwrap()),
         model: "there".to_owned(),
         called: "here".to_owned(),
-        patience: Duration::from_millis(500),
+        timeout: Duration::from_millis(500),
     };
     Arc::new(RemoteServer::new(options, Arc::default()).unwrap())
 }
