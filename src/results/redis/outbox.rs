@@ -33,7 +33,7 @@ pub(super) struct Outbox {
 
 #[derive(Debug, Default)]
 struct Waiting {
-    parcels: VecDeque<PendingReport>,
+    reports: VecDeque<PendingReport>,
     bytes: usize,
     /// True while a report was taken and is not done.
     one_is_taken: bool,
@@ -51,12 +51,12 @@ impl Outbox {
 
     /// Appends a report. Never waits.
     pub(super) fn push(&self, report: NewReport, image: Option<NewImage>) {
-        let parcel = PendingReport { report, image };
+        let pending = PendingReport { report, image };
         let mut waiting = self.waiting();
-        waiting.drop_image_of(&parcel.report.camera);
-        waiting.bytes += parcel.bytes();
-        waiting.parcels.push_back(parcel);
-        while waiting.parcels.len() > MOST_REPORTS || waiting.bytes > MOST_BYTES {
+        waiting.drop_image_of(&pending.report.camera);
+        waiting.bytes += pending.bytes();
+        waiting.reports.push_back(pending);
+        while waiting.reports.len() > MOST_REPORTS || waiting.bytes > MOST_BYTES {
             waiting.take_first();
             self.dropped.inc();
         }
@@ -104,7 +104,7 @@ impl Outbox {
     /// The number of reports that are not done.
     pub(super) fn count(&self) -> usize {
         let waiting = self.waiting();
-        waiting.parcels.len() + usize::from(waiting.one_is_taken)
+        waiting.reports.len() + usize::from(waiting.one_is_taken)
     }
 
     fn take(&self) -> Option<PendingReport> {
@@ -129,15 +129,15 @@ impl PendingReport {
 impl Waiting {
     /// Drops the camera's queued image, as a later report replaces it.
     fn drop_image_of(&mut self, camera: &str) {
-        let mut own = self.parcels.iter_mut().rev();
-        let last = own.find(|parcel| parcel.report.camera == camera);
-        if let Some(image) = last.and_then(|parcel| parcel.image.take()) {
+        let mut own = self.reports.iter_mut().rev();
+        let last = own.find(|pending| pending.report.camera == camera);
+        if let Some(image) = last.and_then(|pending| pending.image.take()) {
             self.bytes -= image.bytes();
         }
     }
 
     fn take_first(&mut self) -> Option<PendingReport> {
-        let first = self.parcels.pop_front()?;
+        let first = self.reports.pop_front()?;
         self.bytes -= first.bytes();
         Some(first)
     }
@@ -168,7 +168,7 @@ mod tests {
         let outbox = outbox();
         let (taken, ()) = tokio::join!(
             async {
-                [outbox.first().await, outbox.first().await].map(|parcel| parcel.report.persons)
+                [outbox.first().await, outbox.first().await].map(|pending| pending.report.persons)
             },
             async {
                 outbox.push(report(1, 1), None);
@@ -218,9 +218,9 @@ mod tests {
         }
         assert_eq!((outbox.count(), outbox.dropped.get()), (9, 0));
         for number in 1..=9 {
-            let parcel = outbox.first().await;
-            assert_eq!(parcel.report.persons, number);
-            assert_eq!(parcel.image.is_some(), number == 9);
+            let pending = outbox.first().await;
+            assert_eq!(pending.report.persons, number);
+            assert_eq!(pending.image.is_some(), number == 9);
         }
     }
 }

@@ -24,11 +24,11 @@ pub(super) async fn run(shared: Arc<Shared>) {
     let mut last_was_refused = false;
     let mut number = 0;
     loop {
-        let parcel = shared.outbox.first().await;
+        let pending = shared.outbox.first().await;
         // Increases also beyond the numbers of servers that have ended, so that theirs are
         // forgotten first.
         number = now_micros().max(number + 1);
-        let refusal = sender.send(&parcel, number).await.err();
+        let refusal = sender.send(&pending, number).await.err();
         if let Some(refusal) = &refusal
             && !last_was_refused
         {
@@ -53,10 +53,10 @@ struct Sender<'a> {
 
 impl Sender<'_> {
     /// Sends a report until Redis has answered. Fails only with a refusal.
-    async fn send(&self, parcel: &PendingReport, number: u64) -> RedisResult<()> {
+    async fn send(&self, pending: &PendingReport, number: u64) -> RedisResult<()> {
         loop {
             let line = self.shared.link.next_line().await;
-            let outcome = self.record(line.connection.clone(), parcel, number).await;
+            let outcome = self.record(line.connection.clone(), pending, number).await;
             match outcome {
                 Err(error) if !is_refusal(&error) => {
                     // Waits for the next connection.
