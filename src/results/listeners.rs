@@ -145,7 +145,7 @@ impl Listeners {
     }
 
     /// Publishes a report to the listeners of its camera and to those of all cameras. Never waits.
-    pub fn tell(&self, report: &Arc<StoredReport>) {
+    pub fn notify(&self, report: &Arc<StoredReport>) {
         for to in [Cameras::All, Cameras::One(report.report.camera.clone())] {
             self.publish_to(&to, report);
         }

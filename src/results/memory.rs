@@ -47,7 +47,7 @@ impl MemoryResults {
         let before = kept.removed_cameras();
         let stored = kept.add(report, image, Timestamp::now());
         self.metrics.results_stored.inc();
-        self.listeners.tell(&stored);
+        self.listeners.notify(&stored);
         self.note_removals(&kept, before);
         stored
     }

@@ -291,8 +291,8 @@ async fn invalid_options_are_refused_by_name() {
         assert_eq!(answer.status, status, "{query}");
         let problem = answer.problem();
         assert_eq!(problem["type"], format!("/problems/{kind}"), "{query}");
-        let told = problem["detail"].as_str().unwrap();
-        assert!(told.contains(detail), "{query}: {told}");
+        let reported = problem["detail"].as_str().unwrap();
+        assert!(reported.contains(detail), "{query}: {reported}");
     }
     let image = frame();
     let answer = service

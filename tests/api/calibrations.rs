@@ -74,7 +74,7 @@ async fn frames_for_unusable_files_are_refused_with_a_remedy() {
     fs::write(service.folder.path().join("rig.yaml"), rig).unwrap();
     fs::write(service.folder.path().join("hall.json"), "{}").unwrap();
     service.calibrations.refresh();
-    for (calibration, told) in [
+    for (calibration, expected) in [
         ("rig", "name one of rig-cam0, rig-cam1"),
         ("hall", "cannot be used"),
     ] {
@@ -85,7 +85,7 @@ async fn frames_for_unusable_files_are_refused_with_a_remedy() {
         let problem = answer.problem();
         assert_eq!(problem["type"], "/problems/unknown-calibration");
         let detail = problem["detail"].as_str().unwrap();
-        assert!(detail.contains(told), "{detail}");
+        assert!(detail.contains(expected), "{detail}");
     }
 }
 
@@ -104,9 +104,9 @@ async fn an_invalid_new_version_is_reported_and_the_old_one_used() {
         (ready.status.as_u16(), &ready.json()["status"]),
         (200, &json!("ready"))
     );
-    let told = &ready.json()["calibrations"];
-    assert_eq!(told["serving"], 1);
-    let files: Vec<_> = told["problems"]
+    let reported = &ready.json()["calibrations"];
+    assert_eq!(reported["serving"], 1);
+    let files: Vec<_> = reported["problems"]
         .as_array()
         .unwrap()
         .iter()
@@ -138,7 +138,7 @@ async fn an_invalid_new_version_is_reported_and_the_old_one_used() {
         "lookdown_calibration_loads_total{result=\"failure\"} 2",
     ] {
         assert!(
-            metrics.lines().any(|told| told == line),
+            metrics.lines().any(|reported| reported == line),
             "{line} is not in\n{metrics}"
         );
     }
@@ -158,9 +158,9 @@ async fn the_view_plan_has_every_view_of_the_model() {
         let views = plan.directions().len();
         let path = format!("{PATH}/views{query}");
         let plan = service.get(&path).await.json();
-        let told = plan["views"].as_array().unwrap();
+        let planned = plan["views"].as_array().unwrap();
         assert_eq!(
-            (told.len(), &plan["cost"]["images"]),
+            (planned.len(), &plan["cost"]["images"]),
             (views, &json!(views)),
             "{query}"
         );
@@ -169,7 +169,7 @@ async fn the_view_plan_has_every_view_of_the_model() {
         let share = plan["coverage"].as_f64().unwrap();
         assert!((0.6..=1.0).contains(&share), "{query}: {share}");
         assert!(plan["overlap"].as_f64().unwrap() > 1.0);
-        for view in told {
+        for view in planned {
             let outline = view["outline"].as_array().unwrap();
             let inside = |value: &Value| (-1.0..=201.0).contains(&value.as_f64().unwrap());
             assert!(!outline.is_empty(), "{view}");

@@ -117,10 +117,10 @@ async fn the_stages_are_in_headers() {
         "refine",
         "total",
     ];
-    let told: Vec<_> = answer.header("server-timing").split(", ").collect();
-    assert_eq!(told.len(), stages.len());
-    for (told, stage) in told.into_iter().zip(stages) {
-        let millis: f64 = told
+    let reported: Vec<_> = answer.header("server-timing").split(", ").collect();
+    assert_eq!(reported.len(), stages.len());
+    for (reported, stage) in reported.into_iter().zip(stages) {
+        let millis: f64 = reported
             .strip_prefix(&format!("{stage};dur="))
             .unwrap()
             .parse()

@@ -54,7 +54,7 @@ async fn metrics_count_frames_views_persons_and_failures() {
         "lookdown_rig_cache_evictions_total 0",
     ] {
         assert!(
-            metrics.lines().any(|told| told == line),
+            metrics.lines().any(|reported| reported == line),
             "{line} is not in\n{metrics}"
         );
     }

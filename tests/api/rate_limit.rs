@@ -50,8 +50,8 @@ async fn too_many_requests_are_refused_with_retry_after() {
         let answer = ask(&service, "/calibrations", "192.0.2.1:1000", None).await;
         assert_eq!(answer.status, 200);
         assert_eq!(answer.header("ratelimit-policy"), "\"default\";q=2;w=100");
-        let told = answer.header("ratelimit");
-        assert_eq!(told, format!("\"default\";r={left};t=50"));
+        let reported = answer.header("ratelimit");
+        assert_eq!(reported, format!("\"default\";r={left};t=50"));
     }
     let refused = ask(&service, "/calibrations", "192.0.2.1:2000", None).await;
     assert_eq!(refused.status, 429);
@@ -88,8 +88,8 @@ async fn every_client_route_counts_and_reports_the_limit() {
             .await,
     ] {
         left -= 1;
-        let told = answer.header("ratelimit");
-        assert!(told.contains(&format!("r={left};")), "{told}");
+        let reported = answer.header("ratelimit");
+        assert!(reported.contains(&format!("r={left};")), "{reported}");
     }
 }
 
@@ -169,7 +169,7 @@ async fn clients_are_distinguished_by_their_connection_address() {
     ])
     .await;
     for (source, status) in [("127.0.0.1", 200), ("127.0.0.1", 429), ("127.0.0.2", 200)] {
-        let told = asked_from(source, server.address).await;
-        assert_eq!(told, format!("HTTP/1.1 {status}"), "{source}");
+        let reported = asked_from(source, server.address).await;
+        assert_eq!(reported, format!("HTTP/1.1 {status}"), "{source}");
     }
 }

@@ -105,7 +105,7 @@ async fn an_invalid_model_is_reported_and_the_old_one_stays_in_use() {
         "lookdown_model_loads_total{result=\"success\"} 2",
     ] {
         assert!(
-            metrics.lines().any(|told| told == line),
+            metrics.lines().any(|reported| reported == line),
             "{line} is not in\n{metrics}"
         );
     }

@@ -242,7 +242,7 @@ async fn the_limits_bound_the_stored_reports() {
         "lookdown_results_listeners 0",
     ] {
         assert!(
-            metrics.lines().any(|told| told == line),
+            metrics.lines().any(|reported| reported == line),
             "{line}: {metrics}"
         );
     }

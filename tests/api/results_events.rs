@@ -175,8 +175,8 @@ async fn a_slow_subscriber_is_disconnected_and_can_resume() {
     assert!((1..MANY).contains(&heard), "{heard}");
     assert_eq!(service.metrics.results_listeners_dropped.get(), 1);
     let metrics = service.get("/metrics").await.text();
-    let told = "lookdown_results_listeners_dropped_total 1";
-    assert!(metrics.lines().any(|line| line == told), "{metrics}");
+    let expected = "lookdown_results_listeners_dropped_total 1";
+    assert!(metrics.lines().any(|line| line == expected), "{metrics}");
 
     let id = last.lines().next().unwrap().strip_prefix("id: ").unwrap();
     let mut stream = Stream::open(&service, EVENTS, Some(id)).await;
@@ -221,9 +221,9 @@ async fn streams_and_waits_end_at_shutdown() {
     );
     server.shows("results_listeners", 2).await;
     server.shutdown.request_without_pause();
-    let told = rest_of(stream).await;
-    assert!(told.contains("\"camera\":\"lobby\""), "{told}");
-    assert!(told.ends_with("\r\n0\r\n\r\n"), "{told}");
+    let rest = rest_of(stream).await;
+    assert!(rest.contains("\"camera\":\"lobby\""), "{rest}");
+    assert!(rest.ends_with("\r\n0\r\n\r\n"), "{rest}");
     let waiting = waiting.await.unwrap().unwrap();
     assert!(waiting.contains("304 Not Modified"), "{waiting}");
     let ended = timeout(Duration::from_secs(20), server.has_ended());

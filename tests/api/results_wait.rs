@@ -50,7 +50,7 @@ async fn a_late_notification_of_an_older_report_is_ignored() {
     let (answer, id) = tokio::join!(service.get_if_none_match(WAIT, &tag), async {
         service.has_listeners(1).await;
         // As a Redis does whose replicas lag behind.
-        service.results.listeners().tell(&older);
+        service.results.listeners().notify(&older);
         service.publish("lobby", 3)
     });
     assert_eq!(

@@ -116,7 +116,7 @@ fn nanos(span: &Span) -> u64 {
 }
 
 fn attributes(attributes: &[KeyValue]) -> BTreeMap<&str, String> {
-    let told = attributes.iter().map(|attribute| {
+    let recorded = attributes.iter().map(|attribute| {
         let value = match attribute.value.as_ref().unwrap().value.as_ref().unwrap() {
             Value::StringValue(text) => text.clone(),
             Value::IntValue(number) => number.to_string(),
@@ -124,7 +124,7 @@ fn attributes(attributes: &[KeyValue]) -> BTreeMap<&str, String> {
         };
         (attribute.key.as_str(), value)
     });
-    told.collect()
+    recorded.collect()
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -143,7 +143,7 @@ async fn a_request_has_a_span_in_the_trace_of_its_caller() {
     assert_eq!(hexadecimal(&request.trace_id), TRACE);
     assert_eq!(hexadecimal(&request.parent_span_id), PARENT);
     assert_eq!(request.trace_state, "vendor=opaque");
-    let told = attributes(&request.attributes);
+    let recorded = attributes(&request.attributes);
     for (key, value) in [
         ("http.request.method", "POST"),
         ("http.route", "/detect"),
@@ -153,7 +153,7 @@ async fn a_request_has_a_span_in_the_trace_of_its_caller() {
         ("lookdown.model", "eager"),
         ("lookdown.request_id", answer.header("x-request-id")),
     ] {
-        assert_eq!(told[key], value, "{key}");
+        assert_eq!(recorded[key], value, "{key}");
     }
     let service = collector.service.lock().unwrap().clone();
     let service = attributes(&service);
@@ -180,13 +180,13 @@ async fn a_request_has_a_span_in_the_trace_of_its_caller() {
         ]
     );
     let report = answer.json();
-    let mut told = BTreeMap::<&str, u64>::new();
+    let mut recorded = BTreeMap::<&str, u64>::new();
     for stage in &stages {
         assert_eq!(stage.trace_id, request.trace_id);
         assert_eq!(stage.parent_span_id, request.span_id);
         assert!(stage.start_time_unix_nano >= request.start_time_unix_nano);
         assert!(stage.end_time_unix_nano <= request.end_time_unix_nano);
-        *told.entry(&stage.name).or_default() += nanos(stage);
+        *recorded.entry(&stage.name).or_default() += nanos(stage);
     }
     for stage in [
         "decode",
@@ -198,7 +198,7 @@ async fn a_request_has_a_span_in_the_trace_of_its_caller() {
     ] {
         let reported = report["timings_ms"][stage].as_f64().unwrap();
         #[expect(clippy::cast_precision_loss, reason = "far below 2^52 nanoseconds")]
-        let in_trace = told[stage] as f64 / 1e6;
+        let in_trace = recorded[stage] as f64 / 1e6;
         assert!(
             (in_trace - reported).abs() < 0.01,
             "{stage}: {in_trace} {reported}"

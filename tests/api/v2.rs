@@ -108,6 +108,6 @@ fn assert_refused(answer: &Answer, status: u16, kind: &str, part: &str) {
         format!("/problems/{kind}"),
         "{part}: {problem}"
     );
-    let told = problem["error"].as_str().unwrap();
-    assert!(told.contains(part), "{part}: {told}");
+    let reported = problem["error"].as_str().unwrap();
+    assert!(reported.contains(part), "{part}: {reported}");
 }

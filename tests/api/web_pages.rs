@@ -253,7 +253,10 @@ async fn allowed_pages_may_read_every_response_header() {
         "www-authenticate",
         "x-request-id",
     ] {
-        assert!(exposed.split(',').any(|told| told.trim() == name), "{name}");
+        assert!(
+            exposed.split(',').any(|header| header.trim() == name),
+            "{name}"
+        );
     }
 }
 

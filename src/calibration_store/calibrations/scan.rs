@@ -102,7 +102,7 @@ impl Calibrations {
             for ((id, named), content) in some.into_iter().zip(contents) {
                 let known = before.get(&id).map(Arc::as_ref);
                 let loaded = LoadedFile::new(&self.reader, &id, named, content, known);
-                self.tell(&loaded, known);
+                self.record_change(&loaded, known);
                 files.insert(id, Arc::new(loaded));
             }
             if silent == MAX_SILENT && !listed.is_empty() {
@@ -118,7 +118,7 @@ impl Calibrations {
     }
 
     /// Counts and logs what a file changes.
-    fn tell(&self, loaded: &LoadedFile, known: Option<&LoadedFile>) {
+    fn record_change(&self, loaded: &LoadedFile, known: Option<&LoadedFile>) {
         if !loaded.is_changed(known) {
             return;
         }

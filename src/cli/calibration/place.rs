@@ -22,7 +22,7 @@ use crate::cli::{async_runtime::of_this_thread, output::UNWRITABLE, server_flags
 const TIMEOUT: Duration = Duration::from_secs(10);
 /// Interval of the questions for tracks.
 const INTERVAL: Duration = Duration::from_millis(500);
-/// Interval of the lines that tell the progress.
+/// Interval of the lines that report the progress.
 const PROGRESS: Duration = Duration::from_secs(30);
 /// Largest answer that is read, bytes.
 const MAX_BYTES: usize = 16 << 20;
@@ -102,16 +102,16 @@ async fn follow(arguments: &Arguments) -> anyhow::Result<(Walks, Walks)> {
     let client = ServerClient::new(&arguments.server.entry().check()?)?;
     let (mut first, mut second) = (Walks::default(), Walks::default());
     let end = time::Instant::now() + Duration::from_secs(60 * arguments.minutes);
-    let mut told = time::Instant::now();
+    let mut last_reported = time::Instant::now();
     let mut ticks = time::interval(INTERVAL);
     ticks.set_missed_tick_behavior(time::MissedTickBehavior::Delay);
     while time::Instant::now() < end {
         ticks.tick().await;
         first.add(tracks(&client, &arguments.first).await?, &arguments.first)?;
         second.add(tracks(&client, &arguments.camera).await?, &arguments.camera)?;
-        if told.elapsed() >= PROGRESS {
-            told = time::Instant::now();
-            let left = end.saturating_duration_since(told).as_secs();
+        if last_reported.elapsed() >= PROGRESS {
+            last_reported = time::Instant::now();
+            let left = end.saturating_duration_since(last_reported).as_secs();
             let (one, other) = (first.0.len(), second.0.len());
             eprintln!("lookdown: {one} and {other} people followed, {left} s left");
         }

@@ -42,7 +42,7 @@ async fn listeners_receive_reports_of_their_camera_or_of_all() {
     let mut one = listeners.listen(&Client::Only, lobby()).unwrap();
     let mut all = listeners.listen(&Client::Only, Cameras::All).unwrap();
     for camera in ["hall", "lobby"] {
-        listeners.tell(&report_of(camera));
+        listeners.notify(&report_of(camera));
     }
     assert_eq!(one.next().await.unwrap().report.camera, "lobby");
     assert_eq!(all.next().await.unwrap().report.camera, "hall");
@@ -67,7 +67,7 @@ async fn slow_listener_gets_its_queue_and_nothing_more() {
     let listeners = room_for(2);
     let mut slow = listeners.listen(&Client::Only, lobby()).unwrap();
     for _ in 0..=QUEUE {
-        listeners.tell(&report_of("lobby"));
+        listeners.notify(&report_of("lobby"));
     }
     assert_eq!((dropped(&listeners), count(&listeners)), (1, 1));
     for _ in 0..QUEUE {

@@ -53,8 +53,8 @@ async fn a_frame_in_json_gives_the_result_of_detect() {
         assert!(close(&column("scores")[index], &person["score"]));
         assert_eq!(column("views")[index], person["views"]);
     }
-    let told: Value = serde_json::from_str(column("report")[0].as_str().unwrap()).unwrap();
-    assert_eq!(told["persons"], report["persons"]);
+    let reported: Value = serde_json::from_str(column("report")[0].as_str().unwrap()).unwrap();
+    assert_eq!(reported["persons"], report["persons"]);
     assert_eq!(answer.header("x-person-count"), persons.len().to_string());
     assert!(answer.header("server-timing").contains("inference;dur="));
     let latest = service.get("/results/lobby/latest").await.json();
@@ -98,8 +98,8 @@ async fn a_frame_after_json_gives_the_same_result_also_as_bytes() {
     head["outputs"] = json!([{ "name": "scores" }, { "name": "boxes", "parameters": binary }]);
     let some = send(&service, FRAMES, &head, &behind).await;
     let length: usize = some.header(HEAD_LENGTH).parse().unwrap();
-    let told: Value = serde_json::from_slice(&some.body[..length]).unwrap();
-    assert_eq!(told["outputs"].as_array().unwrap().len(), 2);
+    let reported: Value = serde_json::from_slice(&some.body[..length]).unwrap();
+    assert_eq!(reported["outputs"].as_array().unwrap().len(), 2);
     assert!(output(&some, "scores").0["data"].is_array());
     assert_eq!(floats(&output(&some, "boxes").1), boxes);
 }

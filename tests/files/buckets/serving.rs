@@ -90,8 +90,8 @@ fn the_last_calibrations_are_used_during_an_outage() {
     let service = Service::start(s3.address);
     let address = s3.address;
     drop(s3);
-    let told = "store_problem\":\"s3://cameras/ceiling cannot be reached: Connection refused";
-    let ready = service.wait_for("/readyz", |answer| answer.contains(told));
+    let expected = "store_problem\":\"s3://cameras/ceiling cannot be reached: Connection refused";
+    let ready = service.wait_for("/readyz", |answer| answer.contains(expected));
     assert!(ready.starts_with("HTTP/1.1 200"), "{ready}");
     assert!(
         service

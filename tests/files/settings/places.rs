@@ -156,8 +156,8 @@ fn credentials_in_a_collector_s_address_are_not_repeated() {
     assert!(message.contains("OTEL_EXPORTER_OTLP_HEADERS"), "{message}");
     assert!(!message.contains("hidden"), "{message}");
     let settings = from_environment(endpoint, "https://collector.example/otlp").unwrap();
-    let told = settings.traces.otlp_endpoint.unwrap();
-    assert_eq!(told.as_str(), "https://collector.example/otlp");
+    let collector = settings.traces.otlp_endpoint.unwrap();
+    assert_eq!(collector.as_str(), "https://collector.example/otlp");
     assert_eq!(defaults().traces.otlp_endpoint, None);
 }
 

@@ -397,12 +397,12 @@ fn an_inference_server_url_must_not_have_a_password() {
         "http://a/?b",
         "http://me:secret@host",
     ] {
-        let told = refusal(with_url(url));
+        let message = refusal(with_url(url));
         assert!(
-            told.contains("inference.url") && told.contains("http://"),
-            "{told}"
+            message.contains("inference.url") && message.contains("http://"),
+            "{message}"
         );
-        assert!(!told.contains("secret"), "{told}");
+        assert!(!message.contains("secret"), "{message}");
     }
     let with_token = |token: &str| {
         let rest = "backend = \"v2\"\nmodel = \"m\"\nurl = \"http://host:8000\"";
@@ -414,9 +414,9 @@ fn an_inference_server_url_must_not_have_a_password() {
     assert_eq!(remote.token, Some("s3cret.+/=".parse().unwrap()));
     assert!(!format!("{remote:?}").contains("s3cret"), "{remote:?}");
     let unused = from_environment("LOOKDOWN__INFERENCE__BEARER_TOKEN", "s3cret");
-    for told in [refusal(with_token("Bearer s3cret")), refusal(unused)] {
-        assert!(told.contains("inference.bearer_token"), "{told}");
-        assert!(!told.contains("s3cret"), "{told}");
+    for message in [refusal(with_token("Bearer s3cret")), refusal(unused)] {
+        assert!(message.contains("inference.bearer_token"), "{message}");
+        assert!(!message.contains("s3cret"), "{message}");
     }
     let nameless = refusal(from_environment("LOOKDOWN__INFERENCE__BACKEND", "v2"));
     assert!(

@@ -170,7 +170,7 @@ mod tests {
         timeline.leave(after(8));
         timeline.enter(Stage::Queue, after(10));
         let spans = timeline.clone().spans(after(14));
-        let told: Vec<_> = spans
+        let millis_of_spans: Vec<_> = spans
             .iter()
             .map(|span| {
                 let millis = [span.began, span.ended].map(|at| (at - start).as_millis());
@@ -178,7 +178,7 @@ mod tests {
             })
             .collect();
         assert_eq!(
-            told,
+            millis_of_spans,
             [("queue", [0, 5]), ("decode", [5, 7]), ("queue", [10, 14])]
         );
         timeline.leave(after(11));

@@ -56,7 +56,7 @@ impl<'a> Source<'a> {
 /// so that what is sampled lies close together. Of all rows of a patch it is found out first where
 /// they sample (`locate`; it is not asked where no pixel sees anything), so that the processor need
 /// not wait for one before it begins with the next. `sample` gets that and the row's index.
-/// `announce` is told of places that will soon be written: of each cache line one.
+/// `announce` gets places that will soon be written: one of each cache line.
 #[expect(
     clippy::inline_always,
     reason = "`locate` and `sample` become vector code only within a function that may use it"
