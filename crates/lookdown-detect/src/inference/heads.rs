@@ -140,12 +140,12 @@ impl Head {
             width: input.width,
             height: input.height,
         };
-        let mut finds = CandidateCollector::new(views, input, floor);
+        let mut collector = CandidateCollector::new(views, input, floor);
         outputs
             .iter()
             .try_for_each(TensorView::check_len)
-            .and_then(|()| self.decoder().decode(outputs, &batch, &mut finds))
-            .and_then(|()| finds.finish())
+            .and_then(|()| self.decoder().decode(outputs, &batch, &mut collector))
+            .and_then(|()| collector.finish())
             .map_err(InferenceError::Run)
     }
 }

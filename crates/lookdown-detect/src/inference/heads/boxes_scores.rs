@@ -67,13 +67,13 @@ impl Decoder for BoxesScoresHead {
         &self,
         outputs: &[TensorView<'_>],
         batch: &Batch,
-        finds: &mut CandidateCollector,
+        collector: &mut CandidateCollector,
     ) -> Result<(), String> {
         let [boxes, scores] = self.select(outputs, batch)?;
         for (view, (boxes, scores)) in boxes.views().zip(scores.views()).enumerate() {
             for (corners, &raw) in boxes.chunks_exact(4).zip(scores) {
-                let score = Activation::None.score(raw, finds.floor);
-                finds.offer(view, score, || four(corners));
+                let score = Activation::None.score(raw, collector.floor);
+                collector.offer(view, score, || four(corners));
             }
         }
         Ok(())

@@ -11,11 +11,11 @@ pub(super) trait Decoder {
     /// Checks that outputs of these shapes can be decoded. The error is a sentence.
     fn check(&self, outputs: &[OutputShape<'_>], batch: &Batch) -> Result<(), String>;
 
-    /// Checks the outputs, then passes every candidate to `finds`.
+    /// Checks the outputs, then passes every candidate to `collector`.
     fn decode(
         &self,
         outputs: &[TensorView<'_>],
         batch: &Batch,
-        finds: &mut CandidateCollector,
+        collector: &mut CandidateCollector,
     ) -> Result<(), String>;
 }

@@ -68,7 +68,7 @@ impl Decoder for DetrHead {
         &self,
         outputs: &[TensorView<'_>],
         batch: &Batch,
-        finds: &mut CandidateCollector,
+        collector: &mut CandidateCollector,
     ) -> Result<(), String> {
         let [boxes, scores] = self.select(outputs, batch)?;
         let person = usize::from(self.person_class);
@@ -78,8 +78,8 @@ impl Decoder for DetrHead {
                 .chunks_exact(4)
                 .zip(all_scores.chunks_exact(scores.shape[2]));
             for (sides, scores) in queries {
-                let score = self.score_activation.score(scores, person, finds.floor);
-                finds.offer(view, score, || {
+                let score = self.score_activation.score(scores, person, collector.floor);
+                collector.offer(view, score, || {
                     let [x, y, width, height] = four(sides);
                     let center = [x * view_width, y * view_height];
                     corners_around(center, [width * view_width, height * view_height])

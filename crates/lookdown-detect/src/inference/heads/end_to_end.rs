@@ -97,11 +97,11 @@ impl EndToEndHead {
         indices: &Indices,
         view: usize,
         batch: &Batch,
-        finds: &mut CandidateCollector,
+        collector: &mut CandidateCollector,
     ) {
         let class = row[indices.class];
         if !class.is_finite() {
-            return finds.count_non_finite();
+            return collector.count_non_finite();
         }
         if (class - f32::from(self.person_class)).abs() >= 0.5 {
             return;
@@ -110,8 +110,8 @@ impl EndToEndHead {
             EndToEndUnit::Pixels => [1.0; 2],
             EndToEndUnit::Share => [batch.width, batch.height].map(f64::from),
         };
-        let score = Activation::None.score(row[indices.score], finds.floor);
-        finds.offer(view, score, || {
+        let score = Activation::None.score(row[indices.score], collector.floor);
+        collector.offer(view, score, || {
             let [x_min, y_min, x_max, y_max] = indices.sides.map(|index| f64::from(row[index]));
             [x_min * width, y_min * height, x_max * width, y_max * height]
         });
@@ -139,23 +139,23 @@ impl Decoder for EndToEndHead {
         &self,
         outputs: &[TensorView<'_>],
         batch: &Batch,
-        finds: &mut CandidateCollector,
+        collector: &mut CandidateCollector,
     ) -> Result<(), String> {
         let (rows, indices) = self.select(outputs, batch)?;
         let columns = rows.shape[rows.shape.len() - 1];
         let Some(index) = indices.view else {
             for (view, values) in rows.views().enumerate() {
                 for row in values.chunks_exact(columns) {
-                    self.offer(row, &indices, view, batch, finds);
+                    self.offer(row, &indices, view, batch, collector);
                 }
             }
             return Ok(());
         };
         for row in rows.values.chunks_exact(columns) {
             if !row[index].is_finite() {
-                finds.count_non_finite();
+                collector.count_non_finite();
             } else if let Some(view) = view_number(row[index], batch.views.unwrap_or(0)) {
-                self.offer(row, &indices, view, batch, finds);
+                self.offer(row, &indices, view, batch, collector);
             }
         }
         Ok(())

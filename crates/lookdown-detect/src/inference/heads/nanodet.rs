@@ -126,7 +126,7 @@ impl Decoder for NanodetHead {
         &self,
         outputs: &[TensorView<'_>],
         batch: &Batch,
-        finds: &mut CandidateCollector,
+        collector: &mut CandidateCollector,
     ) -> Result<(), String> {
         let candidates = self.select(outputs, batch)?;
         let columns = candidates.shape[2];
@@ -135,8 +135,8 @@ impl Decoder for NanodetHead {
         for (view, values) in candidates.views().enumerate() {
             let rows = values.chunks_exact(columns);
             for (values, (grid, cell)) in rows.zip(pyramid(&self.strides, batch)) {
-                let score = self.score_activation.score(values[person], finds.floor);
-                finds.offer(view, score, || self.corners(&values[classes..], grid, cell));
+                let score = self.score_activation.score(values[person], collector.floor);
+                collector.offer(view, score, || self.corners(&values[classes..], grid, cell));
             }
         }
         Ok(())

@@ -62,13 +62,13 @@ impl Decoder for YoloV2Head {
         &self,
         outputs: &[TensorView<'_>],
         batch: &Batch,
-        finds: &mut CandidateCollector,
+        collector: &mut CandidateCollector,
     ) -> Result<(), String> {
         let map = self.select(outputs, batch)?;
         let grid = Grid::of_map(map, batch);
         let channels = map.shape[1] / self.anchors.len();
         let person = usize::from(self.person_class);
-        let floor = finds.floor;
+        let floor = collector.floor;
         let mut logits = Vec::new();
         for (view, values) in map.views().enumerate() {
             let per_anchor = values.chunks_exact(channels * grid.len());
@@ -81,7 +81,7 @@ impl Decoder for YoloV2Head {
                         logits.extend(classes.iter().map(|plane| plane[index]));
                         floor.softmax(&logits, person)
                     });
-                    finds.offer(view, score, || {
+                    collector.offer(view, score, || {
                         let [t_x, t_y, t_w, t_h] =
                             [0, 1, 2, 3].map(|plane| f64::from(location[plane][index]));
                         let center = grid.pixels([sigmoid(t_x) + column, sigmoid(t_y) + row]);

@@ -83,7 +83,7 @@ impl Decoder for YoloV8Head {
         &self,
         outputs: &[TensorView<'_>],
         batch: &Batch,
-        finds: &mut CandidateCollector,
+        collector: &mut CandidateCollector,
     ) -> Result<(), String> {
         let candidates = self.select(outputs, batch)?;
         let (cells, per_channel, per_cell) = match self.layout {
@@ -94,8 +94,8 @@ impl Decoder for YoloV8Head {
         for (view, values) in candidates.views().enumerate() {
             for cell in 0..cells {
                 let value = |channel: usize| values[channel * per_channel + cell * per_cell];
-                let score = self.score_activation.score(value(person), finds.floor);
-                finds.offer(view, score, || {
+                let score = self.score_activation.score(value(person), collector.floor);
+                collector.offer(view, score, || {
                     let [x, y, width, height] = [0, 1, 2, 3].map(|side| f64::from(value(side)));
                     corners_around([x, y], [width, height])
                 });

@@ -78,11 +78,11 @@ impl Decoder for YoloxHead {
         &self,
         outputs: &[TensorView<'_>],
         batch: &Batch,
-        finds: &mut CandidateCollector,
+        collector: &mut CandidateCollector,
     ) -> Result<(), String> {
         let candidates = self.select(outputs, batch)?;
         let person = 5 + usize::from(self.person_class);
-        let floor = finds.floor;
+        let floor = collector.floor;
         for (view, values) in candidates.views().enumerate() {
             let rows = values.chunks_exact(candidates.shape[2]);
             for (values, (grid, cell)) in rows.zip(pyramid(&self.strides, batch)) {
@@ -90,7 +90,7 @@ impl Decoder for YoloxHead {
                     .score_activation
                     .score(values[4], floor)
                     .times(floor, || self.score_activation.score(values[person], floor));
-                finds.offer(view, score, || self.corners(values, grid, cell));
+                collector.offer(view, score, || self.corners(values, grid, cell));
             }
         }
         Ok(())
