@@ -26,8 +26,8 @@ use crate::Shutdown;
 /// The connection passes heads of up to this multiple of the limit to the service, which refuses
 /// them with a description.
 const HEAD_LIMIT_FACTOR: usize = 2;
-/// Longest wait, 500 milliseconds, for the first request on a connection that was accepted just before
-/// draining.
+/// Longest wait, 500 milliseconds, for the first request on a connection that was accepted just
+/// before draining.
 const FIRST_REQUEST_DRAIN_TIMEOUT: Duration = Duration::from_millis(500);
 /// Longest time, 1 second, for which input is discarded after a request that could not be parsed.
 const DISCARD_TIMEOUT: Duration = Duration::from_secs(1);
