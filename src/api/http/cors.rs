@@ -47,7 +47,13 @@ pub(in crate::api) fn layer(
     let all = |common: &[HeaderName], others: &[HeaderName]| [common, others].concat();
     let layer = CorsLayer::new()
         .allow_origin(origins)
-        .allow_methods([Method::GET, Method::POST, Method::PUT, Method::DELETE])
+        .allow_methods([
+            Method::GET,
+            Method::POST,
+            Method::PUT,
+            Method::PATCH,
+            Method::DELETE,
+        ])
         .allow_headers(all(&common_sent, sent))
         .expose_headers(all(&common_read, read));
     Some(layer)
