@@ -208,19 +208,11 @@ impl Detector for OnnxDetector {
             options,
         } = self;
         let input = &description.input;
-        let mut found = HeadOutput::default();
-        for piece in staging.pieces(batch, input) {
-            let staged = staging.stage(piece, input);
-            let head = &description.manifest.output;
-            let output = run(session, head, &staged, input, options)?;
-            found.non_finite += output.non_finite;
-            let views = piece.len() / input.view_len();
-            found
-                .per_view
-                .extend(output.per_view.into_iter().take(views));
-        }
-        found.keep_best(options.candidates.max_detections_per_view);
-        Ok(found)
+        let head = &description.manifest.output;
+        let max_per_view = options.candidates.max_detections_per_view;
+        staging.run_pieces(batch, input, max_per_view, |staged| {
+            run(session, head, staged, input, options)
+        })
     }
 }
 

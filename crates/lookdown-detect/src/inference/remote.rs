@@ -94,18 +94,9 @@ impl Detector for RemoteDetector {
             options,
         } = self;
         let input = &understood.input;
-        let mut found = HeadOutput::default();
-        for piece in staging.pieces(batch, input) {
-            let staged = staging.stage(piece, input);
-            let views = piece.len() / input.view_len();
-            let output = run(server, understood, &staged, options.score_floor)?;
-            found.non_finite += output.non_finite;
-            found
-                .per_view
-                .extend(output.per_view.into_iter().take(views));
-        }
-        found.keep_best(options.max_detections_per_view);
-        Ok(found)
+        staging.run_pieces(batch, input, options.max_detections_per_view, |staged| {
+            run(server, understood, staged, options.score_floor)
+        })
     }
 }
 

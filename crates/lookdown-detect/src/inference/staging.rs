@@ -2,7 +2,7 @@
 
 use std::num::NonZeroUsize;
 
-use super::{Layout, signature::Signature};
+use super::{HeadOutput, InferenceError, Layout, signature::Signature};
 use crate::imaging::{NetworkInput, ViewBatch};
 
 /// Converts batches to inputs.
@@ -33,7 +33,7 @@ impl Staging {
     }
 
     /// The batch's values in pieces of one run each.
-    pub(super) fn pieces<'b>(
+    fn pieces<'b>(
         &self,
         batch: &'b ViewBatch,
         input: &NetworkInput,
@@ -42,8 +42,30 @@ impl Staging {
         batch.values().chunks(views.max(1) * input.view_len())
     }
 
+    /// Runs a network on all views of a batch, piece by piece, and collects what it finds in each view:
+    /// at most `max_per_view` candidates, best first.
+    pub(super) fn run_pieces(
+        &mut self,
+        batch: &ViewBatch,
+        input: &NetworkInput,
+        max_per_view: usize,
+        mut run: impl FnMut(&Staged<'_>) -> Result<HeadOutput, InferenceError>,
+    ) -> Result<HeadOutput, InferenceError> {
+        let mut found = HeadOutput::default();
+        for piece in self.pieces(batch, input) {
+            let output = run(&self.stage(piece, input))?;
+            let views = piece.len() / input.view_len();
+            found.non_finite += output.non_finite;
+            found
+                .per_view
+                .extend(output.per_view.into_iter().take(views));
+        }
+        found.keep_best(max_per_view);
+        Ok(found)
+    }
+
     /// Converts a piece to an input. Missing views of a fixed number are filled with black ones.
-    pub(super) fn stage<'a>(&'a mut self, piece: &'a [f32], input: &NetworkInput) -> Staged<'a> {
+    fn stage<'a>(&'a mut self, piece: &'a [f32], input: &NetworkInput) -> Staged<'a> {
         let given = piece.len() / input.view_len();
         let views = self.views_per_run.map_or(given, NonZeroUsize::get);
         let (width, height) = (input.width as usize, input.height as usize);
