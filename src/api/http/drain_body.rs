@@ -12,7 +12,7 @@ use axum::{
     body::{Body, HttpBody},
     extract::{Request, State},
     http::{
-        HeaderValue, StatusCode, Version,
+        HeaderValue, StatusCode,
         header::{CONNECTION, EXPECT},
     },
     middleware::Next,
@@ -51,8 +51,7 @@ pub(in crate::api) async fn discard(
         Ok(context) => context.deadline,
         Err(problem) => return problem.into_response(),
     };
-    if body.is_end_stream() || parts.version >= Version::HTTP_2 {
-        // An HTTP/2 client receives the response while it sends.
+    if body.is_end_stream() {
         return next.run(Request::from_parts(parts, body)).await;
     }
     // A client with `Expect: 100-continue` sends nothing until the server starts to read.
