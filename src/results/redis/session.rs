@@ -2,7 +2,7 @@
 
 use std::{sync::Arc, time::Duration};
 
-use lookdown_common::{Backoff, text::one_line};
+use lookdown_common::{Backoff, LogOnce, text::one_line};
 use redis::{RedisResult, aio::MultiplexedConnection};
 use tokio::time::{Instant, sleep};
 
@@ -29,7 +29,7 @@ pub(super) async fn keep(shared: Arc<Shared>) {
     let address = &shared.options.address;
     let mut backoff = Backoff::new(FIRST_PAUSE, LONGEST_PAUSE);
     let mut positions = Positions::new();
-    let mut loss_was_logged = false;
+    let mut losses = LogOnce::default();
     for number in 1.. {
         let problem = match open(&shared).await {
             Err(error) => {
@@ -43,9 +43,8 @@ pub(super) async fn keep(shared: Arc<Shared>) {
                     positions.entry(cameras).or_insert(session.newest);
                 }
                 shared.link.is_up(session.commands, number);
-                if loss_was_logged {
+                if losses.clear() {
                     tracing::info!("Redis at {address} answers again: reports are stored there");
-                    loss_was_logged = false;
                 } else {
                     tracing::info!("reports are stored in Redis at {address}");
                 }
@@ -61,12 +60,12 @@ pub(super) async fn keep(shared: Arc<Shared>) {
                 problem
             }
         };
-        if !loss_was_logged {
+        // Whatever its reasons, a loss is logged once.
+        if losses.should_log("lost") {
             tracing::warn!(
                 "Redis at {address} does not answer ({problem}): detection continues, reports \
                  wait for it, and results cannot be read; trying again until it does"
             );
-            loss_was_logged = true;
         }
         sleep(backoff.next_pause()).await;
     }
