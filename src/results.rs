@@ -20,5 +20,5 @@ pub use memory::MemoryResults;
 pub use redis::{RedisAddress, RedisAddressError, RedisOptions, RedisResults};
 pub use report::{NewReport, ReportId, StoredReport};
 pub use store::{ResultLimits, ResultStore, ResultUse, StoreHealth};
-pub use stored_image::{ImagesOf, NewImage, StoredImage};
+pub use stored_image::{ImagesOf, StoredImage};
 pub use unreachable::Unreachable;

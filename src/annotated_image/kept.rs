@@ -57,7 +57,8 @@ pub enum StoredFrameError {
 
 impl StoredFrame {
     /// Keeps a frame, with its persons concealed if `concealment` is given: its original JPEG, if
-    /// that is small enough and nothing is masked or concealed, else a new one. A new one takes tens of milliseconds for a large frame: keep it off the async runtime.
+    /// that is small enough and nothing is masked or concealed, else a new one. A new one takes tens
+    /// of milliseconds for a large frame: keep it off the async runtime.
     ///
     /// # Errors
     /// [`StoredFrameError`] for a frame that cannot be kept.
@@ -88,9 +89,14 @@ impl StoredFrame {
         Ok(Self { jpeg, sketch })
     }
 
+    /// Returns the memory that it takes, bytes.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        self.jpeg.len() + self.sketch.len()
+    }
+
     /// Returns the frame as JPEG with the drawings that the options select. Takes as long as
     /// keeping it, and stops when `is_cancelled` returns true.
-    ///
     ///
     /// # Errors
     /// [`StoredFrameError`] for data that [`StoredFrame::of`] has not made.

@@ -11,7 +11,7 @@ use tokio::{
 };
 
 use crate::{
-    annotated_image::{AnnotationOptions, Layer, StoredFrame},
+    annotated_image::{AnnotationOptions, Layer},
     results::{ImagesOf, ReportId, ResultStore, StoredImage},
 };
 
@@ -74,15 +74,11 @@ impl Images {
 
 /// Returns the image that is published, if it is small enough.
 fn image(stored: &StoredImage) -> Option<Bytes> {
-    let frame = StoredFrame {
-        jpeg: stored.image.frame.clone(),
-        sketch: stored.image.sketch.clone(),
-    };
     let options = AnnotationOptions {
         layers: vec![Layer::Oriented, Layer::Scores],
         width: WIDTH,
         quality: JPEG_QUALITY,
     };
-    let jpeg = frame.annotated(&options, &|| false).ok()?;
+    let jpeg = stored.frame.annotated(&options, &|| false).ok()?;
     (jpeg.len() <= MAX_BYTES).then(|| jpeg.into())
 }

@@ -12,10 +12,10 @@ use parking_lot::{Mutex, MutexGuard};
 
 use self::kept::BoundedReports;
 use super::{
-    Cameras, FollowedNumber, ListenError, Listeners, Listening, NewImage, NewReport, ReportId,
-    ResultLimits, ResultStore, ResultUse, StoreHealth, StoredImage, StoredReport, Unreachable,
+    Cameras, FollowedNumber, ListenError, Listeners, Listening, NewReport, ReportId, ResultLimits,
+    ResultStore, ResultUse, StoreHealth, StoredImage, StoredReport, Unreachable,
 };
-use crate::metrics::Metrics;
+use crate::{annotated_image::StoredFrame, metrics::Metrics};
 
 /// Keeps reports in memory, within limits. They are lost when the process ends.
 #[derive(Debug)]
@@ -41,7 +41,7 @@ impl MemoryResults {
     }
 
     /// Keeps a report, possibly with its image, and publishes it to the listeners.
-    pub fn store(&self, report: NewReport, image: Option<NewImage>) -> Arc<StoredReport> {
+    pub fn store(&self, report: NewReport, image: Option<StoredFrame>) -> Arc<StoredReport> {
         // Published while the lock is held: listeners rely on the order.
         let mut kept = self.kept();
         let before = kept.removed_cameras();
@@ -75,7 +75,7 @@ impl MemoryResults {
 
 #[async_trait]
 impl ResultStore for MemoryResults {
-    fn publish(&self, report: NewReport, image: Option<NewImage>) {
+    fn publish(&self, report: NewReport, image: Option<StoredFrame>) {
         self.store(report, image);
     }
 

@@ -44,10 +44,13 @@ use self::{
     shared::Shared,
 };
 use super::{
-    Cameras, FollowedNumber, ListenError, Listeners, Listening, NewImage, NewReport, ReportId,
-    ResultLimits, ResultStore, ResultUse, StoreHealth, StoredImage, StoredReport, Unreachable,
+    Cameras, FollowedNumber, ListenError, Listeners, Listening, NewReport, ReportId, ResultLimits,
+    ResultStore, ResultUse, StoreHealth, StoredImage, StoredReport, Unreachable,
 };
-use crate::{metrics::Metrics, tls::TlsError};
+use crate::{
+    annotated_image::StoredFrame,
+    {metrics::Metrics, tls::TlsError},
+};
 
 /// Longest time that the shutdown waits for reports that Redis has not stored yet.
 const LAST_WAIT: Duration = Duration::from_secs(2);
@@ -119,7 +122,7 @@ fn max_reply_bytes(limits: &ResultLimits) -> u64 {
 
 #[async_trait]
 impl ResultStore for RedisResults {
-    fn publish(&self, report: NewReport, image: Option<NewImage>) {
+    fn publish(&self, report: NewReport, image: Option<StoredFrame>) {
         self.shared.outbox.push(report, image);
     }
 

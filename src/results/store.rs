@@ -6,9 +6,10 @@ use async_trait::async_trait;
 use lookdown_detect::fairness::Client;
 
 use super::{
-    Cameras, FollowedNumber, ListenError, Listeners, Listening, NewImage, NewReport, ReportId,
-    StoredImage, StoredReport, Unreachable,
+    Cameras, FollowedNumber, ListenError, Listeners, Listening, NewReport, ReportId, StoredImage,
+    StoredReport, Unreachable,
 };
+use crate::annotated_image::StoredFrame;
 
 /// A result store. Its return values are shared, not copied.
 #[async_trait]
@@ -16,7 +17,7 @@ pub trait ResultStore: Send + Sync {
     /// Stores a report under the next ID and publishes it to the listeners, in the order of the
     /// IDs. The caller does not wait: a remote store has the report a little later. The image
     /// replaces the camera's previous one. A report without an image removes that.
-    fn publish(&self, report: NewReport, image: Option<NewImage>);
+    fn publish(&self, report: NewReport, image: Option<StoredFrame>);
 
     /// The latest report of a camera, if it has one.
     ///

@@ -2,34 +2,16 @@
 
 use std::collections::BTreeSet;
 
-use bytes::Bytes;
-
 use super::ReportId;
-
-/// An image to be kept.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct NewImage {
-    /// The frame of a report.
-    pub frame: Bytes,
-    /// The drawings that can be added to the frame.
-    pub sketch: Bytes,
-}
-
-impl NewImage {
-    /// The memory that it takes, bytes.
-    #[must_use]
-    pub fn bytes(&self) -> usize {
-        self.frame.len() + self.sketch.len()
-    }
-}
+use crate::annotated_image::StoredFrame;
 
 /// A kept image: that of its camera's latest report.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StoredImage {
     /// The ID of its report.
     pub id: ReportId,
-    /// The image.
-    pub image: NewImage,
+    /// The frame of its report.
+    pub frame: StoredFrame,
 }
 
 /// The cameras whose images are kept.

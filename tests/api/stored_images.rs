@@ -3,7 +3,10 @@
 use std::collections::BTreeSet;
 
 use bytes::Bytes;
-use lookdown::results::{ImagesOf, NewImage, NewReport, ResultStore};
+use lookdown::{
+    annotated_image::StoredFrame,
+    results::{ImagesOf, NewReport, ResultStore},
+};
 use lookdown_detect::imaging::{
     Frame,
     annotate::{Concealment, encode_jpeg},
@@ -178,7 +181,7 @@ async fn a_jpeg_is_stored_unchanged_unless_it_is_masked() {
     let kept = async || {
         service.post_raw(query, sent.clone()).await;
         let kept = service.results.image("hall").await.unwrap().unwrap();
-        kept.image.frame.to_vec()
+        kept.frame.jpeg.to_vec()
     };
     assert_eq!(kept().await, sent);
     let mut lobby = service.get("/calibrations/lobby").await.json();
@@ -197,9 +200,9 @@ async fn stored_data_that_is_no_image_is_refused_with_404() {
     service.detect_in("hall").await;
     let good = service.results.image("hall").await.unwrap().unwrap();
     let garbage = Bytes::from_static(b"no\nimage");
-    for (frame, sketch) in [
-        (garbage.clone(), good.image.sketch.clone()),
-        (good.image.frame.clone(), garbage.clone()),
+    for (jpeg, sketch) in [
+        (garbage.clone(), good.frame.sketch.clone()),
+        (good.frame.jpeg.clone(), garbage.clone()),
     ] {
         let report = NewReport {
             camera: "hall".to_owned(),
@@ -207,7 +210,7 @@ async fn stored_data_that_is_no_image_is_refused_with_404() {
             persons: 0,
             json: Bytes::from_static(b"{}"),
         };
-        let image = NewImage { frame, sketch };
+        let image = StoredFrame { jpeg, sketch };
         service.results.publish(report, Some(image));
         let answer = service.get(PATH).await;
         assert_eq!(answer.status, 404, "{}", answer.text());
@@ -239,7 +242,7 @@ async fn persons_are_concealed_in_stored_images_on_request() {
     });
     service.detect_in("hall").await;
     let stored = service.results.image("hall").await.unwrap().unwrap();
-    let frame = decode(&stored.image.frame, &DecodeLimits::default());
+    let frame = decode(&stored.frame.jpeg, &DecodeLimits::default());
     assert!(!is_plain(&frame.unwrap().frame));
     let shown = service.get(&format!("{PATH}?draw=none")).await;
     assert!(!is_plain(&image_of(&shown)));

@@ -21,7 +21,7 @@ use crate::{
         http::{context::RequestContext, problem::Problem},
     },
     metrics::Metrics,
-    results::{NewImage, NewReport},
+    results::NewReport,
     telemetry::RequestTrace,
 };
 
@@ -52,7 +52,7 @@ struct Written<T> {
 /// The results of the work on a worker thread.
 struct Finished<T> {
     report: DetectionReport,
-    image: Option<NewImage>,
+    image: Option<StoredFrame>,
     written: Result<Written<T>, Problem>,
 }
 
@@ -138,12 +138,9 @@ fn written<T>(
 }
 
 /// Returns the image to store with the report. A failure here does not fail the request.
-fn new_image(detected: &DetectedFrame, concealment: Option<Concealment>) -> Option<NewImage> {
+fn new_image(detected: &DetectedFrame, concealment: Option<Concealment>) -> Option<StoredFrame> {
     match StoredFrame::of(detected, concealment) {
-        Ok(kept) => Some(NewImage {
-            frame: kept.jpeg,
-            sketch: kept.sketch,
-        }),
+        Ok(frame) => Some(frame),
         Err(error) => {
             tracing::warn!("the image of this frame is not stored: {error}");
             None

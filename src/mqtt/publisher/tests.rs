@@ -6,7 +6,10 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio_util::codec::Framed;
 
 use super::*;
-use crate::results::{ImagesOf, MemoryResults, NewImage, NewReport, ResultLimits};
+use crate::{
+    annotated_image::StoredFrame,
+    results::{ImagesOf, MemoryResults, NewReport, ResultLimits},
+};
 
 type Client = Framed<TcpStream, Codec>;
 
@@ -183,8 +186,8 @@ async fn each_new_image_is_published_and_not_retained() {
     let (mut client, _) = accept(&setup.listener).await;
     welcome(&mut client).await;
     let sketch = r#"{"frame_width":1680,"marks":[],"views":[],"zones":[],"timestamp":""}"#;
-    let image = NewImage {
-        frame: Bytes::from_static(include_bytes!("../../../samples/office.jpg")),
+    let image = StoredFrame {
+        jpeg: Bytes::from_static(include_bytes!("../../../samples/office.jpg")),
         sketch: Bytes::from_static(sketch.as_bytes()),
     };
     setup.results.publish(report(1), Some(image.clone()));

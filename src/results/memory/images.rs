@@ -2,7 +2,10 @@
 
 use std::{collections::HashMap, num::NonZeroUsize, sync::Arc};
 
-use crate::results::{NewImage, ReportId, StoredImage};
+use crate::{
+    annotated_image::StoredFrame,
+    results::{ReportId, StoredImage},
+};
 
 /// The images, at most `most`: the camera that was silent for longest is evicted first.
 #[derive(Debug)]
@@ -21,11 +24,11 @@ impl Images {
 
     /// Replaces the camera's image by that of the report with this ID, or removes it if that report
     /// has none.
-    pub(super) fn replace(&mut self, camera: &str, id: ReportId, image: Option<NewImage>) {
-        let Some(image) = image else {
+    pub(super) fn replace(&mut self, camera: &str, id: ReportId, frame: Option<StoredFrame>) {
+        let Some(frame) = frame else {
             return self.forget(camera);
         };
-        let stored = Arc::new(StoredImage { id, image });
+        let stored = Arc::new(StoredImage { id, frame });
         self.of_cameras.insert(camera.to_owned(), stored);
         while self.of_cameras.len() > self.most.get() {
             let oldest = self.of_cameras.iter().min_by_key(|(_, stored)| stored.id);

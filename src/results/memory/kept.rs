@@ -9,8 +9,9 @@ use std::{
 use jiff::{SignedDuration, Timestamp};
 
 use super::images::Images;
-use crate::results::{
-    Cameras, NewImage, NewReport, ReportId, ResultLimits, ResultUse, StoredImage, StoredReport,
+use crate::{
+    annotated_image::StoredFrame,
+    results::{Cameras, NewReport, ReportId, ResultLimits, ResultUse, StoredImage, StoredReport},
 };
 
 /// Reports within the limits. Every report is in `cameras`, and in exactly one of `latest` and
@@ -49,7 +50,7 @@ impl BoundedReports {
     pub(super) fn add(
         &mut self,
         report: NewReport,
-        image: Option<NewImage>,
+        image: Option<StoredFrame>,
         now: Timestamp,
     ) -> Arc<StoredReport> {
         let id = ReportId::next(self.newest, now);

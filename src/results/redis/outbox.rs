@@ -6,10 +6,7 @@ use std::collections::VecDeque;
 use parking_lot::{Mutex, MutexGuard};
 use tokio::sync::Notify;
 
-use crate::{
-    metrics::IntCounter,
-    results::{NewImage, NewReport},
-};
+use crate::{annotated_image::StoredFrame, metrics::IntCounter, results::NewReport};
 
 /// Most reports that wait: minutes of a few cameras.
 const MOST_REPORTS: usize = 1000;
@@ -19,7 +16,7 @@ const MOST_BYTES: usize = 32 << 20;
 #[derive(Debug)]
 pub(super) struct PendingReport {
     pub(super) report: NewReport,
-    pub(super) image: Option<NewImage>,
+    pub(super) image: Option<StoredFrame>,
 }
 
 /// The queue, oldest first.
@@ -50,7 +47,7 @@ impl Outbox {
     }
 
     /// Appends a report. Never waits.
-    pub(super) fn push(&self, report: NewReport, image: Option<NewImage>) {
+    pub(super) fn push(&self, report: NewReport, image: Option<StoredFrame>) {
         let pending = PendingReport { report, image };
         let mut waiting = self.waiting();
         waiting.drop_image_of(&pending.report.camera);
@@ -122,7 +119,7 @@ impl Outbox {
 
 impl PendingReport {
     fn bytes(&self) -> usize {
-        self.report.bytes() + self.image.as_ref().map_or(0, NewImage::bytes)
+        self.report.bytes() + self.image.as_ref().map_or(0, StoredFrame::bytes)
     }
 }
 
@@ -209,8 +206,8 @@ mod tests {
     #[tokio::test]
     async fn only_the_latest_image_of_a_camera_waits() {
         let outbox = outbox();
-        let image = |length| NewImage {
-            frame: Bytes::from(vec![0; length]),
+        let image = |length| StoredFrame {
+            jpeg: Bytes::from(vec![0; length]),
             sketch: Bytes::new(),
         };
         for number in 1..=9 {

@@ -14,9 +14,12 @@ use redis::{
 };
 
 use super::{keys::Keys, message::is_one_line};
-use crate::results::{
-    Cameras, FOLLOWED_FOR, FollowedNumber, NewImage, NewReport, ReportId, ResultUse, StoredImage,
-    StoredReport,
+use crate::{
+    annotated_image::StoredFrame,
+    results::{
+        Cameras, FOLLOWED_FOR, FollowedNumber, NewReport, ReportId, ResultUse, StoredImage,
+        StoredReport,
+    },
 };
 
 /// The script that deletes a camera.
@@ -163,8 +166,8 @@ impl Reader<'_> {
         let stored = || {
             Some(Arc::new(StoredImage {
                 id: id?.parse().ok()?,
-                image: NewImage {
-                    frame: frame?.into(),
+                frame: StoredFrame {
+                    jpeg: frame?.into(),
                     sketch: sketch?.into(),
                 },
             }))

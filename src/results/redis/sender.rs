@@ -84,7 +84,7 @@ impl Sender<'_> {
         call.arg(report.received_at.to_string());
         call.arg(report.persons).arg(&report.json[..]);
         // An empty image means that there is none.
-        let parts = image.as_ref().map(|it| [&it.frame[..], &it.sketch[..]]);
+        let parts = image.as_ref().map(|it| [&it.jpeg[..], &it.sketch[..]]);
         let [frame, sketch] = parts.unwrap_or_default();
         call.arg(frame).arg(sketch);
         call.arg(report.bytes());

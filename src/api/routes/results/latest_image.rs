@@ -13,7 +13,7 @@ use lookdown_common::text::{Quoted, one_line};
 
 use super::{address::CameraAddress, unknown};
 use crate::{
-    annotated_image::{AnnotationOptions, StoredFrame, StoredFrameError},
+    annotated_image::{AnnotationOptions, StoredFrameError},
     api::{
         ApiState,
         http::{
@@ -74,12 +74,8 @@ pub(in crate::api) async fn get_latest_image(
     let kept = state.results.image(&camera).await?;
     let kept = kept.ok_or_else(|| none_kept(&camera))?;
     let id = kept.id.to_string();
-    let frame = StoredFrame {
-        jpeg: kept.image.frame.clone(),
-        sketch: kept.image.sketch.clone(),
-    };
     let drawing = state.workers.run(caller.ticket(), move |withdrawn| {
-        frame.annotated(&options, &|| withdrawn.is_cancelled())
+        kept.frame.annotated(&options, &|| withdrawn.is_cancelled())
     });
     let drawn = deadline
         .wait("the image was not drawn", "send fewer requests", drawing)

@@ -5,6 +5,7 @@ use bytes::Bytes;
 use proptest::prelude::*;
 
 use super::*;
+use crate::annotated_image::StoredFrame;
 
 const ROOMY: [usize; 4] = [1000, 1000, 1000, 1 << 20];
 
@@ -28,8 +29,8 @@ fn add_with_image(kept: &mut BoundedReports, camera: &str) -> ReportId {
         persons: 0,
         json: Bytes::new(),
     };
-    let image = NewImage {
-        frame: Bytes::from_static(b"frame"),
+    let image = StoredFrame {
+        jpeg: Bytes::from_static(b"frame"),
         sketch: Bytes::from_static(b"sketch"),
     };
     kept.add(report, Some(image), Timestamp::UNIX_EPOCH).id
