@@ -33,7 +33,8 @@ settings! {
         device: Device = Device::Cpu => device();
         /// The precision of the default models on the CPU. `auto`: 8-bit integers for upright
         /// crops and all profiles, for `balanced` and `quality` only if the CPU has instructions
-        /// for them (VNNI, or `dotprod` on arm64). `int8`: for all on any CPU. A GPU uses `fp32`.
+        /// for them (VNNI, or `dotprod` on arm64). `int8`: for all on any CPU. Other devices use
+        /// `fp32`.
         precision: PrecisionChoice = PrecisionChoice::Auto => choice(&[
             ("auto", PrecisionChoice::Auto),
             ("int8", PrecisionChoice::Int8),

@@ -26,14 +26,14 @@ settings! {
     #[derive(Debug, Clone)]
     pub(super) struct ThreadKeys in "inference" {
         /// The sessions of each model, which run side by side. 0: on a CPU one for each core that
-        /// the machine or the container's CPU limit gives, on a GPU or another server two.
+        /// the machine or the container's CPU limit gives, on another device or server two.
         sessions: Option<NonZeroUsize> = None => count();
         /// The threads of each session. 0: one; where `inference.sessions` is set, their share of
         /// the cores.
         threads: Option<NonZeroUsize> = None => count();
         /// The most views in one run of the network, of one or several frames. 0: one on a CPU,
-        /// where more is not faster, eight on a GPU or another server. On a GPU every run has as
-        /// many: black views take the place of missing ones.
+        /// where more is not faster, eight on another device or server. On another device every
+        /// run has as many: black views take the place of missing ones.
         max_batch_views: Option<NonZeroUsize> = None => count();
     }
 }
