@@ -1,5 +1,6 @@
 //! The composition root: settings → engine → workers → service.
 
+mod api_options;
 mod check;
 mod models;
 mod pollers;
@@ -22,7 +23,7 @@ use lookdown_common::{InProcess, ServerClient, ServerOptions};
 
 use crate::{
     access::AccessKeys,
-    api::{self, Access, ApiOptions, ApiState, Companions, Readiness, RequestRate},
+    api::{self, Access, ApiState, Companions, Readiness},
     calibration_store::{BucketStore, CalibrationStore, Calibrations, FolderStore},
     cameras::Cameras,
     metrics::Metrics,
@@ -40,6 +41,8 @@ pub use reload::Reloader;
 pub use sockets::Sockets;
 
 pub(crate) use models::onnx_options;
+
+use api_options::api_options;
 
 /// Longest time that the start waits for the calibrations. The rest is read while the server
 /// listens, and the server is ready after that.
@@ -163,7 +166,6 @@ impl App {
 
     /// Starts the workers. No model is loaded yet: [`App::serve`] does that. Needs a tokio runtime.
     ///
-    ///
     /// # Errors
     /// If the operating system creates no thread, or the keys, the certificate or the collector
     /// cannot be used.
@@ -212,33 +214,7 @@ impl App {
         };
         let tracer = Tracer::start(&settings.traces)?;
         let companions = companions(&settings.counts)?;
-        let options = ApiOptions {
-            max_body_bytes: settings.server.max_body_bytes,
-            max_upload_bytes: settings.limits.max_upload_bytes,
-            max_header_bytes: settings.connections.max_header_bytes,
-            max_headers: settings.connections.max_headers,
-            detect_defaults: settings.detect.clone(),
-            zone_metrics: settings.calibrations.zone_metrics,
-            camera_metrics: settings.results.camera_metrics,
-            images_of: Arc::new(settings.results.images_of.clone()),
-            conceal_images: settings.results.conceal_images,
-            apply_suggested_calibrations: settings.calibrations.apply_suggested,
-            metrics_elsewhere: settings.server.metrics_listen.is_some(),
-            request_timeout: settings.server.request_timeout,
-            min_upload_bytes_per_second: settings.limits.min_upload_bytes_per_second,
-            request_rate: settings
-                .limits
-                .requests_per_second
-                .map(|per_second| RequestRate {
-                    per_second,
-                    burst: settings.limits.request_burst,
-                }),
-            access,
-            cors_origins: settings.access.cors_origins.clone(),
-            hosts: settings.access.hosts.clone(),
-            companions: companions.clone(),
-            tracer: tracer.clone(),
-        };
+        let options = api_options(&settings, access, companions.clone(), tracer.clone());
         let state = ApiState::new(
             Arc::clone(&workers),
             Arc::clone(&models),
