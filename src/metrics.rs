@@ -6,11 +6,10 @@ mod camera_gauges;
 
 use std::sync::Arc;
 
-use lookdown_detect::metric_set;
+use lookdown_common::{metric_set, metrics::text};
 use lookdown_detect::metrics::DetectMetrics;
 use prometheus::{
-    Encoder, HistogramVec, IntCounterVec, IntGaugeVec, Registry, TextEncoder,
-    process_collector::ProcessCollector,
+    HistogramVec, IntCounterVec, IntGaugeVec, Registry, process_collector::ProcessCollector,
 };
 pub use prometheus::{IntCounter, IntGauge};
 
@@ -174,11 +173,7 @@ impl Metrics {
     /// # Errors
     /// If a metric cannot be written.
     pub fn render(&self) -> Result<String, prometheus::Error> {
-        let mut text = Vec::new();
-        for registry in [&self.registry, &self.process] {
-            TextEncoder::new().encode(&registry.gather(), &mut text)?;
-        }
-        Ok(String::from_utf8_lossy(&text).into_owned())
+        text(&[&self.registry, &self.process])
     }
 }
 

@@ -14,7 +14,7 @@ use prometheus::{
     proto::{Gauge, LabelPair, Metric, MetricFamily, MetricType},
 };
 
-use lookdown_detect::metrics::Kind;
+use lookdown_common::metrics::Kind;
 
 /// Most rows of one metric.
 pub(super) const MAX_ROWS: usize = 1000;

@@ -3,7 +3,7 @@
 //!
 //! With the feature `companion` also those of a client of the server: settings files, the server and
 //! its key, HTTP requests with limits, durations and backoff. With `report`, the report of a frame,
-//! which the server writes.
+//! which the server writes. With `metrics`, the declaration of metrics.
 
 #[cfg(feature = "companion")]
 mod abort_on_drop;
@@ -21,6 +21,8 @@ mod http_transport;
 #[cfg(feature = "companion")]
 mod in_process;
 mod log_once;
+#[cfg(feature = "metrics")]
+pub mod metrics;
 pub mod plain_name;
 #[cfg(feature = "companion")]
 mod reload;

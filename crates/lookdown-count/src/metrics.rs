@@ -1,111 +1,53 @@
 //! The metrics of the companion.
 
-use prometheus::{
-    Encoder, IntCounter, IntCounterVec, IntGauge, IntGaugeVec, Opts, Registry, TextEncoder,
-};
+use lookdown_common::{metric_set, metrics::text};
+use prometheus::{IntCounter, IntCounterVec, IntGauge, IntGaugeVec, Registry};
 
 use crate::counter::Counter;
 
-/// All metrics. Series of cameras follow the scenes, which are bounded.
-pub(crate) struct Metrics {
-    registry: Registry,
-    pub(crate) connected: IntGauge,
+metric_set! {
+    /// All metrics. Series of cameras follow the scenes, which are bounded.
+    pub(crate) struct Metrics {
+        registry: Registry,
+    }
+
+    /// 1 while the stream of reports is open, else 0.
+    connected: IntGauge = "connected" [];
     /// Open connections of clients.
-    pub(crate) connections: IntGauge,
-    pub(crate) reports: IntCounter,
-    pub(crate) reports_skipped: IntCounterVec,
-    position_resets: IntCounter,
-    pub(crate) commits_failed: IntCounter,
-    pub(crate) webhooks_delivered: IntCounter,
-    pub(crate) webhooks_dropped: IntCounter,
-    crossings: IntCounterVec,
-    persons: IntGaugeVec,
-    zone_persons: IntGaugeVec,
-    zone_entries: IntCounterVec,
-    zone_person_seconds: IntCounterVec,
-    site_persons: IntGaugeVec,
-    last_report: IntGaugeVec,
+    connections: IntGauge = "connections" [];
+    /// Counted reports.
+    reports: IntCounter = "reports_total" [];
+    /// Reports that were not counted, by reason: malformed, out_of_order, repeated,
+    /// too_many_cameras.
+    reports_skipped: IntCounterVec = "reports_skipped_total" ["reason"];
+    /// Times that the IDs of the server went back.
+    position_resets: IntCounter = "position_resets_total" [];
+    /// Failed transactions of the store.
+    commits_failed: IntCounter = "commits_failed_total" [];
+    /// Delivered messages.
+    webhooks_delivered: IntCounter = "webhooks_delivered_total" [];
+    /// Messages that were given up.
+    webhooks_dropped: IntCounter = "webhooks_dropped_total" [];
+    /// Crossings of the line since the store was created.
+    crossings: IntCounterVec = "crossings_total" ["camera", "line", "direction"];
+    /// Persons now; absent while unknown.
+    persons: IntGaugeVec = "persons" ["camera"];
+    /// Persons in the zone now; absent while unknown.
+    zone_persons: IntGaugeVec = "zone_persons" ["camera", "zone"];
+    /// Entries into the zone since the store was created.
+    zone_entries: IntCounterVec = "zone_entries_total" ["camera", "zone"];
+    /// Time that persons spent in the zone since the store was created.
+    zone_person_seconds: IntCounterVec = "zone_person_seconds_total" ["camera", "zone"];
+    /// Persons now; absent while unknown.
+    site_persons: IntGaugeVec = "site_persons" ["site"];
+    /// Time of the last frame.
+    last_report: IntGaugeVec = "last_report_timestamp_seconds" ["camera"];
 }
 
 impl Metrics {
     pub(crate) fn new() -> Result<Self, prometheus::Error> {
-        let registry = Registry::new();
-        let name = |name: &str| format!("lookdown_count_{name}");
-        let counter = |of: &str, help: &str| {
-            let counter = IntCounter::new(name(of), help)?;
-            registry.register(Box::new(counter.clone()))?;
-            Ok::<_, prometheus::Error>(counter)
-        };
-        let gauges = |of: &str, help: &str, labels: &[&str]| {
-            let gauges = IntGaugeVec::new(Opts::new(name(of), help), labels)?;
-            registry.register(Box::new(gauges.clone()))?;
-            Ok::<_, prometheus::Error>(gauges)
-        };
-        let connected = IntGauge::new(
-            name("connected"),
-            "1 while the stream of reports is open, else 0.",
-        )?;
-        registry.register(Box::new(connected.clone()))?;
-        let connections = IntGauge::new(name("connections"), "Open connections of clients.")?;
-        registry.register(Box::new(connections.clone()))?;
-        let reports_skipped = IntCounterVec::new(
-            Opts::new(
-                name("reports_skipped_total"),
-                "Reports that were not counted, by reason: malformed, out_of_order, repeated, too_many_cameras.",
-            ),
-            &["reason"],
-        )?;
-        registry.register(Box::new(reports_skipped.clone()))?;
-        let counters = |of: &str, help: &str, labels: &[&str]| {
-            let counters = IntCounterVec::new(Opts::new(name(of), help), labels)?;
-            registry.register(Box::new(counters.clone()))?;
-            Ok::<_, prometheus::Error>(counters)
-        };
-        Ok(Self {
-            connected,
-            connections,
-            reports: counter("reports_total", "Counted reports.")?,
-            reports_skipped,
-            position_resets: counter(
-                "position_resets_total",
-                "Times that the IDs of the server went back.",
-            )?,
-            commits_failed: counter("commits_failed_total", "Failed transactions of the store.")?,
-            webhooks_delivered: counter("webhooks_delivered_total", "Delivered messages.")?,
-            webhooks_dropped: counter("webhooks_dropped_total", "Messages that were given up.")?,
-            crossings: counters(
-                "crossings_total",
-                "Crossings of the line since the store was created.",
-                &["camera", "line", "direction"],
-            )?,
-            persons: gauges("persons", "Persons now; absent while unknown.", &["camera"])?,
-            zone_persons: gauges(
-                "zone_persons",
-                "Persons in the zone now; absent while unknown.",
-                &["camera", "zone"],
-            )?,
-            zone_entries: counters(
-                "zone_entries_total",
-                "Entries into the zone since the store was created.",
-                &["camera", "zone"],
-            )?,
-            zone_person_seconds: counters(
-                "zone_person_seconds_total",
-                "Time that persons spent in the zone since the store was created.",
-                &["camera", "zone"],
-            )?,
-            site_persons: gauges(
-                "site_persons",
-                "Persons now; absent while unknown.",
-                &["site"],
-            )?,
-            last_report: gauges(
-                "last_report_timestamp_seconds",
-                "Time of the last frame.",
-                &["camera"],
-            )?,
-            registry,
-        })
+        let registry = Registry::new_custom(Some("lookdown_count".to_owned()), None)?;
+        Self::registered_with(&registry.clone(), registry)
     }
 
     /// Returns all metrics in the text format of Prometheus.
@@ -165,9 +107,7 @@ impl Metrics {
                     .set(number(persons));
             }
         }
-        let mut text = Vec::new();
         // Writing to memory does not fail.
-        let _ = TextEncoder::new().encode(&self.registry.gather(), &mut text);
-        text
+        text(&[&self.registry]).unwrap_or_default().into_bytes()
     }
 }

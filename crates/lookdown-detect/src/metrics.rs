@@ -1,46 +1,9 @@
 //! The metrics of detection. The doc comment of a field is its help text. Each part of the engine
 //! counts its own events in the struct, which its owner registers.
 
-mod kind;
-
+use lookdown_common::metric_set;
 pub use prometheus::{IntCounter, IntGauge};
 use prometheus::{IntCounterVec, IntGaugeVec, Registry};
-
-pub use kind::Kind;
-
-/// Declares a struct of metrics with a constructor `registered_with`, which registers each metric
-/// by its name and takes the values of the struct's other fields.
-#[macro_export]
-macro_rules! metric_set {
-    (
-        $(#[$about:meta])*
-        pub struct $set:ident {
-            $($(#[$note:meta])* $visibility:vis $other:ident: $type:ty,)*
-        }
-        $($(#[doc = $help:literal])+ $field:ident: $kind:ty = $name:literal [$($label:literal),*];)+
-    ) => {
-        $(#[$about])*
-        #[derive(Debug)]
-        pub struct $set {
-            $($(#[$note])* $visibility $other: $type,)*
-            $($(#[doc = $help])+ pub $field: $kind,)+
-        }
-
-        impl $set {
-            fn registered_with(
-                registry: &Registry,
-                $($other: $type,)*
-            ) -> Result<Self, prometheus::Error> {
-                $(
-                    let help = concat!($($help),+).trim_start();
-                    let $field = <$kind as $crate::metrics::Kind>::create($name, help, &[$($label),*])?;
-                    registry.register(Box::new($field.clone()))?;
-                )+
-                Ok(Self { $($other,)* $($field,)+ })
-            }
-        }
-    };
-}
 
 metric_set! {
     /// The metrics of one engine and its models.

@@ -5,10 +5,9 @@ use std::{
     time::{Duration, Instant},
 };
 
+use lookdown_common::{metric_set, metrics::text};
 use parking_lot::Mutex;
-use prometheus::{
-    Encoder, GaugeVec, IntCounter, IntCounterVec, IntGauge, Opts, Registry, TextEncoder,
-};
+use prometheus::{GaugeVec, IntCounter, IntCounterVec, IntGauge, Registry};
 
 use crate::rate::Rate;
 
@@ -43,17 +42,31 @@ impl Failure {
     }
 }
 
+metric_set! {
+    /// The series of all cameras.
+    pub(crate) struct Series {
+        registry: Registry,
+    }
+
+    /// Time since the camera's last whole frame, or since its start without a frame.
+    age: GaugeVec = "last_frame_age_seconds" ["camera"];
+    /// Whole frames of the camera.
+    received: IntCounterVec = "frames_received_total" ["camera"];
+    /// Frames for which the server returned a report.
+    sent: IntCounterVec = "frames_sent_total" ["camera"];
+    /// Frames replaced by a newer one before they were sent.
+    skipped: IntCounterVec = "frames_skipped_total" ["camera"];
+    /// Frames without a report, by reason: damaged, overloaded, refused, unreachable.
+    failed: IntCounterVec = "frames_failed_total" ["camera", "reason"];
+    /// Restarts of the source of the camera.
+    reconnects: IntCounterVec = "reconnects_total" ["camera"];
+    /// Open connections of clients.
+    connections: IntGauge = "connections" [];
+}
+
 /// The metrics of all cameras.
 pub struct Metrics {
-    registry: Registry,
-    age: GaugeVec,
-    received: IntCounterVec,
-    sent: IntCounterVec,
-    skipped: IntCounterVec,
-    failed: IntCounterVec,
-    reconnects: IntCounterVec,
-    /// Open connections of clients.
-    pub(crate) connections: IntGauge,
+    pub(crate) series: Series,
     cameras: Mutex<Vec<Arc<CameraMetrics>>>,
 }
 
@@ -97,67 +110,25 @@ impl Metrics {
     /// If two metrics share a name.
     pub fn new() -> Result<Self, prometheus::Error> {
         let registry = Registry::new_custom(Some("lookdown_watch".to_owned()), None)?;
-        let counter = |name: &str, help: &str, labels: &[&str]| {
-            let counter = IntCounterVec::new(Opts::new(name, help), labels)?;
-            registry.register(Box::new(counter.clone()))?;
-            Ok::<_, prometheus::Error>(counter)
-        };
-        let of_camera = &["camera"];
-        let age = GaugeVec::new(
-            Opts::new(
-                "last_frame_age_seconds",
-                "Time since the camera's last whole frame, or since its start without a frame.",
-            ),
-            of_camera,
-        )?;
-        registry.register(Box::new(age.clone()))?;
-        let connections = IntGauge::new("connections", "Open connections of clients.")?;
-        registry.register(Box::new(connections.clone()))?;
         Ok(Self {
-            age,
-            connections,
-            received: counter(
-                "frames_received_total",
-                "Whole frames of the camera.",
-                of_camera,
-            )?,
-            sent: counter(
-                "frames_sent_total",
-                "Frames for which the server returned a report.",
-                of_camera,
-            )?,
-            skipped: counter(
-                "frames_skipped_total",
-                "Frames replaced by a newer one before they were sent.",
-                of_camera,
-            )?,
-            failed: counter(
-                "frames_failed_total",
-                "Frames without a report, by reason: damaged, overloaded, refused, unreachable.",
-                &["camera", "reason"],
-            )?,
-            reconnects: counter(
-                "reconnects_total",
-                "Restarts of the source of the camera.",
-                of_camera,
-            )?,
-            registry,
+            series: Series::registered_with(&registry.clone(), registry)?,
             cameras: Mutex::default(),
         })
     }
 
     /// Adds a camera.
     pub(crate) fn add(&self, camera: &str, source: String) -> Arc<CameraMetrics> {
+        let series = &self.series;
         let of = |counter: &IntCounterVec| counter.with_label_values(&[camera]);
         let metrics = Arc::new(CameraMetrics {
             camera: camera.to_owned(),
             last_frame: Mutex::new(Instant::now()),
-            received: of(&self.received),
-            sent: of(&self.sent),
-            skipped: of(&self.skipped),
+            received: of(&series.received),
+            sent: of(&series.sent),
+            skipped: of(&series.skipped),
             failed: Failure::ALL
-                .map(|reason| self.failed.with_label_values(&[camera, reason.label()])),
-            reconnects: of(&self.reconnects),
+                .map(|reason| series.failed.with_label_values(&[camera, reason.label()])),
+            reconnects: of(&series.reconnects),
             source,
             rate: Mutex::default(),
             warning: Mutex::default(),
@@ -172,14 +143,19 @@ impl Metrics {
     /// Removes a camera with its series.
     pub(crate) fn remove(&self, camera: &str) {
         self.cameras.lock().retain(|other| other.camera != camera);
-        let counters = [&self.received, &self.sent, &self.skipped, &self.reconnects];
-        for counter in counters {
+        let series = &self.series;
+        for counter in [
+            &series.received,
+            &series.sent,
+            &series.skipped,
+            &series.reconnects,
+        ] {
             // A missing series is as good.
             let _ = counter.remove_label_values(&[camera]);
         }
-        let _ = self.age.remove_label_values(&[camera]);
+        let _ = series.age.remove_label_values(&[camera]);
         for reason in Failure::ALL {
-            let _ = self.failed.remove_label_values(&[camera, reason.label()]);
+            let _ = series.failed.remove_label_values(&[camera, reason.label()]);
         }
     }
 
@@ -203,12 +179,13 @@ impl Metrics {
     pub fn text(&self) -> Vec<u8> {
         for camera in self.cameras.lock().iter() {
             let age = camera.last_frame.lock().elapsed().as_secs_f64();
-            self.age.with_label_values(&[&camera.camera]).set(age);
+            let row = self.series.age.with_label_values(&[&camera.camera]);
+            row.set(age);
         }
-        let mut text = Vec::new();
         // Writing to memory does not fail.
-        let _ = TextEncoder::new().encode(&self.registry.gather(), &mut text);
-        text
+        text(&[&self.series.registry])
+            .unwrap_or_default()
+            .into_bytes()
     }
 }
 

@@ -14,7 +14,7 @@ pub async fn serve_metrics(listener: TcpListener, metrics: Arc<Metrics>) {
         Ok(address) => Access::without_key(address),
         Err(_) => Access::OwnMachine,
     };
-    let open = metrics.connections.clone();
+    let open = metrics.series.connections.clone();
     let text = move || {
         let text = metrics.text();
         async move { ([(CONTENT_TYPE, "text/plain; version=0.0.4")], text).into_response() }
