@@ -18,7 +18,8 @@ use crate::{
     drops::{DropReason, Drops},
     now::{LogPause, Now},
     report::ReceivedReport,
-    scene::{ReportTime, Scene, SceneState},
+    report_time::ReportTime,
+    scene::{Scene, SceneState},
     scene_camera::NamedCrossing,
     sums::{DAY_MS, Owner, Sums, Totals},
 };

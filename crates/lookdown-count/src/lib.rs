@@ -29,6 +29,7 @@ mod options;
 mod presence;
 mod recording;
 mod report;
+mod report_time;
 mod run;
 mod scene;
 mod scene_camera;

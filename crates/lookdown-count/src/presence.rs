@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    scene::ReportTime,
+    report_time::ReportTime,
     sums::{MINUTE_MS, Owner, Sums},
     time_span::TimeSpan,
 };

@@ -1,6 +1,6 @@
 //! A tracker with its cameras, one or all of a site, whose lines and zones count its tracks.
 
-use std::{collections::BTreeMap, sync::Arc, time::Instant};
+use std::{collections::BTreeMap, sync::Arc};
 
 use lookdown_tracking::{
     Observation, RefusedReport, SiteError, Track, Tracker, TrackerSettings, furniture::Furniture,
@@ -12,6 +12,7 @@ use crate::{
     definition::CameraDefinition,
     definition_key::DefinitionKey,
     presence::Presence,
+    report_time::ReportTime,
     scene_camera::{CameraState, NamedCrossing, SceneCamera},
     sums::{DAY_MS, Owner, Sums},
 };
@@ -44,17 +45,6 @@ impl SceneState {
         let mut cameras = self.cameras.iter();
         cameras.find_map(|state| state.last_event_of(camera))
     }
-}
-
-/// The time of a report.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct ReportTime {
-    /// Time of its frame, milliseconds since the Unix epoch.
-    pub(crate) at_ms: i64,
-    /// Longest time between two reports of a camera that is known, milliseconds.
-    pub(crate) longest_gap_ms: i64,
-    /// Its arrival, by a clock that never jumps.
-    pub(crate) now: Instant,
 }
 
 impl Scene {

@@ -19,7 +19,7 @@ use crate::{
     now::{LogPause, Now},
     presence::Presence,
     report::ReportKey,
-    scene::ReportTime,
+    report_time::ReportTime,
     sums::{LineDirection, MINUTE_MS, Sums, ZoneOf},
     time_span::TimeSpan,
 };

@@ -6,7 +6,9 @@ use std::{
     fs,
 };
 
-use super::source_scan::{CRATES, absolute, code, names_crate, sources, used_paths, without_tests};
+use super::source_scan::{
+    CRATES, absolute, code, names_crate, sources, used_paths, without_test_files, without_tests,
+};
 
 /// The parts of modules that have rows of their own.
 const PARTS: [&str; 3] = ["api::http", "api::protocols", "api::routes"];
@@ -54,7 +56,7 @@ fn purpose(text: &str) -> String {
 
 /// Returns the modules of a crate with their uses.
 fn modules(root: &str) -> BTreeMap<String, Uses> {
-    let files = sources(root);
+    let files = without_test_files(sources(root));
     let names: BTreeSet<_> = files.iter().map(|(module, _)| row_of(module)).collect();
     let mut rows: BTreeMap<String, Uses> = BTreeMap::new();
     for (module, path) in files {

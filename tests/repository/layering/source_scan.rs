@@ -51,6 +51,15 @@ pub fn all_sources() -> Vec<(String, PathBuf)> {
         .collect()
 }
 
+/// Returns the modules without those of tests.
+pub fn without_test_files(mut modules: Vec<(String, PathBuf)>) -> Vec<(String, PathBuf)> {
+    modules.retain(|(module, _)| {
+        let name = module.rsplit("::").next().unwrap_or_default();
+        name != "tests" && !name.starts_with("test_")
+    });
+    modules
+}
+
 /// Returns a file without its module of tests.
 pub fn without_tests(text: &str) -> &str {
     text.split("#[cfg(test)]\nmod tests {")

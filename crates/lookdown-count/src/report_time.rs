@@ -1,0 +1,14 @@
+//! The time of a report.
+
+use std::time::Instant;
+
+/// The time of a report.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ReportTime {
+    /// Time of its frame, milliseconds since the Unix epoch.
+    pub(crate) at_ms: i64,
+    /// Longest time between two reports of a camera that is known, milliseconds.
+    pub(crate) longest_gap_ms: i64,
+    /// Its arrival, by a clock that never jumps.
+    pub(crate) now: Instant,
+}
