@@ -12,7 +12,8 @@ const DURATION_BUCKETS: [f64; 15] = [
 
 /// Declares a struct of metrics with a constructor `registered_with`, which registers each metric
 /// by its name and takes the values of the struct's other fields. The doc comment of a field is its
-/// help text, and the visibility of the struct is that of its metrics. The crate needs `prometheus`.
+/// help text, and the visibility of the struct is that of its metrics. The crate needs
+/// `prometheus`.
 #[macro_export]
 macro_rules! metric_set {
     (
