@@ -14,6 +14,7 @@ ROOT = Path(__file__).resolve().parent.parent
 LONGEST_TEST_NAME = 60
 LONGEST_SUMMARY_WORDS = 6
 LONGEST_SENTENCE_WORDS = 35
+WIDEST_COMMENT = 100
 QUESTION_WORDS = "What|Who|Whom|Whose|How|Whether|Where|Which|Of|Why|When"
 # Things are not persons.
 PERSONS = re.compile(r"\b(somebody|nobody|whoever|anybody|everybody|whomever)\b", re.IGNORECASE)
@@ -55,6 +56,9 @@ STRING = re.compile(r'"((?:[^"\\]|\\.)*)"')
 NAMES = re.compile(r"`[^`]*`|\{[^{}]*\}|\]\([^)]*\)")
 FIRST_WORD = re.compile(rf"(?:{QUESTION_WORDS})\b(?!-)")
 RUST_DOC = re.compile(r"^\s*//[/!](?!/) ?(.*)$")
+RUST_COMMENT = re.compile(r"^\s*//")
+# Parts of comments without a place to wrap: rows of tables, and long links and paths.
+UNWRAPPABLE = re.compile(r"//[/!]? *\||\S{60}")
 RUST_TEST = re.compile(r"#\[(?:tokio::)?test\b")
 RUST_FUNCTION = re.compile(r"\bfn (\w+)")
 # Markdown lines without sentences: empty lines, headings, rows of tables, HTML, and images.
@@ -109,10 +113,16 @@ def findings_in_names(name, lines):
 
 
 def findings_in_rust(name, lines):
-    """First words of doc comments, and the length of the names of tests."""
-    is_in_doc = is_test = False
+    """First words of doc comments, the width of comments, and the length of the names of tests."""
+    is_in_doc = is_test = was_empty = False
     for number, line in enumerate(lines, 1):
         doc = RUST_DOC.match(line)
+        is_empty = bool(doc) and not doc.group(1)
+        if is_empty and was_empty:
+            yield f"{name}:{number}: two empty lines in a doc comment: remove one"
+        was_empty = is_empty
+        if len(line) > WIDEST_COMMENT and RUST_COMMENT.match(line) and not UNWRAPPABLE.search(line):
+            yield f"{name}:{number}: a comment has {len(line)} columns: wrap it at {WIDEST_COMMENT}"
         if doc and not is_in_doc and FIRST_WORD.match(doc.group(1)):
             first = doc.group(1).split()[0]
             yield f"{name}:{number}: a doc comment begins with `{first}`: begin with a verb or a noun phrase"

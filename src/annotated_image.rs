@@ -45,7 +45,6 @@ pub enum AnnotationError {
 /// Draws the persons into their frame. Takes tens of milliseconds for a large frame: keep it off
 /// the async runtime. Stops when the job is withdrawn.
 ///
-///
 /// # Errors
 /// [`AnnotationError`] if the frame is larger than the format allows, or the job was withdrawn.
 pub fn annotated_image(

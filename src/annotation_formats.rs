@@ -1,5 +1,5 @@
-//! Exports detected persons in the file formats of annotation tools, for correction there. The output
-//! is text in memory, which the caller writes or sends. A new format needs a file with its
+//! Exports detected persons in the file formats of annotation tools, for correction there. The
+//! output is text in memory, which the caller writes or sends. A new format needs a file with its
 //! `FormatSpec` and a row of the table here.
 
 mod cepdof;
@@ -57,7 +57,8 @@ annotation_formats! {
     Coco = coco,
     /// CVAT for images 1.1: annotations.xml.
     Cvat = cvat,
-    /// YOLO as Ultralytics reads it, also with oriented boxes (OBB): labels/, data.yaml, classes.txt.
+    /// YOLO as Ultralytics reads it, also with oriented boxes (OBB): labels/, data.yaml,
+    /// classes.txt.
     Yolo = yolo,
     /// Pascal VOC: Annotations/.
     Voc = voc,

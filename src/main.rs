@@ -20,8 +20,8 @@ fn main() -> ExitCode {
     if !missing.is_empty() {
         let mut arguments = env::args_os();
         // Setting a variable in a process is not memory-safe, so the process is replaced by itself.
-        // If that fails, as without /proc, the program runs with the variables it has. The path, not
-        // `/proc/self/exe`, keeps the name of the process.
+        // If that fails, as without /proc, the program runs with the variables it has. The path,
+        // not `/proc/self/exe`, keeps the name of the process.
         let _ = Command::new(env::current_exe().unwrap_or_default())
             .arg0(arguments.next().unwrap_or_default())
             .args(arguments)

@@ -1,6 +1,7 @@
 //! Every metric of the server: one struct with its own registry. The doc comment of a field is its
-//! help text. Each subsystem shares the struct and counts its own events in it. Label values come from short fixed
-//! lists, never from clients. Those of cameras and zones are optional and limited to a thousand.
+//! help text. Each subsystem shares the struct and counts its own events in it. Label values come
+//! from short fixed lists, never from clients. Those of cameras and zones are optional and limited
+//! to a thousand.
 
 mod camera_gauges;
 

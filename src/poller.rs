@@ -18,7 +18,6 @@ pub struct Poller {
 impl Poller {
     /// Starts the thread, which runs `task` at this interval.
     ///
-    ///
     /// # Errors
     /// If the operating system creates no thread.
     pub fn start(

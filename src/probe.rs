@@ -57,7 +57,6 @@ pub enum ProbeError {
 /// Checks the server with these settings. Returns the URL that answered 200. Ends within three
 /// seconds.
 ///
-///
 /// # Errors
 /// [`ProbeError`] when the answer is no, or there is none.
 pub async fn ask(settings: &Settings, probe: Probe) -> Result<String, ProbeError> {

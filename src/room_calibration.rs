@@ -116,8 +116,8 @@ pub(crate) fn checked(native: &NativeCalibration) -> anyhow::Result<Calibration>
     Ok(cameras.swap_remove(0).1?)
 }
 
-/// Returns true if the height of a calibration may be set from people: a height that was measured or
-/// given is kept.
+/// Returns true if the height of a calibration may be set from people: a height that was measured
+/// or given is kept.
 pub(crate) fn may_set_height(native: &NativeCalibration) -> bool {
     let source = native.sources.get("height_m").map(|source| source.source);
     native.mount.height_m.is_none() || source == Some(ValueSource::FromPeople)
@@ -139,7 +139,8 @@ pub(crate) fn give_height(native: &mut NativeCalibration, height_m: f64) {
     native.sources.insert("height_m".to_owned(), GIVEN);
 }
 
-/// Returns the angle at the lens circle, radians. It is rounded down, so that the lens model is valid there.
+/// Returns the angle at the lens circle, radians. It is rounded down, so that the lens model is
+/// valid there.
 pub(crate) fn max_theta(fit: &RoomFit) -> f64 {
     (fit.max_theta * 1e6).floor() / 1e6
 }

@@ -1,4 +1,5 @@
-//! Calibrations that the server finds for named cameras from their own frames and people, and offers.
+//! Calibrations that the server finds for named cameras from their own frames and people, and
+//! offers.
 //!
 //! Frames of different times become edges (`RoomFrame`) on one thread of a low priority, one
 //! frame at a time. Neither frames nor images of people are kept.

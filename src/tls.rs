@@ -38,7 +38,6 @@ pub struct Tls {
 impl Tls {
     /// Reads the files that `options` names.
     ///
-    ///
     /// # Errors
     /// [`TlsError`] if they cannot be used.
     pub fn open(options: TlsOptions, metrics: Arc<Metrics>) -> Result<Self, TlsError> {

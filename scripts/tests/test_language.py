@@ -19,6 +19,12 @@ class Language(unittest.TestCase):
         found = [*language.findings_in_rust("a.rs", lines)]
         self.assertEqual([line.split(":")[1] for line in found], ["4"])
 
+    def test_wide_comments_and_doubled_empty_lines_are_found(self):
+        wide = "word " * 20
+        lines = [f"/// {wide}", f"let a = 1; // {wide}", "///", "///", f"/// | {wide} |", f"// {'a' * 100}"]
+        found = [*language.findings_in_rust("a.rs", lines)]
+        self.assertEqual([line.split(":")[1] for line in found], ["1", "4"])
+
     def test_persons_for_things_are_found(self):
         found = [*language.findings_in_text("a.md", ["nobody waits", "the client waits", "Whoever asks"])]
         self.assertEqual([line.split(":")[1] for line in found], ["1", "3"])

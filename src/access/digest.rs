@@ -14,7 +14,6 @@ const BYTES: usize = 32;
 
 /// Returns a new random key: `lookdown_` and 64 hexadecimal digits.
 ///
-///
 /// # Errors
 /// If the operating system returns no random numbers.
 pub fn new_key() -> Result<String, getrandom::Error> {

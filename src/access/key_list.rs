@@ -62,7 +62,6 @@ impl KeyList {
 
     /// Merges two lists.
     ///
-    ///
     /// # Errors
     /// If they share a name, or have too many keys together.
     pub fn with(mut self, other: &Self) -> Result<Self, KeyError> {

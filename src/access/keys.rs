@@ -28,7 +28,6 @@ pub struct AccessKeys {
 impl AccessKeys {
     /// Creates the keys of `lasting` and of `file`, if one is given.
     ///
-    ///
     /// # Errors
     /// [`KeyError`] if the file cannot be used.
     pub fn open(lasting: KeyList, file: Option<&Path>) -> Result<Self, KeyError> {

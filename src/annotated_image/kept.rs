@@ -57,8 +57,8 @@ pub enum StoredFrameError {
 
 impl StoredFrame {
     /// Keeps a frame, with its persons concealed if `concealment` is given: its original JPEG, if
-    /// that is small enough and nothing is masked or concealed, else a new one. A new one takes tens
-    /// of milliseconds for a large frame: keep it off the async runtime.
+    /// that is small enough and nothing is masked or concealed, else a new one. A new one takes
+    /// tens of milliseconds for a large frame: keep it off the async runtime.
     ///
     /// # Errors
     /// [`StoredFrameError`] for a frame that cannot be kept.

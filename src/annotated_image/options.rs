@@ -1,4 +1,5 @@
-//! The drawings and the size of an annotated image: the table of parameters, and the checked values.
+//! The drawings and the size of an annotated image: the table of parameters, and the checked
+//! values.
 
 use std::str::FromStr;
 

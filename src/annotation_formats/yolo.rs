@@ -1,6 +1,7 @@
-//! YOLO: a text file per image in `labels/`, with `data.yaml` (Ultralytics) and `classes.txt` (Label
-//! Studio) next to them. The images belong in `images/`. A line is `class cx cy width height`, or
-//! with oriented boxes (YOLO OBB) `class x1 y1 x2 y2 x3 y3 x4 y4`, relative to the image's sides.
+//! YOLO: a text file per image in `labels/`, with `data.yaml` (Ultralytics) and `classes.txt`
+//! (Label Studio) next to them. The images belong in `images/`. A line is `class cx cy width
+//! height`, or with oriented boxes (YOLO OBB) `class x1 y1 x2 y2 x3 y3 x4 y4`, relative to the
+//! image's sides.
 
 use std::fmt::Write;
 

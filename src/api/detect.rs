@@ -1,5 +1,5 @@
-//! Detection in a frame, from the upload to the answer: the route `POST /detect`, and the parts that
-//! the other protocols share with it.
+//! Detection in a frame, from the upload to the answer: the route `POST /detect`, and the parts
+//! that the other protocols share with it.
 
 pub(super) mod answer;
 pub(super) mod defaults;

@@ -1,4 +1,5 @@
-//! The connection of parts of this process to the server: requests call its routes without a socket.
+//! The connection of parts of this process to the server: requests call its routes without a
+//! socket.
 
 use std::{
     pin::Pin,

@@ -1,5 +1,5 @@
-//! The native API: one module for each resource. No route depends on another or on a protocol. A new
-//! endpoint needs its handler and a row of the table here.
+//! The native API: one module for each resource. No route depends on another or on a protocol. A
+//! new endpoint needs its handler and a row of the table here.
 
 pub(super) mod calibrations;
 pub(super) mod cameras;

@@ -9,8 +9,8 @@ use super::{App, CALIBRATIONS_CHECK};
 use crate::access::Scope;
 
 impl App {
-    /// Loads every model that is served, and describes the server that could start: a line on models
-    /// and calibrations, and lines on the clients that have access. Blocks.
+    /// Loads every model that is served, and describes the server that could start: a line on
+    /// models and calibrations, and lines on the clients that have access. Blocks.
     ///
     /// # Errors
     /// Returns an error if a model cannot be loaded, or if the calibration store cannot be read.

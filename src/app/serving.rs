@@ -39,7 +39,6 @@ impl App {
     /// grace period. After that, no more connections are accepted, and requests in flight are
     /// answered within the drain timeout. A second request to stop ends all at once.
     ///
-    ///
     /// # Errors
     /// If a model cannot be loaded or a socket fails.
     pub async fn serve(mut self, sockets: Sockets, shutdown: Shutdown) -> anyhow::Result<()> {

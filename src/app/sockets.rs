@@ -19,7 +19,6 @@ pub struct Sockets {
 impl Sockets {
     /// Binds the addresses of the settings.
     ///
-    ///
     /// # Errors
     /// One sentence that names the setting, for an address that is in use or not one of this
     /// machine.

@@ -1,7 +1,7 @@
 //! Notifications to systemd: ready, stopping, and the watchdog of the service.
 //!
-//! systemd names its socket in `NOTIFY_SOCKET`, and the interval of the watchdog in `WATCHDOG_USEC`.
-//! Without these variables nothing is sent.
+//! systemd names its socket in `NOTIFY_SOCKET`, and the interval of the watchdog in
+//! `WATCHDOG_USEC`. Without these variables nothing is sent.
 
 use std::time::Duration;
 

@@ -6,8 +6,8 @@ use anyhow::Context;
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use tokio::runtime::{Builder, Runtime};
 
-/// Threads of `run`, `watch` and `count` for sockets, cameras, counts and JSON. Frames have separate
-/// threads.
+/// Threads of `run`, `watch` and `count` for sockets, cameras, counts and JSON. Frames have
+/// separate threads.
 pub(super) const THREADS: usize = 2;
 /// Longest time that the end of the process waits for tasks that block. They may take as long as
 /// workers that are stuck, and a read of standard input may never end.

@@ -11,7 +11,8 @@ use strum::VariantNames;
 #[derive(Debug, Args)]
 #[group(id = "camera_flags", multiple = true)]
 pub(super) struct CameraFlags {
-    /// The name under which the server keeps the results [default: the calibration; `run` without one: camera]
+    /// The name under which the server keeps the results [default: the calibration; `run` without
+    /// one: camera]
     #[arg(long)]
     name: Option<String>,
     /// The ID of a calibration of the server

@@ -1,4 +1,5 @@
-//! Completion on the command line: the answers to a shell, whose script `lookdown completions` prints.
+//! Completion on the command line: the answers to a shell, whose script `lookdown completions`
+//! prints.
 
 use std::{
     ffi::{OsStr, OsString},

@@ -88,8 +88,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     })
 }
 
-/// Returns the settings of the counts. Counts of `server`, which is in this process, have no address
-/// of their own.
+/// Returns the settings of the counts. Counts of `server`, which is in this process, have no
+/// address of their own.
 pub(super) fn counting(
     settings: &SettingsSource,
     server: Option<ServerOptions>,

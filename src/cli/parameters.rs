@@ -1,5 +1,5 @@
-//! Request parameters as flags: the same names in kebab-case and the same checks, from the tables of their
-//! specifications.
+//! Request parameters as flags: the same names in kebab-case and the same checks, from the tables
+//! of their specifications.
 
 use std::str::FromStr;
 

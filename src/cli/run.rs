@@ -122,7 +122,8 @@ fn create_calibrations(settings: &Settings) {
     }
 }
 
-/// Adds a key of this process to those of the settings, if requests need keys. It is in memory only.
+/// Adds a key of this process to those of the settings, if requests need keys. It is in memory
+/// only.
 fn own_key(settings: &mut Settings) -> anyhow::Result<Option<Secret>> {
     if !settings.access.needs_keys() {
         return Ok(None);

@@ -55,8 +55,8 @@ impl SettingsFile {
         self.source(None, flags)?.load()
     }
 
-    /// Returns the source with a file that stands without `--config`, and with values of other flags,
-    /// each with its key.
+    /// Returns the source with a file that stands without `--config`, and with values of other
+    /// flags, each with its key.
     ///
     /// # Errors
     /// If there are two files.

@@ -23,8 +23,8 @@ use crate::{cameras::Cameras, settings::Settings};
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// A settings file with cameras (docs/watch.md), or one camera: the URL of a JPEG snapshot, an
-    /// MJPEG stream or RTSP, a folder into which images are dropped, a video file, or `-` for images
-    /// on standard input
+    /// MJPEG stream or RTSP, a folder into which images are dropped, a video file, or `-` for
+    /// images on standard input
     #[arg(value_name = "SETTINGS.toml|SOURCE")]
     source: Option<String>,
     #[command(flatten)]
@@ -110,8 +110,8 @@ async fn listen(address: SocketAddr, metrics: &Arc<Metrics>) -> anyhow::Result<A
     Ok(AbortOnDrop(serving.abort_handle()))
 }
 
-/// Returns the cameras of the settings and of the command line. In `lookdown run`, the stored cameras
-/// are added, and its own server replaces that of the settings.
+/// Returns the cameras of the settings and of the command line. In `lookdown run`, the stored
+/// cameras are added, and its own server replaces that of the settings.
 pub(super) fn cameras(
     settings: &SettingsSource,
     camera: Option<CameraEntry>,

@@ -38,8 +38,8 @@ impl Broker {
         }
     }
 
-    /// Returns the client side of TLS if the connection uses it. `authorities` is a PEM file; `None`
-    /// trusts those of the system.
+    /// Returns the client side of TLS if the connection uses it. `authorities` is a PEM file;
+    /// `None` trusts those of the system.
     pub(super) fn tls(&self, authorities: Option<&Path>) -> Result<Option<ClientTls>, TlsError> {
         let tls = || ClientTls::new("mqtt.authorities", authorities);
         self.has_tls.then(tls).transpose()

@@ -107,8 +107,8 @@ impl CountsPublisher {
         tokio::join!(self.publish(wanted, images), requesting);
     }
 
-    /// Publishes in one session after the other. `wanted` receives the cameras of events, and `images`
-    /// has their images.
+    /// Publishes in one session after the other. `wanted` receives the cameras of events, and
+    /// `images` has their images.
     async fn publish(
         mut self,
         wanted: mpsc::Sender<String>,

@@ -30,8 +30,9 @@ impl Device<'_> {
         format!("{}_{entity}", self.id)
     }
 
-    /// Returns the topic and the payload that announce an entity. `config` has its own fields. The entity is
-    /// available while all topics of `availability` are. `None` without a discovery prefix.
+    /// Returns the topic and the payload that announce an entity. `config` has its own fields. The
+    /// entity is available while all topics of `availability` are. `None` without a discovery
+    /// prefix.
     pub(super) fn announcement(
         &self,
         topics: &Topics,

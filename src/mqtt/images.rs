@@ -1,5 +1,5 @@
-//! The latest images of cameras, with boxes: drawn one after the other, so that neither their number
-//! nor a slow broker takes more than one thread.
+//! The latest images of cameras, with boxes: drawn one after the other, so that neither their
+//! number nor a slow broker takes more than one thread.
 
 use std::{collections::HashMap, sync::Arc, time::Duration};
 

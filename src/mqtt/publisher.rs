@@ -243,7 +243,8 @@ impl Publication {
                     } else if self.is_birth(&message) {
                         next_state.get_or_insert(not_before);
                     } else if message.topic == self.topics.status() && message.payload == OFFLINE {
-                        // Another client says otherwise, such as the will of a replica that has ended.
+                        // Another client says otherwise, such as the will of a replica that has
+                        // ended.
                         session.publish([self.status(ONLINE)]).await?;
                     }
                 }

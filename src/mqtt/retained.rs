@@ -1,6 +1,6 @@
-//! The retained topics that this client does not publish, such as those of a camera that was removed
-//! while no server was connected. They are withdrawn some time after the connection, unless another
-//! client publishes them.
+//! The retained topics that this client does not publish, such as those of a camera that was
+//! removed while no server was connected. They are withdrawn some time after the connection, unless
+//! another client publishes them.
 
 use std::collections::{BTreeMap, BTreeSet};
 

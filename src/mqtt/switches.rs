@@ -82,8 +82,8 @@ impl Switches {
     }
 
     /// Notes a command or a state. Returns false for a message of another topic. A retained command
-    /// is ignored: it would override what was chosen in the web page. The cameras of the settings are
-    /// known some seconds after the start, so commands of unknown cameras wait.
+    /// is ignored: it would override what was chosen in the web page. The cameras of the settings
+    /// are known some seconds after the start, so commands of unknown cameras wait.
     pub(super) fn note(&mut self, message: &Publish) -> bool {
         let Some(topic) = self.topics.switch_topic(&message.topic) else {
             return false;

@@ -1,7 +1,7 @@
 //! The headline number of a camera: how many people are there now.
 //!
-//! It is the number of followed persons while `lookdown count` hands it back, else the median of the
-//! camera's last reports. All servers with one result store have the same number.
+//! It is the number of followed persons while `lookdown count` hands it back, else the median of
+//! the camera's last reports. All servers with one result store have the same number.
 
 use std::{num::NonZeroUsize, sync::Arc, time::Duration};
 
@@ -73,7 +73,8 @@ impl HeadlineSource {
     }
 }
 
-/// Returns the median of each report and those before it in the window, in the order of the reports.
+/// Returns the median of each report and those before it in the window, in the order of the
+/// reports.
 #[must_use]
 pub fn medians(reports: &[Arc<StoredReport>]) -> Vec<usize> {
     let mut first = 0;

@@ -2,8 +2,8 @@
 //!
 //! A server holds two connections, independent of the number of listeners: one for queries and
 //! reports, one that subscribes to the cameras that have listeners here. Redis assigns the IDs, so
-//! they are the same on every server. While Redis is unreachable, reports wait in a bounded outbox, and detection
-//! does not wait for them.
+//! they are the same on every server. While Redis is unreachable, reports wait in a bounded outbox,
+//! and detection does not wait for them.
 
 mod address;
 mod connect;

@@ -26,14 +26,14 @@ settings! {
         /// Keys in addition to those of the file, each as `name:scope+scope:sha256`, with
         /// `:highest_priority` behind it where that is not 5.
         keys: KeyList = KeyList::default() => keys();
-        /// Lets every client that reaches a server without keys detect and read; changes are refused.
-        /// Such a server needs it to start on an address that is not loopback. Has no effect when
-        /// there are keys.
+        /// Lets every client that reaches a server without keys detect and read; changes are
+        /// refused. Such a server needs it to start on an address that is not loopback. Has no
+        /// effect when there are keys.
         open: bool = false => flag();
         /// Names of a server without keys, beside those that no stranger can own: addresses, names
         /// without a dot, and names below `.local`, `.internal`, `.home.arpa` and `.localhost`. A
-        /// request for another name may come from a web page whose owner made its name resolve to this
-        /// server (DNS rebinding). `"*.example.org"` is every name below it, `"*"` every name.
+        /// request for another name may come from a web page whose owner made its name resolve to
+        /// this server (DNS rebinding). `"*.example.org"` is every name below it, `"*"` every name.
         hosts: Vec<String> = Vec::new() => hosts();
         /// Origins of web pages that may call the server from a browser, such as
         /// `https://dashboard.example`.

@@ -36,8 +36,8 @@ pub fn use_packaged_files(files: PackagedFiles) {
 const SYSTEM_FOLDER: &str = "/usr/lib/lookdown";
 
 /// Returns the folders that may contain the files of this installation, best first: that of the
-/// executable, the repository that it was built in, and the folder of the Debian package. The current
-/// folder is not one of them: its owner would choose the code that this program runs.
+/// executable, the repository that it was built in, and the folder of the Debian package. The
+/// current folder is not one of them: its owner would choose the code that this program runs.
 fn installation_folders() -> Vec<PathBuf> {
     let executable = std::env::current_exe().unwrap_or_default();
     let mut folders: Vec<_> = executable
@@ -107,9 +107,9 @@ pub fn is_installed(path: &Path) -> bool {
 
 /// Returns the existing file or folder for `path`.
 ///
-/// A given path is used unchanged. The default path is that of [`PackagedFiles`]. Without them it is
-/// searched for in the folders of the installation only, so that no library or model of the current
-/// folder is used unless a setting names it.
+/// A given path is used unchanged. The default path is that of [`PackagedFiles`]. Without them it
+/// is searched for in the folders of the installation only, so that no library or model of the
+/// current folder is used unless a setting names it.
 pub(super) fn locate(path: &Path, default: &str) -> Option<PathBuf> {
     if path != Path::new(default) {
         return path.exists().then(|| path.to_owned());

@@ -37,8 +37,8 @@ settings! {
         /// The longest time for the path and the headers of a request to arrive.
         header_timeout as "header_timeout_millis" => millis(1..=MAX_TIMEOUT_MILLIS);
         /// The longest time that a connection stays open between two requests, or while its client
-        /// reads less than 64 KiB of a response. A proxy that keeps connections should close its own
-        /// earlier.
+        /// reads less than 64 KiB of a response. A proxy that keeps connections should close its
+        /// own earlier.
         idle_timeout as "idle_timeout_millis" => millis(1..=MAX_TIMEOUT_MILLIS);
         /// The most bytes of the path and all headers. More are answered with 431.
         max_header_bytes => whole(1024..=128 * 1024);

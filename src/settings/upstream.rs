@@ -13,8 +13,8 @@ settings! {
     /// The server that `lookdown watch` and `lookdown count` are clients of.
     #[derive(Debug, Clone)]
     pub(super) struct UpstreamKeys in "upstream" {
-        /// The URL of the server that `lookdown watch` and `lookdown count` use. `lookdown run` uses
-        /// its own server instead.
+        /// The URL of the server that `lookdown watch` and `lookdown count` use. `lookdown run`
+        /// uses its own server instead.
         url: String = "http://127.0.0.1:8080".to_owned()
             => text("a URL such as http://127.0.0.1:8080", |url| !url.is_empty());
         /// The file with the API key for that server. The first line is the key. `watch` needs the

@@ -17,8 +17,8 @@ use super::{
 };
 use crate::calibration_store::{Reading, WriteCondition};
 
-/// A low priority: frames that are answered come first. At the lowest one, a busy machine would not end
-/// a fit for minutes.
+/// A low priority: frames that are answered come first. At the lowest one, a busy machine would not
+/// end a fit for minutes.
 const NICE: i32 = 10;
 
 /// Work of the thread.

@@ -29,7 +29,6 @@ pub(super) struct Collector {
 impl Collector {
     /// Creates a client that has sent nothing yet. Needs a tokio runtime.
     ///
-    ///
     /// # Errors
     /// If the certificates of the system cannot be used.
     pub(super) fn new() -> reqwest::Result<Self> {

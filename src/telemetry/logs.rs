@@ -13,7 +13,6 @@ use crate::settings::{LogFormat, LogSettings};
 
 /// Starts logging, including that of panics.
 ///
-///
 /// # Errors
 /// If logging was already started in this process.
 pub fn start_logs(settings: &LogSettings) -> Result<(), TryInitError> {

@@ -45,7 +45,6 @@ impl Tracer {
     /// Starts the thread that sends spans, if the settings name a collector. Does not check that
     /// the collector answers. Needs a tokio runtime.
     ///
-    ///
     /// # Errors
     /// [`TracerError`], which names the setting.
     pub fn start(settings: &TraceSettings) -> Result<Self, TracerError> {

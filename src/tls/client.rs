@@ -16,7 +16,6 @@ impl ClientTls {
     /// Trusts the authorities in a PEM file, which the setting `setting` names, or those of the
     /// system.
     ///
-    ///
     /// # Errors
     /// [`TlsError`] if the file cannot be used.
     pub fn new(setting: &'static str, authorities: Option<&Path>) -> Result<Self, TlsError> {
@@ -42,7 +41,6 @@ impl ClientTls {
     }
 
     /// Performs the handshake with the server `host`, a name or an address.
-    ///
     ///
     /// # Errors
     /// If the server's certificate is not valid for this host, or the connection fails.

@@ -1,5 +1,5 @@
-//! A search for request bodies whose parsing takes more than linear time: forms, and tensors in JSON
-//! and as bytes.
+//! A search for request bodies whose parsing takes more than linear time: forms, and tensors in
+//! JSON and as bytes.
 //!
 //! Each filler is inserted into a valid body at its place, at two sizes. The larger body is eight
 //! times as large, and so may be its time, with a margin for noise.

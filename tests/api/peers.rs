@@ -35,7 +35,8 @@ struct EvilServer {
     sent: Arc<AtomicU64>,
 }
 
-/// An answer: `start`, then `rest` again and again with a pause after each, until the client leaves.
+/// An answer: `start`, then `rest` again and again with a pause after each, until the client
+/// leaves.
 #[derive(Clone)]
 struct Evil {
     name: &'static str,

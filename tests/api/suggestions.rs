@@ -125,7 +125,8 @@ async fn a_camera_without_a_calibration_gets_one_suggested() {
         suggested["calibration"]["sources"]["lens"]["source"],
         "measured"
     );
-    // Nothing is stored before it is applied; then the camera has nothing to suggest but its height.
+    // Nothing is stored before it is applied; then the camera has nothing to suggest but its
+    // height.
     assert_eq!(service.get("/calibrations/hall").await.status, 404);
     let stored = service
         .put("/calibrations/hall", &suggested["calibration"].to_string())

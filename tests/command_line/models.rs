@@ -44,8 +44,8 @@ fn listed(repository: &Path) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// Answers each request with the weights after this number of redirections. Returns the address, and
-/// the paths of the requests once the last one is answered.
+/// Answers each request with the weights after this number of redirections. Returns the address,
+/// and the paths of the requests once the last one is answered.
 fn server(redirections: usize, location: &str) -> (String, thread::JoinHandle<Vec<String>>) {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = format!("http://{}/converted/", listener.local_addr().unwrap());

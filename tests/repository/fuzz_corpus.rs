@@ -1,5 +1,5 @@
-//! Replays the seeds of the fuzzers and the inputs that they kept. `docs/lab/reliability.md` describes
-//! how the fuzzers are run.
+//! Replays the seeds of the fuzzers and the inputs that they kept. `docs/lab/reliability.md`
+//! describes how the fuzzers are run.
 
 #[path = "../../lab/fuzz/src/lib.rs"]
 mod targets;

@@ -1,5 +1,5 @@
-//! The repository: its documentation, documented variables, layers, OpenAPI document, the libraries'
-//! API, the fuzzing corpus and the workflows.
+//! The repository: its documentation, documented variables, layers, OpenAPI document, the
+//! libraries' API, the fuzzing corpus and the workflows.
 #![expect(clippy::unwrap_used, reason = "a panic fails the test")]
 
 mod documentation;

@@ -55,7 +55,8 @@ const LASTING: [&str; 2] = [
     "src/api/routes/results/latest.rs",
 ];
 
-/// Calls that read the clock of the machine. Everything that waits or limits uses the monotonic clock.
+/// Calls that read the clock of the machine. Everything that waits or limits uses the monotonic
+/// clock.
 const CLOCKS: [&str; 3] = ["SystemTime::now()", "Timestamp::now()", "Zoned::now()"];
 /// The files that may make them: they date reports, and compare with the dates of others.
 /// docs/lab/reliability.md states what holds when the clock jumps.
@@ -81,9 +82,10 @@ const CLOCK_READERS: [&str; 18] = [
     "src/tls.rs",
 ];
 
-/// Calls that make HTTP clients. That of `http_transport.rs` bounds the provisional responses of its
-/// peers. The others end every request at a timeout, until which endless provisional responses keep
-/// one core busy (`provisional_responses_end_at_the_timeout`). Each has the reason for its own client.
+/// Calls that make HTTP clients. That of `http_transport.rs` bounds the provisional responses of
+/// its peers. The others end every request at a timeout, until which endless provisional responses
+/// keep one core busy (`provisional_responses_end_at_the_timeout`). Each has the reason for its own
+/// client.
 const CLIENTS: [&str; 4] = [
     " Client::builder()",
     " Client::new()",

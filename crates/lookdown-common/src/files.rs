@@ -1,7 +1,7 @@
 //! Reads files of users and operators: the one way in which Lookdown opens a file to read it.
 //!
-//! A path may lead to a pipe, whose opening waits for a writer, to a device that never ends, or to a
-//! file that grows. Each function opens without waiting, accepts regular files only, and reads a
+//! A path may lead to a pipe, whose opening waits for a writer, to a device that never ends, or to
+//! a file that grows. Each function opens without waiting, accepts regular files only, and reads a
 //! bounded number of bytes.
 
 use std::{

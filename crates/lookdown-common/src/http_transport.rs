@@ -1,6 +1,6 @@
 //! HTTP/1.1 requests to cameras, webhooks and servers: without redirections, proxies and cookies.
-//! The number of provisional responses (`100 Continue`) before a response is bounded, as a peer that
-//! never ends them would keep a core busy until the deadline of the request.
+//! The number of provisional responses (`100 Continue`) before a response is bounded, as a peer
+//! that never ends them would keep a core busy until the deadline of the request.
 
 mod body;
 mod error;
@@ -165,7 +165,8 @@ impl Provisional {
     }
 }
 
-/// Returns the trusted authorities. A certificate of the system that cannot be parsed is not trusted.
+/// Returns the trusted authorities. A certificate of the system that cannot be parsed is not
+/// trusted.
 fn trusted(authorities: Option<&[u8]>) -> Result<RootCertStore, ClientError> {
     let mut roots = RootCertStore::empty();
     let Some(pem) = authorities else {

@@ -1,9 +1,9 @@
 //! The parts that the crates of Lookdown share: texts of clients, names, files, problems
 //! that are logged once.
 //!
-//! With the feature `companion` also those of a client of the server: settings files, the server and
-//! its key, HTTP requests with limits, durations and backoff. With `report`, the report of a frame,
-//! which the server writes. With `metrics`, the declaration of metrics.
+//! With the feature `companion` also those of a client of the server: settings files, the server
+//! and its key, HTTP requests with limits, durations and backoff. With `report`, the report of a
+//! frame, which the server writes. With `metrics`, the declaration of metrics.
 
 #[cfg(feature = "companion")]
 mod abort_on_drop;

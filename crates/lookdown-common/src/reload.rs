@@ -34,8 +34,8 @@ impl<T: PartialEq + Send + 'static> Reload<T> {
         loaded.unwrap_or_else(|error| Err(ConfigError::problem("settings", &error)))
     }
 
-    /// Waits until the settings differ from `current`, and returns them. Invalid settings are logged
-    /// once, and the current ones stay in use.
+    /// Waits until the settings differ from `current`, and returns them. Invalid settings are
+    /// logged once, and the current ones stay in use.
     pub async fn changed(&self, current: &T) -> T {
         let mut log = LogOnce::default();
         loop {

@@ -76,8 +76,8 @@ pub struct Report {
     #[schema(required = false)]
     pub defaults: Vec<ReportDefault>,
     /// The origin of the persons: `full` is a search of the views of the profile. With `follow`,
-    /// `followed` means crops where the persons of the frame before were expected. `unchanged` means
-    /// that nothing had moved, so that detections of earlier frames were reused.
+    /// `followed` means crops where the persons of the frame before were expected. `unchanged`
+    /// means that nothing had moved, so that detections of earlier frames were reused.
     pub search: Cow<'static, str>,
     /// The numbers of views by outcome.
     pub views: ReportViews,

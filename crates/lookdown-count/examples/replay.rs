@@ -1,5 +1,5 @@
-//! Counts the reports of a clip again and again, as if its camera had gone on: the number of persons of
-//! each round. `docs/lab/count-accuracy.md` has the command.
+//! Counts the reports of a clip again and again, as if its camera had gone on: the number of
+//! persons of each round. `docs/lab/count-accuracy.md` has the command.
 
 use std::{error::Error, fs, sync::Arc, time::Duration};
 

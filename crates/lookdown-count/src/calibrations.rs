@@ -120,8 +120,8 @@ impl Calibrations {
         Ok(())
     }
 
-    /// Forgets the calibrations beyond the limits except one, and returns their IDs. Cameras that use
-    /// them keep their definitions until the next start, which requests them again.
+    /// Forgets the calibrations beyond the limits except one, and returns their IDs. Cameras that
+    /// use them keep their definitions until the next start, which requests them again.
     fn forget_oldest(&mut self, except: &str) -> Vec<String> {
         let mut forgotten = Vec::new();
         let mut total: usize = self.known.values().map(|known| known.bytes).sum();

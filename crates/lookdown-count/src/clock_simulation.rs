@@ -1,5 +1,5 @@
-//! Simulated jumps of the clocks of the server, of a camera and of this machine, with restarts of the
-//! server and kills of the companion.
+//! Simulated jumps of the clocks of the server, of a camera and of this machine, with restarts of
+//! the server and kills of the companion.
 
 mod tests;
 

@@ -1,4 +1,5 @@
-//! The settings of a camera's calibration that counting needs: lines, zones, and the place on a site.
+//! The settings of a camera's calibration that counting needs: lines, zones, and the place on a
+//! site.
 
 use lookdown_lens::{
     calibration::{Calibration, CameraGeometry},
@@ -144,8 +145,8 @@ impl CameraDefinition {
         pixel - Pixel::new(f64::from(width) / 2.0, f64::from(height) / 2.0)
     }
 
-    /// Returns the frame pixel of a place on the floor of the tracker; `None` where the lens does not
-    /// see it.
+    /// Returns the frame pixel of a place on the floor of the tracker; `None` where the lens does
+    /// not see it.
     pub(crate) fn pixel_of(&self, floor_m: [f64; 2]) -> Option<[f64; 2]> {
         let geometry = self.geometry.as_ref()?;
         let [x_m, y_m] = self.pose.of_site(floor_m);
@@ -153,8 +154,8 @@ impl CameraDefinition {
         Some([pixel.x, pixel.y])
     }
 
-    /// Returns the place on the floor of the tracker at a frame pixel; `None` where the lens does not
-    /// see the floor.
+    /// Returns the place on the floor of the tracker at a frame pixel; `None` where the lens does
+    /// not see the floor.
     pub(crate) fn floor_at(&self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
         let geometry = self.geometry.as_ref()?;
         let floor = floor_position(Pixel::new(x, y), &geometry.lens, &geometry.mount)?;

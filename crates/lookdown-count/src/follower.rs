@@ -203,8 +203,8 @@ impl Follower {
         }
     }
 
-    /// Stores all sums. Repeats a failed transaction until it succeeds: meanwhile no report is read,
-    /// so that memory stays bounded. The server sends those reports again.
+    /// Stores all sums. Repeats a failed transaction until it succeeds: meanwhile no report is
+    /// read, so that memory stays bounded. The server sends those reports again.
     pub(crate) async fn commit(&mut self) {
         let batch = self.counter.lock().take_batch();
         let messages = std::mem::take(&mut self.messages);

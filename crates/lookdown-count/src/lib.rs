@@ -5,8 +5,8 @@
 //! The pure core is [`lookdown_tracking`], whose state is serializable, so that it can be stored
 //! together with the counts.
 //!
-//! Around it: the follower reads `/events` and feeds the counter, the store keeps sums per minute with
-//! the state and the ID of the last report, and the HTTP API answers from both.
+//! Around it: the follower reads `/events` and feeds the counter, the store keeps sums per minute
+//! with the state and the ID of the last report, and the HTTP API answers from both.
 
 mod batch;
 mod calibrations;

@@ -168,8 +168,8 @@ impl Recording {
         scene.map_or(0, |scene| scene.presence().persons)
     }
 
-    /// Returns the indices of the persons in the report of this time, the last one, that are followed
-    /// and count.
+    /// Returns the indices of the persons in the report of this time, the last one, that are
+    /// followed and count.
     #[must_use]
     pub fn followed(&self, at: Timestamp) -> BTreeSet<usize> {
         let at_s = seconds(at.as_millisecond());

@@ -24,8 +24,8 @@ pub(crate) struct Scene {
     heat_map: HeatMap,
     presence: Presence,
     pub(crate) cameras: Vec<SceneCamera>,
-    /// True from a reset of the position until the next report: the server's clock may have been set
-    /// back.
+    /// True from a reset of the position until the next report: the server's clock may have been
+    /// set back.
     pub(crate) may_begin_again: bool,
 }
 

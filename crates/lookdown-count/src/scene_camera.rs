@@ -24,8 +24,8 @@ use crate::{
     time_span::TimeSpan,
 };
 
-/// Reports of a camera that are late for this long mean that a clock was set back: tracks begin again
-/// at its time.
+/// Reports of a camera that are late for this long mean that a clock was set back: tracks begin
+/// again at its time.
 pub(crate) const LATE_LIMIT: Duration = Duration::from_secs(10);
 
 /// Pause between two log lines about the clock of a camera.
@@ -131,8 +131,8 @@ impl SceneCamera {
         };
     }
 
-    /// Returns true if a refused report shows that a clock was set back: no report of this camera was
-    /// in order for [`LATE_LIMIT`].
+    /// Returns true if a refused report shows that a clock was set back: no report of this camera
+    /// was in order for [`LATE_LIMIT`].
     pub(crate) fn is_set_back(&mut self, now: Instant) -> bool {
         let since = *self.late_since.get_or_insert(now);
         now.saturating_duration_since(since) >= LATE_LIMIT

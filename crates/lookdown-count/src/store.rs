@@ -1,7 +1,7 @@
 //! The embedded store: sums per minute, the state of the trackers and the ID of the last report.
 //!
-//! All of it changes in one transaction, so that the sums contain every report up to that ID and none
-//! after it, however the process ends.
+//! All of it changes in one transaction, so that the sums contain every report up to that ID and
+//! none after it, however the process ends.
 
 mod read;
 mod schema;

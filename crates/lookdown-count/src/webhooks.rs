@@ -73,8 +73,8 @@ pub(crate) enum Condition {
 }
 
 impl Webhook {
-    /// Returns a digest of everything but the key: it identifies the webhook in the store, where its
-    /// URL may hold a password.
+    /// Returns a digest of everything but the key: it identifies the webhook in the store, where
+    /// its URL may hold a password.
     fn digest(&self) -> String {
         let text = json!([self.url.as_str(), self.camera, self.condition]).to_string();
         STANDARD.encode(Sha256::digest(text))

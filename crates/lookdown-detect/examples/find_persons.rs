@@ -1,5 +1,5 @@
-//! Detects the persons in an image, with its calibration if there is one:
-//! `cargo run -p lookdown-detect --example find_persons -- samples/office.jpg samples/calibrations/office.json`
+//! Detects the persons in an image, with its calibration if there is one: `cargo run -p
+//! lookdown-detect --example find_persons -- samples/office.jpg samples/calibrations/office.json`
 
 use std::{env, error::Error, fs, path::Path, sync::Arc};
 

@@ -37,7 +37,8 @@ pub struct DetectorOptions {
 }
 
 impl Default for DetectorOptions {
-    /// Returns [`DEFAULT_ONNX_RUNTIME`] and [`DEFAULT_MODELS`] on the CPU, with a thread for each core.
+    /// Returns [`DEFAULT_ONNX_RUNTIME`] and [`DEFAULT_MODELS`] on the CPU, with a thread for each
+    /// core.
     fn default() -> Self {
         Self {
             onnx_runtime: DEFAULT_ONNX_RUNTIME.into(),
@@ -113,8 +114,8 @@ impl Detector {
     /// the lens circle of the frame is assumed. Blocks.
     ///
     /// # Errors
-    /// [`DetectorError::Model`] if a model of the profile cannot be loaded, [`DetectorError::Frame`]
-    /// if the frame does not fit the camera.
+    /// [`DetectorError::Model`] if a model of the profile cannot be loaded,
+    /// [`DetectorError::Frame`] if the frame does not fit the camera.
     pub fn detect(
         &self,
         frame: Arc<Frame>,

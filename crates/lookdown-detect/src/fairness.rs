@@ -1,5 +1,5 @@
-//! Fairness between clients: the identity of a client, its priority levels, and budgets of which one
-//! client may use half.
+//! Fairness between clients: the identity of a client, its priority levels, and budgets of which
+//! one client may use half.
 
 mod client;
 mod priority_level;

@@ -1,7 +1,8 @@
 #![doc = include_str!("../README.md")]
 //!
-//! [`Detector`] is the entrance for one process. The parts below it are for servers: [`pipeline`] has
-//! the engine and the queue of frames, [`inference`] the networks, [`imaging`] the remap tables.
+//! [`Detector`] is the entrance for one process. The parts below it are for servers: [`pipeline`]
+//! has the engine and the queue of frames, [`inference`] the networks, [`imaging`] the remap
+//! tables.
 
 pub mod detection;
 mod detector;

@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 //!
-//! [`DataSet`] reads the annotations, [`detect`] runs a detector on them, [`Summary`] has the figures.
+//! [`DataSet`] reads the annotations, [`detect`] runs a detector on them, [`Summary`] has the
+//! figures.
 
 mod average_precision;
 mod counts;

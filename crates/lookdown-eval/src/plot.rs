@@ -38,7 +38,6 @@ pub enum PlotError {
 impl LinePlot {
     /// Returns the plot as an SVG document.
     ///
-    ///
     /// # Errors
     /// [`PlotError`] if there are too many lines.
     pub fn svg(&self) -> Result<String, PlotError> {
@@ -51,7 +50,6 @@ impl LinePlot {
     }
 
     /// Returns the plot as a PNG file.
-    ///
     ///
     /// # Errors
     /// [`PlotError`] if there are too many lines.

@@ -7,8 +7,8 @@
 //! So a request that may make changes is refused unless its `Origin` is the server itself or one of
 //! the allowed ones. Requests for a public host name are refused unless the settings list it, and
 //! images for pages of other sites unless their origin is allowed. A server that only its own
-//! machine reaches also refuses requests that a proxy forwarded: the clients of a proxy are on other
-//! machines. API keys make these checks unnecessary: browsers do not add them on their own.
+//! machine reaches also refuses requests that a proxy forwarded: the clients of a proxy are on
+//! other machines. API keys make these checks unnecessary: browsers do not add them on their own.
 
 use std::{net::IpAddr, sync::Arc};
 

@@ -52,8 +52,8 @@ pub async fn of_api_page(response: Response) -> Response {
     with_policy(response, API_PAGE_POLICY)
 }
 
-/// Permits pages of other origins to show a response. A server with `access.cors_origins` refuses the
-/// requests of other pages itself.
+/// Permits pages of other origins to show a response. A server with `access.cors_origins` refuses
+/// the requests of other pages itself.
 #[expect(clippy::unused_async, reason = "layers of axum are async")]
 pub async fn for_other_origins(mut response: Response) -> Response {
     let policy = HeaderValue::from_static("cross-origin");

@@ -30,8 +30,8 @@ use self::{
 };
 use crate::Shutdown;
 
-/// Longest time for the handshake, and for the head, on a connection beyond the limit. A probe needs
-/// milliseconds of CPU time, which it may wait for beside a flood of handshakes.
+/// Longest time for the handshake, and for the head, on a connection beyond the limit. A probe
+/// needs milliseconds of CPU time, which it may wait for beside a flood of handshakes.
 const TIMEOUT_BEYOND_LIMIT: Duration = Duration::from_secs(2);
 
 /// The services that answer. Each request carries the address of its client, a
@@ -49,7 +49,8 @@ pub trait Handshake: Send + Sync + 'static {
     /// The encrypted connection.
     type Stream: AsyncRead + AsyncWrite + Send + Unpin;
 
-    /// Returns the connection, or `None` if the handshake fails or takes longer than `max_duration`.
+    /// Returns the connection, or `None` if the handshake fails or takes longer than
+    /// `max_duration`.
     fn accept(
         &self,
         connection: TcpStream,

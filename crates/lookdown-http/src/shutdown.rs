@@ -32,8 +32,8 @@ impl Default for Shutdown {
 
 impl Shutdown {
     /// Creates a shutdown that SIGTERM and SIGINT request, the latter without a grace period. From
-    /// now on these signals no longer end the process by themselves, and SIGUSR1 and SIGUSR2 have no
-    /// effect. Needs a tokio runtime.
+    /// now on these signals no longer end the process by themselves, and SIGUSR1 and SIGUSR2 have
+    /// no effect. Needs a tokio runtime.
     ///
     /// # Errors
     /// If the operating system refuses a handler.
@@ -41,7 +41,8 @@ impl Shutdown {
         let shutdown = Self::default();
         let mut terminate = signal(SignalKind::terminate())?;
         let mut interrupt = signal(SignalKind::interrupt())?;
-        // A handler stays for the life of the process: without one these signals would end it at once.
+        // A handler stays for the life of the process: without one these signals would end it at
+        // once.
         drop(signal(SignalKind::user_defined1())?);
         drop(signal(SignalKind::user_defined2())?);
         let asked = shutdown.clone();

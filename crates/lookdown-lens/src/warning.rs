@@ -36,11 +36,13 @@ macro_rules! warnings {
 }
 
 warnings! {
-    /// The frame was rotated according to its EXIF orientation; boxes are in pixels of the rotated frame.
+    /// The frame was rotated according to its EXIF orientation; boxes are in pixels of the rotated
+    /// frame.
     FrameRotated = "frame-rotated";
     /// The request named no calibration: the lens was assumed from the lens circle of the frame.
     LensAssumed = "lens-assumed";
-    /// The frame shows no lens circle: the assumed circle is the largest one in the middle of the frame.
+    /// The frame shows no lens circle: the assumed circle is the largest one in the middle of the
+    /// frame.
     LensCircleNotFound = "lens-circle-not-found";
     /// The calibration file does not name its lens model: the reader chose one.
     LensModelAssumed = "lens-model-assumed";

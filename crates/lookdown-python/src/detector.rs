@@ -22,8 +22,8 @@ pub(crate) struct PyDetector {
 
 #[pymethods]
 impl PyDetector {
-    /// Loads the models of the parameters, which are those of `POST /detect`. `config` is a settings
-    /// file.
+    /// Loads the models of the parameters, which are those of `POST /detect`. `config` is a
+    /// settings file.
     #[new]
     #[pyo3(signature = (parameters, config=None))]
     fn new(

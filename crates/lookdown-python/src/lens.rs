@@ -6,7 +6,8 @@ use pyo3::prelude::*;
 
 use crate::arrays::{array, rows};
 
-/// A fisheye lens. The center of the top-left pixel is (0, 0); rays are in the camera frame of OpenCV.
+/// A fisheye lens. The center of the top-left pixel is (0, 0); rays are in the camera frame of
+/// OpenCV.
 #[pyclass(name = "Lens", module = "lookdown", frozen)]
 pub(crate) struct PyLens(pub Lens);
 

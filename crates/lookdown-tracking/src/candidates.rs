@@ -69,8 +69,8 @@ pub(super) fn candidates<'a>(
     without_parts(candidates, settings.least_score_in_line)
 }
 
-/// Drops persons below a score that may be a part of a stronger one, or the same one again. They come
-/// in order of falling scores.
+/// Drops persons below a score that may be a part of a stronger one, or the same one again. They
+/// come in order of falling scores.
 fn without_parts(candidates: Vec<Candidate>, least_score: f64) -> Vec<Candidate> {
     let mut kept: Vec<Candidate> = Vec::new();
     for candidate in candidates {

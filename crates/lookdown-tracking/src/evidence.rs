@@ -4,10 +4,11 @@
 //! section 6.2: logarithms of likelihood ratios add up. The score of a person is a probability, so
 //! its log odds are what one person adds. But only independent errors add up:
 //!
-//! * Frames in quick succession are alike, so a report counts by the time since the camera's last one.
-//! * A thing that stands still looks the same in every frame. However often it is seen, it counts as
-//!   a few reports of its mean score, and what it did before fades. A poster with a score of .3 thus
-//!   never becomes a person, not even when the track of a passer-by stays on it.
+//! * Frames in quick succession are alike, so a report counts by the time since the camera's last
+//!   one.
+//! * A thing that stands still looks the same in every frame. However often it is seen, it counts
+//!   as a few reports of its mean score, and what it did before fades. A poster with a score of .3
+//!   thus never becomes a person, not even when the track of a passer-by stays on it.
 //!
 //! A thing with a higher score is a person for this test. What stands for hours is left to
 //! [`furniture`](crate::furniture), which continues with tracks that never left their first place.

@@ -2,8 +2,8 @@
 //!
 //! After a search, motion where no person was needs another search. Motion at a person needs a crop
 //! where that person is expected; people without motion stay as they were. A crop has one vote
-//! instead of those of all views, so that each person keeps the odds that the search gave it relative
-//! to its first crop. The caller detects motion, places crops and finds people in them.
+//! instead of those of all views, so that each person keeps the odds that the search gave it
+//! relative to its first crop. The caller detects motion, places crops and finds people in them.
 
 mod boxes;
 mod found_person;
@@ -24,7 +24,8 @@ pub use self::{
 
 /// Time from a search to the next one, seconds: a little less than a second, because frames jitter.
 pub const SEARCH_EVERY_S: f64 = 0.9;
-/// Cells with motion belong to the same motion if at most this many cells less one lie between them.
+/// Cells with motion belong to the same motion if at most this many cells less one lie between
+/// them.
 pub const JOINED_CELLS: f64 = 2.0;
 
 /// The people of a camera since the last search of its frame.
@@ -34,8 +35,8 @@ pub struct FollowedPeople<P> {
 }
 
 impl<P: FoundPerson> FollowedPeople<P> {
-    /// Takes the people of a search at `at_s` (seconds), with the motion of those before it. A person
-    /// in motion whom the search has missed is expected for a second.
+    /// Takes the people of a search at `at_s` (seconds), with the motion of those before it. A
+    /// person in motion whom the search has missed is expected for a second.
     #[must_use]
     pub fn of_search(persons: &[P], at_s: f64, before: Option<&Self>) -> Self {
         let before = before.map(|before| before.targets.as_slice());
@@ -93,9 +94,9 @@ impl<P: FoundPerson> FollowedPeople<P> {
         targets.map(move |(target, _)| (&target.person, target.expected(at_s)))
     }
 
-    /// Confirms people in motion by those found in crops at `at_s` (seconds). Others that were found
-    /// become people of their own from `least_score` on. `place` returns a found person with another
-    /// score and another oriented box.
+    /// Confirms people in motion by those found in crops at `at_s` (seconds). Others that were
+    /// found become people of their own from `least_score` on. `place` returns a found person with
+    /// another score and another oriented box.
     pub fn confirm(
         &mut self,
         moving: &[bool],

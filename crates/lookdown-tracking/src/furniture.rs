@@ -1,11 +1,12 @@
 //! Memory of a place: what has stood at one place with one shape for hours is furniture.
 //!
 //! The evidence of a track (`evidence.rs`) ends with the track, and counts a thing that stands
-//! still as a few reports. This memory begins where the evidence ends: a track that is confirmed and
-//! never moved on from its first place starts a [`Thing`], whose time of presence adds up over tracks.
+//! still as a few reports. This memory begins where the evidence ends: a track that is confirmed
+//! and never moved on from its first place starts a [`Thing`], whose time of presence adds up over
+//! tracks.
 //!
-//! A person who sits moves: the smoothed box leaves its first place or changes its size, and the time
-//! begins again. `docs/lab/count-accuracy.md` has the measured motions of things and persons.
+//! A person who sits moves: the smoothed box leaves its first place or changes its size, and the
+//! time begins again. `docs/lab/count-accuracy.md` has the measured motions of things and persons.
 
 use serde::{Deserialize, Serialize};
 
@@ -245,7 +246,8 @@ impl Furniture {
         self.decide(id, ThingState::Confirmed)
     }
 
-    /// Counts a thing as a person, as long as it stays there. Returns false for an unknown identifier.
+    /// Counts a thing as a person, as long as it stays there. Returns false for an unknown
+    /// identifier.
     pub fn take_back(&mut self, id: u64) -> bool {
         self.decide(id, ThingState::TakenBack)
     }
@@ -256,8 +258,8 @@ impl Furniture {
         thing.map(|thing| thing.state = state).is_some()
     }
 
-    /// Updates the things with the persons of a report, `observed_s` after the last one. Returns the
-    /// thing that each person shows.
+    /// Updates the things with the persons of a report, `observed_s` after the last one. Returns
+    /// the thing that each person shows.
     pub(super) fn update(
         &mut self,
         persons: &[&Observation],

@@ -118,7 +118,8 @@ impl Kalman {
     }
 }
 
-/// The matrix that takes the place `lag` seconds ago from the state: place minus velocity times lag.
+/// The matrix that takes the place `lag` seconds ago from the state: place minus velocity times
+/// lag.
 fn observation_matrix(lag: f64) -> Matrix2x4<f64> {
     let mut matrix = Matrix2x4::identity();
     matrix.fixed_view_mut::<2, 2>(0, 2).fill_diagonal(-lag);

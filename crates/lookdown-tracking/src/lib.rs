@@ -1,8 +1,8 @@
 #![doc = include_str!("../README.md")]
 //!
-//! [`Tracker`] turns [`Observation`]s into tracks, [`lines`] counts crossings, [`zones`] occupancy and
-//! dwell times, [`heat_map`] seconds of presence. [`furniture`] is what never moves. [`follow`] tells where to look for
-//! people between searches of a frame.
+//! [`Tracker`] turns [`Observation`]s into tracks, [`lines`] counts crossings, [`zones`] occupancy
+//! and dwell times, [`heat_map`] seconds of presence. [`furniture`] is what never moves. [`follow`]
+//! tells where to look for people between searches of a frame.
 
 mod assignment;
 mod camera;

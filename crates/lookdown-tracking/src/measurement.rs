@@ -37,9 +37,9 @@ pub(super) struct Measurement {
 impl Measurement {
     /// Returns the measurement on the floor; `None` without a finite place.
     ///
-    /// An error of the angle moves the place radially by `(r² + h²) / h` and across by
-    /// `sqrt(r² + h²)` per radian: the derivatives of `r = h tan(angle)`. The lower end of the box is
-    /// the near side of the feet, so the body's axis lies farther out.
+    /// An error of the angle moves the place radially by `(r² + h²) / h` and across by `sqrt(r² +
+    /// h²)` per radian: the derivatives of `r = h tan(angle)`. The lower end of the box is the near
+    /// side of the feet, so the body's axis lies farther out.
     pub fn on_floor(
         person: &Observation,
         camera: &CameraPose,

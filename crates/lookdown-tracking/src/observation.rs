@@ -5,7 +5,8 @@
 pub struct Observation {
     /// Place on the floor in meters (x, y of the camera); absent without the camera's height.
     pub floor_m: Option<[f64; 2]>,
-    /// Direction of the person's center: clockwise from the top of the frame, in degrees (0 to 360).
+    /// Direction of the person's center: clockwise from the top of the frame, in degrees (0 to
+    /// 360).
     pub azimuth_deg: f64,
     /// Angle between that direction and the optical axis, in degrees (0 to 180).
     pub off_axis_deg: f64,

@@ -1,9 +1,9 @@
 //! The place of a camera on the floor of another, from the people who walk through both views.
 //!
-//! Two walks that overlap in time are taken for the same person, which gives a rotation and a shift of
-//! the floor (least squares, S. Umeyama, "Least-squares estimation of transformation parameters between
-//! two point patterns", IEEE TPAMI 13 (4), 1991, without scale). The pair whose rotation and shift most
-//! other walks agree with wins, and is fitted again to all of these.
+//! Two walks that overlap in time are taken for the same person, which gives a rotation and a shift
+//! of the floor (least squares, S. Umeyama, "Least-squares estimation of transformation parameters
+//! between two point patterns", IEEE TPAMI 13 (4), 1991, without scale). The pair whose rotation
+//! and shift most other walks agree with wins, and is fitted again to all of these.
 
 use nalgebra::{Rotation2, Vector2};
 
@@ -13,8 +13,8 @@ const STEP_S: f64 = 0.5;
 const MAX_GAP_S: f64 = 2.0;
 /// Common steps of two walks that may be the same person.
 const LEAST_STEPS: usize = 6;
-/// Standard deviation of the places of a walk that tells a direction, meters: a person who stands fits
-/// any rotation.
+/// Standard deviation of the places of a walk that tells a direction, meters: a person who stands
+/// fits any rotation.
 const LEAST_SPREAD_M: f64 = 0.5;
 /// Mean distance of the places of one person from two cameras, meters.
 const MAX_DISTANCE_M: f64 = 0.6;
@@ -31,7 +31,8 @@ const ROUNDS: usize = 5;
 /// The largest difference of the floors' scales.
 const MAX_SCALE_ERROR: f64 = 0.15;
 
-/// The walk of a person over the floor of a camera: times in seconds, in order, and places in meters.
+/// The walk of a person over the floor of a camera: times in seconds, in order, and places in
+/// meters.
 pub type Walk = Vec<(f64, [f64; 2])>;
 
 /// The place of a camera on the floor of another.
@@ -196,8 +197,8 @@ fn scale(pairs: &[&Pair]) -> f64 {
     (spread(|pair| &pair.first) / spread(|pair| &pair.second)).sqrt()
 }
 
-/// Standard deviations of the position in meters and of the rotation in degrees: the jackknife, with
-/// one walk left out at a time.
+/// Standard deviations of the position in meters and of the rotation in degrees: the jackknife,
+/// with one walk left out at a time.
 fn deviations(pairs: &[&Pair], all: &Motion) -> (f64, f64) {
     let (mut shifts, mut angles) = (0.0, 0.0);
     for left_out in 0..pairs.len() {

@@ -24,7 +24,8 @@ pub const MAX_CAMERAS: usize = 64;
 /// of the chi-squared distribution with two degrees of freedom.
 const GATE: f64 = 13.8;
 
-/// A tracker of one camera or one site. Serializable: stored with the counts, it survives a restart.
+/// A tracker of one camera or one site. Serializable: stored with the counts, it survives a
+/// restart.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Tracker {
     settings: TrackerSettings,
@@ -96,8 +97,8 @@ impl Tracker {
         })
     }
 
-    /// Limits the reports of a camera to areas on the floor of the site: it misses no person elsewhere.
-    /// Not stored.
+    /// Limits the reports of a camera to areas on the floor of the site: it misses no person
+    /// elsewhere. Not stored.
     pub fn limit(&mut self, camera: usize, areas: Vec<Polygon>) {
         if let Some(camera) = self.cameras.get_mut(camera) {
             camera.areas = areas;
@@ -132,8 +133,8 @@ impl Tracker {
     /// Updates the tracks with the persons of one frame of the camera number `camera`, captured at
     /// `at_s` (seconds since the Unix epoch). Returns the confirmed tracks that ended.
     ///
-    /// `elapsed_s` is the time since the camera's last report by a clock that never jumps: furniture
-    /// is observed no longer than that.
+    /// `elapsed_s` is the time since the camera's last report by a clock that never jumps:
+    /// furniture is observed no longer than that.
     ///
     /// Reports of several cameras may arrive in any order within
     /// [`TrackerSettings::max_lateness_s`]; those of one camera are in order of time.
@@ -207,8 +208,8 @@ impl Tracker {
         last.map_or(f64::INFINITY, |last| at_s - last)
     }
 
-    /// Continues tracks with persons in the three steps of `ByteTrack`: high scores, low scores, then
-    /// tracks without confirmation. Returns true for each candidate that continued a track.
+    /// Continues tracks with persons in the three steps of `ByteTrack`: high scores, low scores,
+    /// then tracks without confirmation. Returns true for each candidate that continued a track.
     fn associate(&mut self, report: &CurrentReport, candidates: &[Candidate]) -> Vec<bool> {
         let high = self.settings.high_score;
         let mut used = vec![false; candidates.len()];

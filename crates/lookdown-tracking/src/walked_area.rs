@@ -1,8 +1,8 @@
 //! The floor on which people walked, as a polygon.
 //!
-//! People walk, so the cells that they were in are connected. A thing that looks like a person stays in
-//! a few cells of its own, however long. The largest connected part of the heat map thus is the floor
-//! of the room.
+//! People walk, so the cells that they were in are connected. A thing that looks like a person
+//! stays in a few cells of its own, however long. The largest connected part of the heat map thus
+//! is the floor of the room.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -22,9 +22,9 @@ pub const LEAST_WALKED_M2: f64 = 2.0;
 /// Directions in which the area is measured, equal to its largest number of corners.
 const DIRECTIONS: u32 = 24;
 
-/// Returns the corners of the floor on which people walked and of 0.5 m around it, in meters, at most
-/// 24. `presence` has the milliseconds of presence per cell. `None` if less than [`LEAST_WALKED_M2`]
-/// are connected.
+/// Returns the corners of the floor on which people walked and of 0.5 m around it, in meters, at
+/// most 24. `presence` has the milliseconds of presence per cell. `None` if less than
+/// [`LEAST_WALKED_M2`] are connected.
 #[must_use]
 pub fn walked_area(presence: &BTreeMap<Cell, u64>) -> Option<Vec<[f64; 2]>> {
     let cells = largest_part(presence);

@@ -1,7 +1,8 @@
 //! Zones: occupancy, entries and dwell times.
 //!
-//! A person enters after a while inside and leaves after a while outside (the hold), so that a track
-//! that trembles at the outline does not flap. Times are those of the first and last place inside.
+//! A person enters after a while inside and leaves after a while outside (the hold), so that a
+//! track that trembles at the outline does not flap. Times are those of the first and last place
+//! inside.
 
 use std::collections::BTreeMap;
 

@@ -64,8 +64,8 @@ impl AsRef<[u8]> for Reserved {
 }
 
 impl Reservation {
-    /// Returns the bytes with this reservation. It is released with their last clone, as a connection
-    /// may still send a frame whose response has arrived.
+    /// Returns the bytes with this reservation. It is released with their last clone, as a
+    /// connection may still send a frame whose response has arrived.
     ///
     /// # Errors
     /// [`Exhausted`].

@@ -1,5 +1,5 @@
-//! The caller of a request: the client whose share of the budgets it uses, and its highest permitted
-//! priority.
+//! The caller of a request: the client whose share of the budgets it uses, and its highest
+//! permitted priority.
 
 use std::net::{IpAddr, SocketAddr};
 

@@ -47,8 +47,8 @@ pub(in crate::api) fn of_panic(_: Box<dyn Any + Send>) -> Response {
     Problem::fault().into_response()
 }
 
-/// Adds the context of the request, the request ID, the access log line, the metrics and the problem
-/// document.
+/// Adds the context of the request, the request ID, the access log line, the metrics and the
+/// problem document.
 pub(in crate::api) async fn wrap(
     State(Envelope { metrics, contexts }): State<Envelope>,
     request: Request,

@@ -32,8 +32,8 @@ pub(in crate::api) use failures::with_failures;
 /// Detect persons (DeepStack)
 ///
 /// Without a calibration, the lens circle is detected in the frame. An ideal 180° equidistant lens
-/// that points straight down is assumed. Unknown fields are ignored. The query may have the parameters
-/// of `POST /detect`, such as `profile` and `camera`; unknown ones are refused.
+/// that points straight down is assumed. Unknown fields are ignored. The query may have the
+/// parameters of `POST /detect`, such as `profile` and `camera`; unknown ones are refused.
 #[utoipa::path(
     post, path = "/v1/vision/detection", tag = "deepstack", operation_id = "detect_as_deepstack",
     params(DetectionQuery),

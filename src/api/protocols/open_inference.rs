@@ -2,8 +2,8 @@
 //! (the extension `binary_tensor_data`). Source: the repository `open-inference-protocol`, and the
 //! extensions as Triton Inference Server describes them.
 //!
-//! The model `lookdown` accepts frames and returns their persons. Each loaded detector accepts views
-//! and returns its detections.
+//! The model `lookdown` accepts frames and returns their persons. Each loaded detector accepts
+//! views and returns its detections.
 
 mod answer;
 mod content_encoding;

@@ -39,8 +39,8 @@ const MAX_BYTES: usize = 16 << 10;
 #[serde(deny_unknown_fields)]
 #[schema(example = json!({ "url": "rtsp://10.0.0.8:554/stream2", "user": "viewer", "password": "secret" }))]
 pub(in crate::api) struct NewCamera {
-    /// The URL of the source: `rtsp`, `rtsps`, `http` or `https`, without user and password. Without
-    /// it, the stored URL stays.
+    /// The URL of the source: `rtsp`, `rtsps`, `http` or `https`, without user and password.
+    /// Without it, the stored URL stays.
     #[serde(default)]
     url: String,
     /// The user name.

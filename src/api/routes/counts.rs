@@ -1,4 +1,5 @@
-//! Counts and furniture on the port of the server: those of this process, or of a `lookdown count` on another host.
+//! Counts and furniture on the port of the server: those of this process, or of a `lookdown count`
+//! on another host.
 
 use std::time::Duration;
 
@@ -89,7 +90,8 @@ async fn answer(state: &ApiState, request: Request) -> Result<Response, Problem>
     }
 }
 
-/// Returns the request without the parameters of its path here, which the routes would add theirs to.
+/// Returns the request without the parameters of its path here, which the routes would add theirs
+/// to.
 fn without_extensions(request: Request) -> Request {
     let (parts, body) = request.into_parts();
     let mut request = Request::new(body);

@@ -55,8 +55,8 @@ struct CalibrationHealth {
     problem_count: usize,
     /// These files, at most 100; empty for clients that may not read calibrations.
     problems: Vec<FileProblem>,
-    /// The reason why the calibration store cannot be read, if it cannot. Without details for clients
-    /// that may not read calibrations.
+    /// The reason why the calibration store cannot be read, if it cannot. Without details for
+    /// clients that may not read calibrations.
     #[serde(skip_serializing_if = "Option::is_none")]
     store_problem: Option<String>,
 }
@@ -151,8 +151,8 @@ pub(in crate::api) async fn metrics(
     Ok(([(CONTENT_TYPE, "text/plain; version=0.0.4")], text))
 }
 
-/// Sets the gauges that are read and not counted: an age, lengths of queues, and the use of a result
-/// store that other servers change, too.
+/// Sets the gauges that are read and not counted: an age, lengths of queues, and the use of a
+/// result store that other servers change, too.
 async fn read_gauges(state: &ApiState) {
     let (metrics, workers) = (&state.metrics, &state.workers);
     metrics.pending_frames.set(gauge_value(workers.pending()));

@@ -1,4 +1,5 @@
-//! Reasons for which a calibration cannot be used or was not changed, or for which the outcome is unknown.
+//! Reasons for which a calibration cannot be used or was not changed, or for which the outcome is
+//! unknown.
 
 use lookdown_lens::calibration::{CalibrationId, FormatError};
 

@@ -1,6 +1,6 @@
-//! The calibrations of the sample frames, built into the program as `sample-NAME`: the first request
-//! and the web page show floor positions with them. Lists of calibrations leave them out. A file of
-//! the same ID in the store takes their place.
+//! The calibrations of the sample frames, built into the program as `sample-NAME`: the first
+//! request and the web page show floor positions with them. Lists of calibrations leave them out. A
+//! file of the same ID in the store takes their place.
 
 use std::{
     collections::HashMap,

@@ -19,7 +19,8 @@ pub(super) fn write_native(
     write_content(&Target::Native.write(calibration)?.content, out)
 }
 
-/// Writes the content of a calibration file into the file of `--out`, by default to standard output.
+/// Writes the content of a calibration file into the file of `--out`, by default to standard
+/// output.
 pub(super) fn write_content(content: &str, out: Option<&Path>) -> anyhow::Result<()> {
     match out {
         Some(out) => fs::write(out, content)

@@ -98,8 +98,8 @@ impl Source {
         }
     }
 
-    /// Reads the only camera of the file, or the requested one, as the content of a native file with
-    /// this ID or its own one. Returns the notes of the reader, too.
+    /// Reads the only camera of the file, or the requested one, as the content of a native file
+    /// with this ID or its own one. Returns the notes of the reader, too.
     pub(super) fn read_native(
         &self,
         id: Option<&CalibrationId>,

@@ -21,7 +21,8 @@ pub(in crate::cli) struct Arguments {
     /// visibility; may be repeated
     #[arg(long, value_name = "NAME", conflicts_with = "sweep", value_parser = one_of::<Stratification>())]
     pub(super) by: Vec<Stratification>,
-    /// Trade-off between accuracy and cost; may be repeated [default: balanced; with --sweep: paper]
+    /// Trade-off between accuracy and cost; may be repeated [default: balanced; with --sweep:
+    /// paper]
     #[arg(long, value_name = "NAME", value_parser = one_of::<Profile>())]
     pub(super) profile: Vec<Profile>,
     /// Method that merges overlapping boxes into persons; may be repeated [default: all of them]

@@ -21,9 +21,9 @@ use crate::{
 
 /// The data set that the inputs are compared on: frames with annotated persons.
 const SAMPLES: &str = "samples";
-/// Average precision below which a network is taken for one that does not detect persons: three times
-/// that of the best of 240 networks of random weights with the best input, and a sixth of that of the
-/// worst installed network (docs/models.md).
+/// Average precision below which a network is taken for one that does not detect persons: three
+/// times that of the best of 240 networks of random weights with the best input, and a sixth of
+/// that of the worst installed network (docs/models.md).
 const LEAST_PRECISION: f64 = 0.1;
 
 /// The parts of a manifest that do not depend on the input.
@@ -35,8 +35,8 @@ struct Guess<'a> {
     is_open: bool,
 }
 
-/// Writes the manifest of an ONNX file. Detects the persons of the samples with each usual input, and
-/// keeps the one with the highest average precision.
+/// Writes the manifest of an ONNX file. Detects the persons of the samples with each usual input,
+/// and keeps the one with the highest average precision.
 pub(super) fn write(model: &Path, settings: &Settings) -> anyhow::Result<()> {
     let (Some(file), true) = (
         model.file_name().and_then(|name| name.to_str()),

@@ -1,5 +1,5 @@
-//! Events of the counts: crossings, and the first person after none. They follow from two successive
-//! snapshots, so that only stored crossings are published.
+//! Events of the counts: crossings, and the first person after none. They follow from two
+//! successive snapshots, so that only stored crossings are published.
 
 use std::{collections::HashMap, time::Duration};
 

@@ -5,8 +5,8 @@ use lookdown_common::text::is_camera_name;
 
 use crate::results::{NewReport, StoredReport};
 
-/// Parses a message: the ID, the time of arrival, the number of persons, the JSON and the camera, in
-/// lines of their own. Returns `None` for the message of another program.
+/// Parses a message: the ID, the time of arrival, the number of persons, the JSON and the camera,
+/// in lines of their own. Returns `None` for the message of another program.
 pub(super) fn parse(message: Vec<u8>) -> Option<StoredReport> {
     let message = Bytes::from(message);
     let mut parts = message.splitn(5, |&byte| byte == b'\n');
@@ -27,7 +27,8 @@ pub(super) fn parse(message: Vec<u8>) -> Option<StoredReport> {
     })
 }
 
-/// Returns false for JSON with line ends: each line would be an event of its own in an event stream.
+/// Returns false for JSON with line ends: each line would be an event of its own in an event
+/// stream.
 pub(super) fn is_one_line(json: &[u8]) -> bool {
     !json.iter().any(|byte| matches!(byte, b'\r' | b'\n'))
 }

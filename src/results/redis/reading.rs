@@ -175,8 +175,8 @@ impl Reader<'_> {
         Ok(stored())
     }
 
-    /// Stores the followed number of a camera for as long as it is valid. Returns false for a camera
-    /// without a report.
+    /// Stores the followed number of a camera for as long as it is valid. Returns false for a
+    /// camera without a report.
     pub(super) async fn follow(
         &mut self,
         camera: &str,

@@ -1,4 +1,5 @@
-//! The manifests of the families in the documentation, with networks in the layout of their exports.
+//! The manifests of the families in the documentation, with networks in the layout of their
+//! exports.
 
 use std::fs;
 

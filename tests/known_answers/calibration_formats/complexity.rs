@@ -1,10 +1,10 @@
 //! A search for inputs whose parsing takes more than linear time.
 //!
 //! Each recipe inserts one kind of filler into a calibration file: repeated, nested, numbered or
-//! long. Each is grown by a factor of eight, and so may be its time, with a margin for noise. No limit
-//! is absolute, so that the test holds on slow machines. `LOOKDOWN_COMPLEXITY=long` uses every file,
-//! more positions and pairs of the slowest recipes at the size of the largest permitted file, which
-//! may take one second in the release build.
+//! long. Each is grown by a factor of eight, and so may be its time, with a margin for noise. No
+//! limit is absolute, so that the test holds on slow machines. `LOOKDOWN_COMPLEXITY=long` uses
+//! every file, more positions and pairs of the slowest recipes at the size of the largest permitted
+//! file, which may take one second in the release build.
 
 use std::{collections::BTreeMap, env, fs, thread, time::Duration};
 
@@ -187,8 +187,8 @@ fn processor_time() -> Duration {
     Duration::try_from(clock_gettime(ClockId::ThreadCPUTime)).unwrap()
 }
 
-/// Returns positions of different kinds in a file: its start, and behind its middle line end, colon,
-/// digit and so on.
+/// Returns positions of different kinds in a file: its start, and behind its middle line end,
+/// colon, digit and so on.
 fn positions(file: &str, is_long: bool) -> Vec<usize> {
     let wanted = ['\n', ':', '7', '[', '{', '"', '>'];
     let wanted = &wanted[..if is_long { wanted.len() } else { 4 }];

@@ -35,7 +35,8 @@ use crate::{
     time_span::TimeSpan,
 };
 
-/// Most values of an answer: steps times directions of lines and zones. An answer has 12 MB at most.
+/// Most values of an answer: steps times directions of lines and zones. An answer has 12 MB at
+/// most.
 pub(crate) const MAX_VALUES: usize = 100_000;
 
 /// The counts of a camera or a site.

@@ -31,7 +31,8 @@ pub(super) struct TimeParameters {
     /// A duration of whole minutes, up to a week, such as `1h`; `15m` if absent.
     #[param(nullable = false)]
     step: Option<String>,
-    /// The time zone of `today`, `yesterday` and `week`, such as `Europe/Berlin`; that of this machine if absent.
+    /// The time zone of `today`, `yesterday` and `week`, such as `Europe/Berlin`; that of this
+    /// machine if absent.
     #[param(nullable = false)]
     time_zone: Option<String>,
     /// `json` or `csv`; `Accept: text/csv` if absent.

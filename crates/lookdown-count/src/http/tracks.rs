@@ -28,7 +28,8 @@ use crate::{
 /// Longest tail of an answer, seconds.
 const TAIL_S: f64 = 5.0;
 
-/// Parts of a line or of an edge of a zone in the frame: a straight line on the floor is a curve there.
+/// Parts of a line or of an edge of a zone in the frame: a straight line on the floor is a curve
+/// there.
 const OUTLINE_SEGMENTS: u32 = 16;
 
 /// The current tracks of a camera or a site.

@@ -72,8 +72,8 @@ impl Store {
         Ok(transaction.commit()?)
     }
 
-    /// Stores a calibration, and removes those that are forgotten. `content` is `None` if the server
-    /// has none with this ID. Blocks.
+    /// Stores a calibration, and removes those that are forgotten. `content` is `None` if the
+    /// server has none with this ID. Blocks.
     pub(crate) fn put_calibration(
         &self,
         id: &str,
@@ -101,8 +101,8 @@ impl Store {
         Ok(())
     }
 
-    /// Removes sums of minutes and days that ended before this time: those of the oldest day at most,
-    /// so that a clock that is ahead for a while does not remove all of them. Blocks.
+    /// Removes sums of minutes and days that ended before this time: those of the oldest day at
+    /// most, so that a clock that is ahead for a while does not remove all of them. Blocks.
     pub(crate) fn expire(&self, before_ms: i64) -> Result<(), StoreError> {
         const MINUTES_OF_A_DAY: i64 = DAY_MS / MINUTE_MS;
         let minute = before_ms.div_euclid(MINUTE_MS);

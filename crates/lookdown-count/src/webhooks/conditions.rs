@@ -19,11 +19,11 @@ pub(crate) struct Conditions {
     holding: BTreeSet<(usize, String)>,
     /// True if the stored state is another one.
     is_changed: bool,
-    /// Last report of each camera, milliseconds since the Unix epoch, but no later than its arrival:
-    /// a camera whose report is of the future may be silent all the same.
+    /// Last report of each camera, milliseconds since the Unix epoch, but no later than its
+    /// arrival: a camera whose report is of the future may be silent all the same.
     reports: BTreeMap<String, i64>,
-    /// Time of the start, milliseconds since the Unix epoch. No camera is silent for longer: reports
-    /// of the time before may still arrive.
+    /// Time of the start, milliseconds since the Unix epoch. No camera is silent for longer:
+    /// reports of the time before may still arrive.
     started_ms: i64,
 }
 

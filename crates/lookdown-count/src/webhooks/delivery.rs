@@ -220,8 +220,8 @@ impl Receiver {
 }
 
 impl Images {
-    /// Returns the body of a message, with the latest image of its camera if the webhook wants one and
-    /// the message is recent. Images are not stored.
+    /// Returns the body of a message, with the latest image of its camera if the webhook wants one
+    /// and the message is recent. Images are not stored.
     async fn added_to(&self, message: &Message) -> String {
         let age_s = Timestamp::now().as_second() - message.created_s;
         if !self.webhooks.contains(&message.webhook) || age_s > IMAGE_AGE_S {

@@ -3,8 +3,8 @@
 /// Least change of a cell's mean, in gray levels (0 to 255), that counts as motion. The noise of a
 /// mean is below 1.
 pub(super) const MOVED_LEVELS: u8 = 4;
-/// Least change of a cell's mean by a person who was not there. Clothes differ from the floor by tens,
-/// parted ends of shadows by less than this.
+/// Least change of a cell's mean by a person who was not there. Clothes differ from the floor by
+/// tens, parted ends of shadows by less than this.
 pub const NEW_LEVELS: u8 = 10;
 /// Most cells that noise of a video encoder changes, each by less than `NEW_LEVELS` and none beside
 /// another one.

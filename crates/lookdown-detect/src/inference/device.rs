@@ -18,7 +18,8 @@ pub enum Device {
     /// An NVIDIA GPU, by its number, with `TensorRT`. Operators without `TensorRT` support run with
     /// CUDA.
     TensorRt(i32),
-    /// A device of Intel, with `OpenVINO`. Operators without `OpenVINO` support run on the processor.
+    /// A device of Intel, with `OpenVINO`. Operators without `OpenVINO` support run on the
+    /// processor.
     OpenVino(OpenVinoDevice),
 }
 

@@ -42,8 +42,8 @@ impl Staging {
         batch.values().chunks(views.max(1) * input.view_len())
     }
 
-    /// Runs a network on all views of a batch, piece by piece, and collects what it finds in each view:
-    /// at most `max_per_view` candidates, best first.
+    /// Runs a network on all views of a batch, piece by piece, and collects what it finds in each
+    /// view: at most `max_per_view` candidates, best first.
     pub(super) fn run_pieces(
         &mut self,
         batch: &ViewBatch,

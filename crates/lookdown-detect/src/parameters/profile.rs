@@ -67,8 +67,8 @@ impl Profile {
         self.max_crops() > 0
     }
 
-    /// Returns the maximum number of upright crops in the pass that follows the views of the plan, 0
-    /// without such a pass.
+    /// Returns the maximum number of upright crops in the pass that follows the views of the plan,
+    /// 0 without such a pass.
     pub(crate) fn max_crops(self) -> usize {
         match self {
             Self::Fast => 5,

@@ -2,8 +2,8 @@
 //!
 //! In fusion, the vote of a supporting view is its score × its IoU with the fused box. The merged
 //! score of a clearly visible person is therefore far below 1. The odds of a person grow with a
-//! power of the odds of the merged score (Platt scaling on the logit of the score). `docs/lab/results.md`
-//! has the reliability of the results. The order of persons does not change.
+//! power of the odds of the merged score (Platt scaling on the logit of the score).
+//! `docs/lab/results.md` has the reliability of the results. The order of persons does not change.
 
 use super::Tuning;
 use crate::detection::Refinement;

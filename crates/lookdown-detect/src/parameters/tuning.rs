@@ -14,8 +14,8 @@ pub struct Tuning {
     pub odds_power: f64,
     /// The share of a crop's side that the larger side of a person's box fills, 0.05 to 0.9.
     pub crop_fill: f64,
-    /// The factor for scores from crops, in which persons lean by up to 45° and more, above 0 and at
-    /// most 1. Where many upright views see a person, they give better scores, and crops give
+    /// The factor for scores from crops, in which persons lean by up to 45° and more, above 0 and
+    /// at most 1. Where many upright views see a person, they give better scores, and crops give
     /// better extents.
     pub crop_vote: f64,
 }

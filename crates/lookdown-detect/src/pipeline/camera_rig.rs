@@ -324,8 +324,8 @@ impl CameraRig {
         crops.chain(mosaics.iter().flat_map(Mosaic::crops))
     }
 
-    /// Returns the view whose vote a view shares: a mirrored crop shares that of its original, which
-    /// comes before it, and any other view has its own.
+    /// Returns the view whose vote a view shares: a mirrored crop shares that of its original,
+    /// which comes before it, and any other view has its own.
     pub(super) fn voter(&self, view: usize) -> usize {
         let Views::Crops(crops) = &self.views else {
             return view;

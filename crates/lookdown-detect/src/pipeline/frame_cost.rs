@@ -1,8 +1,9 @@
 //! The cost of a frame: the permits of `limits.max_frames_in_flight` that it takes.
 //!
 //! A frame of a usual size costs 1. Each 8 megapixels that are decoded, each 32 inputs of the
-//! network, and each 8 megapixels that are drawn add 1. A frame with more pixels than the limit also
-//! costs 1, because its header is enough to refuse it. No frame costs more than a client may use.
+//! network, and each 8 megapixels that are drawn add 1. A frame with more pixels than the limit
+//! also costs 1, because its header is enough to refuse it. No frame costs more than a client may
+//! use.
 
 use super::{ClientViewsJob, DetectJob};
 

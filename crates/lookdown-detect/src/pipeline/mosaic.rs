@@ -57,8 +57,8 @@ impl Mosaic {
         self.tiles.iter().map(|(_, table)| table)
     }
 
-    /// Renders the tiles into the slot `[3, height, width]` of the network's input. Places without a
-    /// tile are black.
+    /// Renders the tiles into the slot `[3, height, width]` of the network's input. Places without
+    /// a tile are black.
     pub(super) fn render(&self, frame: &Frame, input: &NetworkInput, slot: &mut [f32]) {
         for (plane, offset) in slot.chunks_exact_mut(input.plane_len()).zip(input.offset) {
             plane.fill(offset);
@@ -84,8 +84,8 @@ impl Mosaic {
         }
     }
 
-    /// Returns the crop whose tile holds the middle of a box, and the corners of the box within that
-    /// tile. `None` where there is no tile.
+    /// Returns the crop whose tile holds the middle of a box, and the corners of the box within
+    /// that tile. `None` where there is no tile.
     pub(super) fn tile_of(&self, bbox: &BBox<ViewPixels>) -> Option<(&FrameCrop, [f64; 4])> {
         let [x, y] = bbox.center();
         self.tiles

@@ -15,9 +15,9 @@ use crate::{imaging::MaskedPixels, parameters::Profile};
 
 /// Steps along each side of a view between the rays that test whether it covers the lens image.
 const SIGHT_STEPS: u32 = 64;
-/// Most products of rows and edges for which masks are computed. Five masks of ten corners are exact
-/// in frames of up to 20,000 rows. But a plan may be for 65,536 rows, which are never decoded, and
-/// 32 masks with 64 corners each would take seconds in so many.
+/// Most products of rows and edges for which masks are computed. Five masks of ten corners are
+/// exact in frames of up to 20,000 rows. But a plan may be for 65,536 rows, which are never
+/// decoded, and 32 masks with 64 corners each would take seconds in so many.
 const MAX_MASK_WORK: usize = 1 << 20;
 
 /// The view plan of a camera and its cost.

@@ -97,7 +97,8 @@ impl BlobDetector {
     }
 }
 
-/// Returns the calibration `lobby` for frames of 600 × 600 pixels, 3 m above the floor, with these areas.
+/// Returns the calibration `lobby` for frames of 600 × 600 pixels, 3 m above the floor, with these
+/// areas.
 pub(super) fn calibration(areas: &str) -> Arc<Calibration> {
     let content = format!(
         r#"{{ "id": "lobby", "image": {{"width": 600, "height": 600}},

@@ -4,8 +4,8 @@
 //! fair queueing (Goyal, Vin and Cheng, 1996) with equal weights. An entry starts, in virtual time,
 //! when the previous entry of its client ends, but not before now. Entries leave in the order of
 //! their starts. Virtual time advances by the cost of what leaves, divided among the active
-//! clients. So a client with many entries delays another client by one entry each round only, and an
-//! idle client saves up nothing.
+//! clients. So a client with many entries delays another client by one entry each round only, and
+//! an idle client saves up nothing.
 
 use std::collections::HashMap;
 
@@ -27,7 +27,8 @@ pub(super) struct Turn {
     client: Client,
 }
 
-/// Assigns positions in a queue. A client is forgotten when its last entry has ended in virtual time.
+/// Assigns positions in a queue. A client is forgotten when its last entry has ended in virtual
+/// time.
 #[derive(Debug, Default)]
 pub(super) struct Turns {
     arrivals: u64,

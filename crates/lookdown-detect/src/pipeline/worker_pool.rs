@@ -104,8 +104,8 @@ impl WorkerPool {
     ///
     /// # Errors
     /// [`PipelineError::Overloaded`] at once when the queue is full, [`PipelineError::ShareUsed`]
-    /// when the client has too many frames in it, [`PipelineError::ShuttingDown`] after [`WorkerPool::shut_down`], otherwise the error of the
-    /// engine.
+    /// when the client has too many frames in it, [`PipelineError::ShuttingDown`] after
+    /// [`WorkerPool::shut_down`], otherwise the error of the engine.
     pub async fn detect(&self, job: DetectJob) -> Result<DetectedFrame, PipelineError> {
         self.detect_and(job, |detected| detected).await
     }

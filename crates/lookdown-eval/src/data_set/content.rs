@@ -65,7 +65,6 @@ impl DataSet {
     /// Returns the same data set with ground truth to be scored as `scoring`. Rotated boxes can be
     /// converted to axis-parallel ones: the bounds of the ellipse inscribed in each.
     ///
-    ///
     /// # Errors
     /// [`ScoringMismatch`] if the ground truth cannot be converted to that shape.
     pub fn scored_as(mut self, scoring: Scoring) -> Result<Self, ScoringMismatch> {

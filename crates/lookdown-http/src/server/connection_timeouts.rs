@@ -33,8 +33,8 @@ struct State {
 struct Reading {
     /// The time since which the client blocks the response.
     blocked_since: Option<Instant>,
-    /// The time for which it blocked the response since it last read [`PROGRESS_BYTES`], without the
-    /// current wait.
+    /// The time for which it blocked the response since it last read [`PROGRESS_BYTES`], without
+    /// the current wait.
     blocked: Duration,
     /// The bytes that were sent since then.
     sent_bytes: usize,
@@ -99,8 +99,8 @@ impl ConnectionTimeouts {
         state.until = None;
     }
 
-    /// Records that all of a response is ready to be sent. A head that arrived in part with the last
-    /// request has the time of an idle connection.
+    /// Records that all of a response is ready to be sent. A head that arrived in part with the
+    /// last request has the time of an idle connection.
     pub(super) fn request_ends(&self) {
         let mut state = self.state();
         state.phase = Phase::Idle;

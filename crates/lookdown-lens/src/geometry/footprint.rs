@@ -106,9 +106,9 @@ impl Footprint {
         })
     }
 
-    /// Maps the box `[x_min, y_min, x_max, y_max]` of a crop to the frame. Its bounds are exact: the
-    /// outline is the inscribed ellipse, which touches all four sides. `None` when the middle of
-    /// the box lies beyond the lens image.
+    /// Maps the box `[x_min, y_min, x_max, y_max]` of a crop to the frame. Its bounds are exact:
+    /// the outline is the inscribed ellipse, which touches all four sides. `None` when the middle
+    /// of the box lies beyond the lens image.
     #[must_use]
     pub fn of_crop_box(crop_box: [f64; 4], crop: &FrameCrop, lens: &Lens) -> Option<Self> {
         let [x_min, y_min, x_max, y_max] = crop.frame_box(crop_box);

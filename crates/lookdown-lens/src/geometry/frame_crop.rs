@@ -1,9 +1,9 @@
 //! Frame crops: upright cut-outs of the fisheye frame, turned by a multiple of 90°, scaled, and
 //! mirrored if wanted.
 //!
-//! Quarter turns and mirroring map axis-parallel boxes to axis-parallel boxes. The footprint of a box
-//! that was found in a crop is therefore exact; `docs/geometry.md` compares it with that of a virtual
-//! view.
+//! Quarter turns and mirroring map axis-parallel boxes to axis-parallel boxes. The footprint of a
+//! box that was found in a crop is therefore exact; `docs/geometry.md` compares it with that of a
+//! virtual view.
 
 use nalgebra::Vector2;
 

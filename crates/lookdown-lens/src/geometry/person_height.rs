@@ -9,8 +9,8 @@ use super::{
     pixels::{PixelConvention, cross_half_pixel},
 };
 
-/// Standard deviation of the angle of either end of a box, with the bias of boxes, which are a little
-/// larger than people: 61 boxes of standing people of the rendered development set.
+/// Standard deviation of the angle of either end of a box, with the bias of boxes, which are a
+/// little larger than people: 61 boxes of standing people of the rendered development set.
 const ANGLE_SD: f64 = 3.3 * std::f64::consts::PI / 180.0;
 /// A height with a larger standard deviation means nothing, meters.
 const MAX_SD_M: f64 = 0.6;

@@ -5,8 +5,8 @@ use super::{
     pixels::{PixelConvention, cross_half_pixel},
 };
 
-/// Returns the box of a person of `height_m` who stands `out_m` away in the direction `azimuth` from
-/// the point below a camera at `camera_m` that looks straight down.
+/// Returns the box of a person of `height_m` who stands `out_m` away in the direction `azimuth`
+/// from the point below a camera at `camera_m` that looks straight down.
 pub(crate) fn standing(
     lens: &Lens,
     camera_m: f64,

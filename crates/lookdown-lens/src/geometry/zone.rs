@@ -53,7 +53,8 @@ impl Zone {
 }
 
 impl ZoneArea {
-    /// Returns true when it contains a foot at `foot` (corner-origin frame pixels), which is `floor`.
+    /// Returns true when it contains a foot at `foot` (corner-origin frame pixels), which is
+    /// `floor`.
     #[must_use]
     pub fn holds(&self, foot: Pixel, floor: Option<FloorPosition>) -> bool {
         match self {

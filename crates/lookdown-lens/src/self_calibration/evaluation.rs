@@ -2,7 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// The number of parameters: focal length, two of the shape, two of the center, three of the rotation.
+/// The number of parameters: focal length, two of the shape, two of the center, three of the
+/// rotation.
 pub(super) const PARAMETERS: usize = 8;
 
 /// Evidence, and the normal equations of the parameters.

@@ -41,9 +41,9 @@ const MAX_UNCERTAINTY: (f64, f64) = (0.025, 0.8);
 /// Standard deviation of the second coefficient of a lens from that of an ideal lens. A wider one
 /// exchanges curvature at the rim for focal length, and makes the middle too large.
 const K2_SIGMA: f64 = 0.0015;
-/// Errors of the radius are larger than the edges say, because no lens is exactly one of the family:
-/// by this factor, and by this share of the radius however many edges there are. 68 % of 177 errors in
-/// rendered frames are within 0.9 of the deviations that result, 95 % within 2.4.
+/// Errors of the radius are larger than the edges say, because no lens is exactly one of the
+/// family: by this factor, and by this share of the radius however many edges there are. 68 % of
+/// 177 errors in rendered frames are within 0.9 of the deviations that result, 95 % within 2.4.
 const LENS_MISFIT: f64 = 1.4;
 const LENS_FLOOR: f64 = 0.003;
 /// Largest difference of a fit of half of the edges.
@@ -103,8 +103,8 @@ pub struct RoomFit {
 }
 
 impl RoomFit {
-    /// Fits a camera to the edges of its frames. Circles are tried in turn, a later one must explain the edges clearly
-    /// better than those before. The result is deterministic.
+    /// Fits a camera to the edges of its frames. Circles are tried in turn, a later one must
+    /// explain the edges clearly better than those before. The result is deterministic.
     ///
     /// # Errors
     /// [`FitRefusal`] when the edges do not determine the camera.

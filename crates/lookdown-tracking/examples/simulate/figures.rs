@@ -1,6 +1,7 @@
 //! Measured figures of the detector: its misses, false alarms and errors of boxes.
 //!
-//! `lab/benches/count/measure_detector.py` derives them from detections of `lookdown eval`, with `fusion`.
+//! `lab/benches/count/measure_detector.py` derives them from detections of `lookdown eval`, with
+//! `fusion`.
 
 use lookdown_tracking::follow::logit;
 

@@ -1,5 +1,5 @@
-//! Follows persons between searches of the whole frame, as the server does with `follow`. Moving persons
-//! stand for the cells with motion.
+//! Follows persons between searches of the whole frame, as the server does with `follow`. Moving
+//! persons stand for the cells with motion.
 
 use lookdown_lens::geometry::OrientedBox;
 use lookdown_tracking::follow::{

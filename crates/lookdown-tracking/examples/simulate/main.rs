@@ -1,5 +1,5 @@
-//! Simulates walks under ceiling cameras and follows them: truth, detections, tracks and crossings as
-//! JSON lines for lab/benches/count/score.py.
+//! Simulates walks under ceiling cameras and follows them: truth, detections, tracks and crossings
+//! as JSON lines for lab/benches/count/score.py.
 //!
 //!     simulate --rate 5 --seed 1 --seconds 300 --persons 8 --detector rendered [--site] [--follow]
 #![allow(missing_docs, reason = "an example has no documentation of its own")]

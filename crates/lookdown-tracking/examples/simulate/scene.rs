@@ -322,7 +322,8 @@ impl Scene {
         }
     }
 
-    /// The pose of the second camera from the tracks of both, each on its own floor, and its errors.
+    /// The pose of the second camera from the tracks of both, each on its own floor, and its
+    /// errors.
     fn second_camera(&self) -> Option<Value> {
         let [first, second] = self.separate.as_slice() else {
             return None;

@@ -5,8 +5,9 @@ use nalgebra::{Point2, Vector2};
 /// Returns the crossings of the step `from` – `to` through the polyline to the right-hand side of a
 /// walk along it (x right, y down), minus those to the left.
 ///
-/// A point exactly on a line counts as on its left, and so does a corner exactly on the step's line:
-/// a step through a corner crosses one of the two segments that meet there, never both or none.
+/// A point exactly on a line counts as on its left, and so does a corner exactly on the step's
+/// line: a step through a corner crosses one of the two segments that meet there, never both or
+/// none.
 pub(super) fn signed_crossings(points: &[[f64; 2]], from: [f64; 2], to: [f64; 2]) -> i32 {
     let segments = points.windows(2).map(|pair| (pair[0], pair[1]));
     segments

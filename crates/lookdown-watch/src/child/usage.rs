@@ -45,8 +45,8 @@ impl Usage {
     /// Checks the usage of a child.
     ///
     /// # Errors
-    /// [`SourceError`] if all children together take more than half of the machine's memory, and this
-    /// one the most of it, or if it uses more CPU time than a decoder needs.
+    /// [`SourceError`] if all children together take more than half of the machine's memory, and
+    /// this one the most of it, or if it uses more CPU time than a decoder needs.
     pub(crate) fn check(&mut self) -> Result<(), SourceError> {
         // A child that has ended has no files.
         let Some((resident, cpu_seconds)) = read(self.pid) else {
@@ -74,7 +74,8 @@ impl Drop for Usage {
     }
 }
 
-/// Notes the memory of a child. Returns true if all children exceed the limit, and this one has most.
+/// Notes the memory of a child. Returns true if all children exceed the limit, and this one has
+/// most.
 fn is_largest_beyond(all: &mut BTreeMap<u32, u64>, pid: u32, resident: u64, limit: u64) -> bool {
     all.insert(pid, resident);
     let sum: u64 = all.values().sum();

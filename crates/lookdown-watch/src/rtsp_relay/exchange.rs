@@ -15,7 +15,8 @@ use crate::{SourceError, credentials::Login};
 const MAX_PENDING: usize = 16;
 /// Requests for one response: the second one answers the challenge of the first.
 const ATTEMPTS: u32 = 2;
-/// Most messages within [`UNASKED_PERIOD`] that answer no request. Cameras send one or two a minute.
+/// Most messages within [`UNASKED_PERIOD`] that answer no request. Cameras send one or two a
+/// minute.
 const MAX_UNASKED: u32 = 100;
 /// The period in which such messages are counted.
 const UNASKED_PERIOD: Duration = Duration::from_secs(10);

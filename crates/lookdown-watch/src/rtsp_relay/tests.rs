@@ -16,8 +16,8 @@ const DIGEST: &str = "RTSP/1.0 401 Unauthorized\r\nWWW-Authenticate: Basic realm
 const BASIC: &str = "RTSP/1.0 401 Unauthorized\r\nWWW-Authenticate: Basic realm=\"c\"\r\n";
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// The answers of a camera to its requests, one after another, without their `CSeq`. Returns the URL,
-/// and the requests at the end.
+/// The answers of a camera to its requests, one after another, without their `CSeq`. Returns the
+/// URL, and the requests at the end.
 async fn camera(answers: &[&str]) -> (Url, tokio::task::JoinHandle<Vec<String>>) {
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let port = listener.local_addr().unwrap().port();

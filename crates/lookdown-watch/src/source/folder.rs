@@ -104,7 +104,8 @@ fn read_newest(folder: &Path, before: &Seen) -> io::Result<(Seen, Option<NewFile
         if !is_image(&path) {
             continue;
         }
-        // A file may have been removed since. Cameras that upload files must not name others by links.
+        // A file may have been removed since. Cameras that upload files must not name others by
+        // links.
         let Ok(about) = fs::symlink_metadata(&path) else {
             continue;
         };

@@ -1,7 +1,7 @@
 //! RTSP streams and video files in real time, through `ffmpeg`.
 //!
-//! `ffmpeg` reads a stream through a relay, whose URL is written to its standard input, so it is not in
-//! the list of processes.
+//! `ffmpeg` reads a stream through a relay, whose URL is written to its standard input, so it is
+//! not in the list of processes.
 
 use std::{convert::Infallible, ffi::OsString, fmt::Write as _, path::Path, time::Duration};
 

@@ -196,7 +196,8 @@ impl ProblemKind {
         self.entry().name
     }
 
-    /// The path of the documentation, which identifies the kind to programs: `type` of a problem document.
+    /// The path of the documentation, which identifies the kind to programs: `type` of a problem
+    /// document.
     pub(in crate::api) fn path(self) -> String {
         format!("/problems/{}", self.name())
     }

@@ -1,5 +1,5 @@
-//! The form that DeepStack's clients send: the frame in `image`, `min_confidence` and `api_key`. The
-//! query may have the parameters of `POST /detect`.
+//! The form that DeepStack's clients send: the frame in `image`, `min_confidence` and `api_key`.
+//! The query may have the parameters of `POST /detect`.
 
 use axum::extract::{FromRequest, Request};
 use lookdown_detect::{

@@ -30,8 +30,8 @@ use crate::{
 /// A fitted camera.
 #[derive(Serialize, ToSchema)]
 pub(in crate::api) struct FittedCamera {
-    /// The calibration in the native format. Its `sources` have the standard deviations: of `lens` in
-    /// percent of the radius, of `center` in pixels, of `world_up` in degrees.
+    /// The calibration in the native format. Its `sources` have the standard deviations: of `lens`
+    /// in percent of the radius, of `center` in pixels, of `world_up` in degrees.
     #[schema(value_type = Object)]
     calibration: NativeCalibration,
     #[serde(flatten)]
@@ -40,8 +40,8 @@ pub(in crate::api) struct FittedCamera {
 
 /// Find the lens
 ///
-/// Fits lens, center and level to the straight edges of a frame of the camera, or says why the frame
-/// does not determine them. Nothing is stored.
+/// Fits lens, center and level to the straight edges of a frame of the camera, or says why the
+/// frame does not determine them. Nothing is stored.
 #[utoipa::path(
     post, path = "/calibrations/{id}/fit", tag = "calibrations", operation_id = "fit_calibration",
     params(

@@ -38,7 +38,8 @@ pub(in crate::api) struct PastReport {
     /// The ID: the value for `since`, and the `ETag` of the latest report.
     #[schema(example = "1763717400412345")]
     id: String,
-    /// Median of the persons in the reports of the 5 s up to this one, as far as this page has them.
+    /// Median of the persons in the reports of the 5 s up to this one, as far as this page has
+    /// them.
     #[schema(example = 3)]
     persons: usize,
     /// The report.
@@ -86,8 +87,8 @@ pub(in crate::api) async fn get_history(
     Ok((content_type, cache, body))
 }
 
-/// Writes a JSON array of the reports with their IDs and medians. The stored JSON of each report is copied
-/// unchanged.
+/// Writes a JSON array of the reports with their IDs and medians. The stored JSON of each report is
+/// copied unchanged.
 fn write<'a>(page: impl Iterator<Item = (&'a StoredReport, usize)>) -> Bytes {
     let mut text = BytesMut::new();
     for (stored, persons) in page {

@@ -134,8 +134,8 @@ impl Samples {
     }
 }
 
-/// Along one axis, of two neighbors each the lower one (the left or upper one in the frame), and the
-/// weight of the other.
+/// Along one axis, of two neighbors each the lower one (the left or upper one in the frame), and
+/// the weight of the other.
 struct Neighbors {
     lower: __m256i,
     upper_weight: __m256,
@@ -154,8 +154,8 @@ impl Neighbors {
 /// Bytes that the processor fetches at once.
 const CACHE_LINE: isize = 64;
 
-/// Lets the processor fetch what lies ahead: it follows neither the curves nor the rows of a view by
-/// itself.
+/// Lets the processor fetch what lies ahead: it follows neither the curves nor the rows of a view
+/// by itself.
 ///
 /// Eight blocks, one below the other, are a patch that may lie in the frame at any angle. Each of
 /// them announces two pixels of the patch after the next, so that all announce its diagonals, which

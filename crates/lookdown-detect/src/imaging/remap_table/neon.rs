@@ -1,5 +1,5 @@
-//! Sampling eight pixels at a time with NEON, as two vectors of four. To the bit what `scalar` does:
-//! the same operations in the same order, none of them fused.
+//! Sampling eight pixels at a time with NEON, as two vectors of four. To the bit what `scalar`
+//! does: the same operations in the same order, none of them fused.
 //!
 //! Pixels are read through slices; what is unsafe is to call a function that needs NEON, and to see
 //! arrays as vectors and vectors as arrays.
@@ -130,8 +130,8 @@ impl Samples {
     }
 }
 
-/// Along one axis, of two neighbors each the lower one (the left or upper one in the frame), and the
-/// weight of the other.
+/// Along one axis, of two neighbors each the lower one (the left or upper one in the frame), and
+/// the weight of the other.
 struct Neighbors {
     lower: int32x4_t,
     upper_weight: float32x4_t,
@@ -175,7 +175,8 @@ fn pixel_pairs(lines: &[u8], first_bytes: &[u32; QUARTET]) -> uint8x16x2_t {
     unsafe { transmute::<[[u8; PAIR_BYTES]; QUARTET], uint8x16x2_t>(pairs) }
 }
 
-/// The weighted sums of pairs of pixels: the byte `first_byte` of each pair, and the same channel of its right pixel.
+/// The weighted sums of pairs of pixels: the byte `first_byte` of each pair, and the same channel
+/// of its right pixel.
 #[target_feature(enable = "neon")]
 fn weighted_sum(pairs: uint8x16x2_t, first_byte: u8, samples: &Samples) -> float32x4_t {
     let left = bytes_of_pairs(pairs, first_byte);

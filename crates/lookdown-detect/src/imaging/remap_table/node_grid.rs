@@ -1,5 +1,5 @@
-//! Node grids: where a view samples, at every eighth pixel: in the lens's normalized plane, or, of a
-//! frame crop, in the frame.
+//! Node grids: where a view samples, at every eighth pixel: in the lens's normalized plane, or, of
+//! a frame crop, in the frame.
 
 use lookdown_lens::geometry::{
     FrameCrop, Lens, Pixel, VirtualView,

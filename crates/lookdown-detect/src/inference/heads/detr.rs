@@ -24,7 +24,7 @@ use super::{
 /// ```toml
 /// [output]
 /// head = "detr"
-/// person_class = 0               # 80 COCO classes; 1 where they are numbered as in COCO (RF-DETR, DETR)
+/// person_class = 0               # 80 COCO classes; RF-DETR, DETR, numbered as in COCO: 1
 /// score_activation = "sigmoid"   # default; DETR: "softmax"
 /// # boxes = "pred_boxes"         # if the shapes are ambiguous
 /// # scores = "logits"

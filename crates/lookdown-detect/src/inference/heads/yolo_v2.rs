@@ -25,7 +25,8 @@ use super::{
 /// [output]
 /// head = "yolo_v2"
 /// person_class = 14   # Pascal VOC, alphabetical
-/// anchors = [[1.3221, 1.73145], [3.19275, 4.00944], [5.05587, 8.09892], [9.47112, 4.84053], [11.2364, 10.0071]]
+/// anchors = [[1.3221, 1.73145], [3.19275, 4.00944], [5.05587, 8.09892], [9.47112, 4.84053],
+///     [11.2364, 10.0071]]
 /// ```
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -96,8 +96,8 @@ fn a_greedy_client_hardly_slows_the_others() {
 }
 
 /// Serves frames by three workers. Four clients have one frame in flight each, and a fifth one has
-/// `greedy` frames. Each sends its next frame just after a worker has taken another one. Returns the
-/// share of the four clients.
+/// `greedy` frames. Each sends its next frame just after a worker has taken another one. Returns
+/// the share of the four clients.
 fn share_of_others(greedy: usize) -> f64 {
     let clients: Vec<_> = (0..5)
         .map(|name| Client::with_key(&name.to_string()))

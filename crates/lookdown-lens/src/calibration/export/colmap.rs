@@ -1,5 +1,5 @@
-//! COLMAP's `cameras.txt` with one camera. It has no skew; its pixel coordinates begin at the corner
-//! of the first pixel.
+//! COLMAP's `cameras.txt` with one camera. It has no skew; its pixel coordinates begin at the
+//! corner of the first pixel.
 
 use super::{
     decimal::join,

@@ -119,8 +119,9 @@ fn first_line(error: &impl std::fmt::Display) -> String {
     text.lines().next().unwrap_or_default().to_owned()
 }
 
-/// OpenCV up to 4 begins its files with `%YAML:1.0`, which is not a YAML directive, and others leave
-/// out the `---` that has to follow one; as a comment it does no harm and lines keep their numbers.
+/// OpenCV up to 4 begins its files with `%YAML:1.0`, which is not a YAML directive, and others
+/// leave out the `---` that has to follow one; as a comment it does no harm and lines keep their
+/// numbers.
 fn without_directive(text: &str) -> String {
     if text.starts_with("%YAML") {
         format!("#{text}")

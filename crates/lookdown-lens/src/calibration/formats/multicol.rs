@@ -1,5 +1,6 @@
-//! MultiCol-SLAM's `InteriorOrientationFisheye*.yaml`, known from the `LaFiDa` data set: Scaramuzza's
-//! model with x along the columns (<https://github.com/urbste/MultiCol-SLAM>, `cam_model_omni.cpp`).
+//! MultiCol-SLAM's `InteriorOrientationFisheye*.yaml`, known from the `LaFiDa` data set:
+//! Scaramuzza's model with x along the columns (<https://github.com/urbste/MultiCol-SLAM>,
+//! `cam_model_omni.cpp`).
 //!
 //! Flat `Camera.key: value` lines. Published files leave out the space after some colons, which
 //! YAML would not read, so they are read line by line.

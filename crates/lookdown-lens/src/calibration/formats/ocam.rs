@@ -1,5 +1,5 @@
-//! `OCamCalib`'s `calib_results.txt` (Scaramuzza, <https://sites.google.com/site/scarabotix>): blocks of
-//! numbers, each after a `#` comment that says what it is.
+//! `OCamCalib`'s `calib_results.txt` (Scaramuzza, <https://sites.google.com/site/scarabotix>):
+//! blocks of numbers, each after a `#` comment that says what it is.
 //!
 //! Its x axis runs down the rows: the center is row, then column (counted from 0), the size is
 //! height, then width. The polynomials are preceded by their count. The inverse polynomial is an

@@ -1,7 +1,8 @@
 //! The XML form of `OpenCV`'s `FileStorage`, read into the tree that its YAML and JSON forms make.
 //!
-//! The reader streams: time and memory grow with the number of bytes. Attributes are skipped unread,
-//! because their names and namespaces are what makes XML expensive, and `FileStorage` needs none.
+//! The reader streams: time and memory grow with the number of bytes. Attributes are skipped
+//! unread, because their names and namespaces are what makes XML expensive, and `FileStorage` needs
+//! none.
 
 use quick_xml::{
     Reader,
@@ -197,7 +198,8 @@ mod tests {
         text + after
     }
 
-    /// Each of these takes minutes to days in a parser that resolves namespaces or compares attributes.
+    /// Each of these takes minutes to days in a parser that resolves namespaces or compares
+    /// attributes.
     #[test]
     fn namespaces_and_attributes_cost_linear_time() {
         let root = "<opencv_storage>";

@@ -1,4 +1,5 @@
-//! ROS `camera_info`: the YAML of `camera_calibration_parsers`, or a message as `topic echo` prints it.
+//! ROS `camera_info`: the YAML of `camera_calibration_parsers`, or a message as `topic echo` prints
+//! it.
 //!
 //! `equidistant` is OpenCV's fisheye (<https://github.com/ros2/common_interfaces>,
 //! `distortion_models.hpp`), also written `fisheye` and `kannala_brandt`. `plumb_bob` describes no

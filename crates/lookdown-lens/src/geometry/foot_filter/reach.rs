@@ -1,9 +1,9 @@
 //! The parts of a frame that can show a person who stands in an area.
 //!
-//! A pixel may show a person of any height up to [`TALLEST_M`]. In units of the camera's height, the
-//! ray at the angle `theta` from straight down meets the floor at `tan(theta)`, and a height `q`
-//! above the floor at `(1 - q) tan(theta)`. The pixel matters if the floor between the two, in that
-//! direction, is near an area.
+//! A pixel may show a person of any height up to [`TALLEST_M`]. In units of the camera's height,
+//! the ray at the angle `theta` from straight down meets the floor at `tan(theta)`, and a height
+//! `q` above the floor at `(1 - q) tan(theta)`. The pixel matters if the floor between the two, in
+//! that direction, is near an area.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -79,7 +79,8 @@ impl AreaReach {
         })
     }
 
-    /// Returns true if a position of the frame (corner-origin pixels) can show a person of the areas.
+    /// Returns true if a position of the frame (corner-origin pixels) can show a person of the
+    /// areas.
     #[must_use]
     pub fn holds(&self, at: Pixel) -> bool {
         let cell = cell(at.y, self.cell_height) * CELLS + cell(at.x, self.cell_width);

@@ -80,8 +80,8 @@ impl<F: Rising> Tabulated<F> {
 }
 
 /// Returns the place at which a function, which rises from `low` to `high`, reaches `value`; the
-/// nearer end when it does not. `curve` returns the function's value and slope. Newton from `start`,
-/// kept within the bracket by bisection.
+/// nearer end when it does not. `curve` returns the function's value and slope. Newton from
+/// `start`, kept within the bracket by bisection.
 pub(super) fn rising_root(
     curve: impl Fn(f64) -> (f64, f64),
     value: f64,

@@ -1,5 +1,5 @@
-//! The lens models: each file has the formula, symbols, domain, source, parameters and curve of one.
-//! A new model is a file and a line of this list. `docs/geometry.md` has the table.
+//! The lens models: each file has the formula, symbols, domain, source, parameters and curve of
+//! one. A new model is a file and a line of this list. `docs/geometry.md` has the table.
 
 use super::{ImagePlane, LensError, curve::Curve, distortion::RadialTangential, model::Model};
 
