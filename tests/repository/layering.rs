@@ -123,11 +123,11 @@ fn only_listed_modules_use_crates_for_external_systems() {
     for (crate_name, root) in CRATES {
         for (module, path) in without_test_files(sources(root)) {
             let code = code(&fs::read_to_string(&path).unwrap());
-            let user = [crate_name, top(&module)];
+            let places = [crate_name, top(&module)];
             for (name, allowed) in MAY_USE_CRATE {
                 if names_crate(&code, name) {
-                    match user.into_iter().find(|user| allowed.contains(user)) {
-                        Some(user) => _ = used.insert((name, user.to_owned())),
+                    match places.into_iter().find(|place| allowed.contains(place)) {
+                        Some(place) => _ = used.insert((name, place.to_owned())),
                         None => breaches.push(format!("{}: {module} uses {name}", path.display())),
                     }
                 }
