@@ -47,10 +47,7 @@ use super::{
     Cameras, FollowedNumber, ListenError, Listeners, Listening, NewReport, ReportId, ResultLimits,
     ResultStore, ResultUse, StoreHealth, StoredImage, StoredReport, Unreachable,
 };
-use crate::{
-    annotated_image::StoredFrame,
-    {metrics::Metrics, tls::TlsError},
-};
+use crate::{annotated_image::StoredFrame, metrics::Metrics, tls::TlsError};
 
 /// Longest time that the shutdown waits for reports that Redis has not stored yet.
 const LAST_WAIT: Duration = Duration::from_secs(2);

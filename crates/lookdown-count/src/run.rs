@@ -57,7 +57,7 @@ pub enum CountError {
     Store(#[from] StoreError),
     /// The task that opens the store panicked.
     #[error("the store cannot be opened because of an internal error: {0}")]
-    StoreTask(#[from] JoinError),
+    StoreTask(#[source] JoinError),
     /// The metrics cannot be created.
     #[error("the metrics cannot be created: {0}")]
     Metrics(#[from] prometheus::Error),
@@ -92,7 +92,7 @@ pub async fn count(
         let resumed = store.resumed()?;
         Ok::<_, StoreError>((store, resumed))
     });
-    let (store, resumed) = opened.await??;
+    let (store, resumed) = opened.await.map_err(CountError::StoreTask)??;
     let calibrations = Calibrations::resumed(resumed.calibrations);
     let counting = CountingOptions {
         longest_gap_ms: i64::try_from(options.longest_gap.as_millis()).unwrap_or(i64::MAX),

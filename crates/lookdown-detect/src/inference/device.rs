@@ -82,8 +82,10 @@ impl FromStr for Device {
         }
         let (kind, number) = name.split_once(':').ok_or(UnknownDevice)?;
         if kind == "openvino" {
-            let device = number.parse().map_err(|_| UnknownDevice)?;
-            return Ok(Self::OpenVino(device));
+            return number
+                .parse()
+                .map(Self::OpenVino)
+                .map_err(|_| UnknownDevice);
         }
         let plain = number.bytes().all(|digit| digit.is_ascii_digit());
         let number = number.parse().ok().filter(|_| plain);
