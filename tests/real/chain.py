@@ -5,6 +5,7 @@ import hashlib
 import socket
 import subprocess
 import tempfile
+import time
 import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
@@ -99,6 +100,16 @@ class Chain:
         self.replicas[name] = stack.enter_context(
             running(f"replica-{name}", command, PORT, "/readyz", variables, host=host.address)
         )
+
+    def kill(self, name: str) -> float:
+        """Kills a replica. Returns the time, on the clock of `time.monotonic`, from which on it accepts no connection.
+
+        The kernel accepts connections for a process that is killed until it has freed the memory of it.
+        """
+        process = self.replicas[name].process
+        process.kill()
+        process.wait(timeout=30)
+        return time.monotonic()
 
     def end(self, name: str) -> None:
         """Stops a replica and what is left of it."""

@@ -17,31 +17,36 @@ class Crowd:
     def __init__(self):
         self.statuses: collections.Counter[int] = collections.Counter()
         self.replicas: collections.Counter[str] = collections.Counter()
+        self.lost_starts: list[float] = []
+        """When each lost request began, on the clock of `time.monotonic`."""
         self.stopped = threading.Event()
         self._lock = threading.Lock()
 
     @property
     def lost(self) -> int:
         """The number of requests without an answer from a replica."""
-        return sum(count for status, count in self.statuses.items() if status in LOST)
+        return len(self.lost_starts)
 
-    def count(self, status: int, replica: str) -> None:
-        """Counts a request."""
+    def count(self, started: float, status: int, replica: str) -> None:
+        """Counts a request that began at `started`."""
         with self._lock:
             self.statuses[status] += 1
             self.replicas[replica] += 1
+            if status in LOST:
+                self.lost_starts.append(started)
 
     def ask(self, address: str, path: str, body: bytes, headers: dict[str, str]) -> None:
         """Runs one client, on a connection that it keeps for as long as possible."""
         connection = http.client.HTTPConnection(address, timeout=30)
         while not self.stopped.is_set():
+            started = time.monotonic()
             try:
                 connection.request("POST", path, body, headers)
                 answer = connection.getresponse()
                 answer.read()
-                self.count(answer.status, answer.getheader("x-replica", ""))
+                self.count(started, answer.status, answer.getheader("x-replica", ""))
             except (OSError, http.client.HTTPException):
-                self.count(0, "")
+                self.count(started, 0, "")
                 connection.close()
 
 

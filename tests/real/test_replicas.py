@@ -117,13 +117,15 @@ class Replicas(unittest.TestCase):
     def test_killing_a_replica_loses_only_requests_in_flight(self):
         with self._load() as seen:
             self._wait_for_answers(seen)
-            self.chain.replicas["r2"].process.kill()
+            gone = self.chain.kill("r2")
             self.chain.wait_until("r2", "DOWN")
             self._wait_for_answers(seen)
             self.chain.start("r2")
             self.chain.wait_until("r2", "UP")
             self._until_it_answers(seen, "r2")
-        self._lost_at_most(seen, CLIENTS, "killed")
+        print(f"killed: {seen.statuses.total()} requests, {seen.lost} lost, {dict(seen.statuses)}", flush=True)
+        self.assertEqual([start - gone for start in seen.lost_starts if start >= gone], [], seen.statuses)
+        self.assertEqual(seen.statuses[200] + seen.lost, seen.statuses.total(), seen.statuses)
 
     def test_a_disconnected_replica_loses_little_and_recovers(self):
         with self._load() as seen:
@@ -135,7 +137,9 @@ class Replicas(unittest.TestCase):
             self.chain.host("r3").back()
             self.chain.wait_until("r3", "UP")
             self._until_it_answers(seen, "r3")
-        self._lost_at_most(seen, CLIENTS, "cut off")
+        print(f"cut off: {seen.statuses.total()} requests, {seen.lost} lost, {dict(seen.statuses)}", flush=True)
+        self.assertLessEqual(seen.lost, CLIENTS, seen.statuses)
+        self.assertEqual(seen.statuses[200] + seen.lost, seen.statuses.total(), seen.statuses)
         report = send(self.chain.replicas["r3"], "POST", f"{DETECT}&camera=gate", OFFICE.read_bytes())[2]
         path, found = "/results/gate/latest", report["request_id"]
         other = self.chain.replicas["r1"]
@@ -151,11 +155,6 @@ class Replicas(unittest.TestCase):
     def _until_it_answers(self, seen, name: str):
         enough = seen.replicas[name] + 1
         wait_until(lambda: seen.replicas[name] >= enough, f"{name} answers again")
-
-    def _lost_at_most(self, seen, most: int, how: str):
-        print(f"{how}: {seen.statuses.total()} requests, {seen.lost} lost, {dict(seen.statuses)}", flush=True)
-        self.assertLessEqual(seen.lost, most, seen.statuses)
-        self.assertEqual(seen.statuses[200] + seen.lost, seen.statuses.total(), seen.statuses)
 
 
 @unittest.skipIf(os.geteuid(), "only root can make hosts")
