@@ -15,7 +15,7 @@ VERSION = $(shell sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml)
 FORM ?= long
 
 .NOTPARALLEL:
-.PHONY: help setup models serve test test-real reliability real audit advisories sbom dist deb image wheel arm64 bench bench-full bench-remap check release ci fuzz bless
+.PHONY: help setup models serve test test-real reliability real real-parts audit advisories sbom dist deb image wheel arm64 bench bench-full bench-remap check release ci fuzz bless
 
 help: ## list the targets
 	@echo "make TARGET, where TARGET is:"
@@ -110,15 +110,19 @@ test-real: ## test with real services; as root on Debian it installs missing pac
 	@$(MAKE) --no-print-directory real
 
 real: ## test with a browser, Redis, brokers, clients ..., or only PARTS: tests/real
+	@$(PYTHON) scripts/setup.py toolchain runtime model wheel
+	cargo build --release --locked --target-dir target
+	@# Downloads while it compiles a wheel, in half the time of `make wheel`.
+	@$(MAKE) --no-print-directory real-parts & trap 'kill $$!; exit 130' INT; \
+		LOOKDOWN_COMMIT=$(LOOKDOWN_COMMIT) $(PYTHON) scripts/wheel.py quick || { kill $$!; exit 1; }; wait $$!
+	$(PYTHON) tests/real/run.py $(PARTS)
+
+real-parts:
 	@# The words are Debian packages; comments start with a hash.
 	@scripts/packages.sh $$(sed 's/#.*//' tests/real/packages.txt)
 	@# Node.js from other sources includes npm, which conflicts with Debian's package.
 	@command -v npm > /dev/null || scripts/packages.sh npm
-	@$(PYTHON) scripts/setup.py toolchain runtime model real-parts wheel
-	cargo build --release --locked --target-dir target
-	@# Half the time of the wheel that `make wheel` builds.
-	LOOKDOWN_COMMIT=$(LOOKDOWN_COMMIT) $(PYTHON) scripts/wheel.py quick
-	$(PYTHON) tests/real/run.py $(PARTS)
+	@$(PYTHON) scripts/setup.py toolchain runtime real-parts
 
 reliability: ## kill, flood, starve and soak the server (an hour), or only PARTS: docs/lab/reliability.md
 	@$(PYTHON) scripts/setup.py toolchain runtime model reliability

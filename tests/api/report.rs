@@ -100,6 +100,7 @@ fn report() -> DetectionReport {
             outside: 1,
             masked: 2,
             outside_areas: 3,
+            not_needed: 5,
         },
         batch_count: 3,
         non_finite: 0,

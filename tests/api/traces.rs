@@ -170,7 +170,7 @@ async fn a_request_has_a_span_in_the_trace_of_its_caller() {
             "calibrate",
             "queue",
             "remap",
-            "inference", // The second pass.
+            "inference", // The crops.
             "refine",
             "remap",
             "queue",

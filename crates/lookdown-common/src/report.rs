@@ -24,7 +24,8 @@ use utoipa::ToSchema;
     },
     "defaults": [{"name": "profile", "value": "quality", "source": "calibration"}],
     "search": "full",
-    "views": {"inferred": 24, "unchanged": 0, "outside": 0, "masked": 0, "outside_areas": 0},
+    "views": {"inferred": 24, "unchanged": 0, "outside": 0, "masked": 0, "outside_areas": 0,
+        "not_needed": 0},
     "persons": [{
         "box": {"x_min": 1102.41, "y_min": 700.08, "x_max": 1341.77, "y_max": 842.6},
         "score": 0.8731,
@@ -161,6 +162,8 @@ pub struct ReportViews {
     pub masked: usize,
     /// Views that cannot show a person in an area of the calibration.
     pub outside_areas: usize,
+    /// Narrow views where the wide ones show no possible person.
+    pub not_needed: usize,
 }
 
 /// A zone of the calibration.

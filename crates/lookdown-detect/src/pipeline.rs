@@ -28,6 +28,7 @@ mod test_support;
 mod ticket;
 mod timeline;
 mod turns;
+mod visible_views;
 mod worker_pool;
 
 pub use calibration_lookup::{CalibrationLookup, UnusableCalibration};

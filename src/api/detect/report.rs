@@ -53,6 +53,7 @@ pub fn to_report(report: &DetectionReport) -> Report {
             outside: report.views.outside,
             masked: report.views.masked,
             outside_areas: report.views.outside_areas,
+            not_needed: report.views.not_needed,
         },
         persons: report.persons.iter().map(to_person).collect(),
         margin: report.margin.as_ref().map(|margin| {

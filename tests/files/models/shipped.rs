@@ -18,11 +18,16 @@ use serde_json::Value;
 
 use crate::models::folder::of_repository;
 
-/// Runs a model on the office sample with a low score threshold.
+/// Runs a model on the office sample in the views of the paper, which suit all models, with a low
+/// score threshold.
 fn detect(model: &str) -> DetectionReport {
     let settings = settings::load(None, []).unwrap();
-    let parameters =
-        DetectParameters::parse([("model", model), ("score_threshold", "0.05")]).unwrap();
+    let parameters = DetectParameters::parse([
+        ("model", model),
+        ("profile", "paper"),
+        ("score_threshold", "0.05"),
+    ])
+    .unwrap();
     let engine = engine_for(&settings, std::slice::from_ref(&parameters)).unwrap();
     let calibration = of_repository("samples/calibrations/office.json");
     let image = fs::read(of_repository("samples/office.jpg")).unwrap();

@@ -32,8 +32,9 @@ pub enum Profile {
     Paper,
     /// Five wide views and up to 5 upright crops of the frame; on a CPU by a model in INT8.
     Fast,
-    /// 18 views, wide around the nadir and narrow at the rim, and up to 12 upright crops of the
-    /// frame; by models in INT8 where the CPU has instructions for them.
+    /// Eight wide views, up to eight narrow ones at the rim where the wide ones show a possible
+    /// person, up to 12 upright crops of the frame, and one of its part below the camera; by models
+    /// in INT8 where the CPU has instructions for them.
     #[default]
     Balanced,
     /// The views and crops of [`Balanced`](Self::Balanced), and a mirrored copy of each crop, which
@@ -67,14 +68,19 @@ impl Profile {
         self.max_crops() > 0
     }
 
-    /// Returns the maximum number of upright crops in the pass that follows the views of the plan,
-    /// 0 without such a pass.
+    /// Returns the maximum number of upright crops around possible persons, 0 without such crops.
     pub(crate) fn max_crops(self) -> usize {
         match self {
             Self::Fast => 5,
             Self::Balanced | Self::Quality => 12,
             Self::Paper | Self::Direct => 0,
         }
+    }
+
+    /// Returns true if a crop shows what is below the camera, where the views of the plan cut
+    /// people off.
+    pub(crate) fn has_nadir_crop(self) -> bool {
+        matches!(self, Self::Balanced | Self::Quality)
     }
 
     /// Returns true if each crop has a mirrored copy, which shares its vote.
@@ -84,7 +90,8 @@ impl Profile {
 
     /// Returns the maximum number of inputs of the network in the pass through upright crops.
     pub(crate) fn max_crop_inputs(self) -> usize {
-        self.max_crops() * (1 + usize::from(self.mirrors_crops()))
+        let crops = self.max_crops() + usize::from(self.has_nadir_crop());
+        crops * (1 + usize::from(self.mirrors_crops()))
     }
 
     /// Returns the method that projects boxes back to the frame.

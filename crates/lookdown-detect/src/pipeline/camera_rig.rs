@@ -2,22 +2,23 @@
 //!
 //! A rig is immutable. All frames of a camera share the rig of a view plan.
 
-use std::sync::Arc;
-
 use lookdown_lens::{
     calibration::CameraGeometry,
     geometry::{
         BackProjection, Footprint, FrameCrop, Pixel, ViewPlan, VirtualView,
-        foot_filter::AreaReach,
+        crop_placement::CropTarget,
         pixels::{PixelConvention, cross_half_pixel},
     },
 };
 
-use super::mosaic::{Grid, Mosaic};
-use super::outline::{crop_outline, view_outline};
+use super::{
+    mosaic::{Grid, Mosaic},
+    outline::{crop_outline, view_outline},
+    visible_views::{Hidden, LeftOut, Visible},
+};
 use crate::{
     detection::{BBox, FramePixels, ViewPixels},
-    imaging::{Frame, Letterbox, MaskedPixels, NetworkInput, RemapTable},
+    imaging::{Frame, Letterbox, NetworkInput, RemapTable},
 };
 
 /// Distance to the view's border, as a share of the view's width, below which a box is considered
@@ -31,48 +32,9 @@ pub(super) struct CameraRig {
     frame: BBox<FramePixels>,
     hidden: Hidden,
     views: Views,
+    /// Views of parts of the frame, for those that may show a person.
+    details: Vec<(VirtualView, RemapTable)>,
     left_out: LeftOut,
-}
-
-/// The pixels of a frame that show no person who counts.
-#[derive(Debug, Clone)]
-struct Hidden {
-    masked: Arc<MaskedPixels>,
-    /// The pixels that can show a person of the areas; `None` without areas.
-    reach: Option<Arc<AreaReach>>,
-}
-
-impl Hidden {
-    fn of(geometry: &CameraGeometry, width: u32, height: u32) -> Self {
-        let CameraGeometry { lens, mount, areas } = geometry;
-        let reach = AreaReach::new(&areas.foot_filter, lens, mount, width, height);
-        Self {
-            masked: Arc::new(MaskedPixels::new(&areas.masks, width, height)),
-            reach: reach.map(Arc::new),
-        }
-    }
-
-    /// Returns true if a view shows an unmasked pixel that can show a person of the areas.
-    fn leaves_something(&self, table: &RemapTable) -> bool {
-        let Some(reach) = &self.reach else {
-            return true;
-        };
-        table.sees_pixel(|x, y| {
-            reach.holds(Pixel::new(f64::from(x) + 0.5, f64::from(y) + 0.5))
-                && !self.masked.hides(x, y)
-        })
-    }
-}
-
-/// The numbers of planned views that the network does not process.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) struct LeftOut {
-    /// Views outside the lens image.
-    pub(super) outside: usize,
-    /// Views whose part of the lens image is wholly masked.
-    pub(super) masked: usize,
-    /// Views that cannot show a person in an area.
-    pub(super) outside_areas: usize,
 }
 
 /// The network's views of a frame.
@@ -86,32 +48,6 @@ enum Views {
     Mosaics(Vec<Mosaic>),
     /// The whole frame, letterboxed.
     Direct(Letterbox),
-}
-
-/// The views that can show a person, and the numbers of the others.
-struct Visible<V> {
-    views: Vec<(V, RemapTable)>,
-    left_out: LeftOut,
-}
-
-impl<V> Visible<V> {
-    fn of(planned: impl Iterator<Item = (V, RemapTable)>, hidden: &Hidden) -> Self {
-        let mut views = Vec::new();
-        let mut left_out = LeftOut::default();
-        let masked = &hidden.masked;
-        for (view, table) in planned {
-            if !table.sees_anything() {
-                left_out.outside += 1;
-            } else if !masked.is_empty() && !table.sees_beside(masked) {
-                left_out.masked += 1;
-            } else if !hidden.leaves_something(&table) {
-                left_out.outside_areas += 1;
-            } else {
-                views.push((view, table));
-            }
-        }
-        Self { views, left_out }
-    }
 }
 
 impl CameraRig {
@@ -132,11 +68,45 @@ impl CameraRig {
                 frame: BBox::of_frame(frame_width, frame_height),
                 hidden,
                 views: Views::Direct(Letterbox::new(frame_width, frame_height, input)),
+                details: Vec::new(),
                 left_out: LeftOut::default(),
             };
         };
         let views = plan.views(&geometry.mount, input.width, input.height);
-        Self::of_views(geometry, hidden, views, frame_width, frame_height)
+        let tables = RemapTable::of_views(&views, &geometry.lens, frame_width, frame_height);
+        let mut planned = views.into_iter().zip(tables);
+        let views = Visible::of(planned.by_ref().take(plan.constant_count()), &hidden);
+        let details = Visible::of(planned, &hidden);
+        Self {
+            geometry,
+            frame: BBox::of_frame(frame_width, frame_height),
+            hidden,
+            left_out: views.left_out.and(details.left_out),
+            views: Views::Virtual(views.views),
+            details: details.views,
+        }
+    }
+
+    /// Returns a rig of the same camera with those detail views that show the middle of a target.
+    pub(super) fn with_details_of(&self, targets: &[CropTarget]) -> Self {
+        let lens = &self.geometry.lens;
+        let rays: Vec<_> = targets
+            .iter()
+            .filter_map(|target| {
+                let pixel = cross_half_pixel(target.center(), PixelConvention::PixelCenter);
+                lens.unproject(&pixel)
+            })
+            .collect();
+        let shown = self.details.iter();
+        let shown = shown.filter(|(view, _)| rays.iter().any(|ray| view.holds(ray)));
+        Self {
+            geometry: self.geometry.clone(),
+            frame: self.frame,
+            hidden: self.hidden.clone(),
+            views: Views::Virtual(shown.cloned().collect()),
+            details: Vec::new(),
+            left_out: LeftOut::default(),
+        }
     }
 
     /// Returns a rig of the same camera with crops of the frame instead of views.
@@ -156,6 +126,7 @@ impl CameraRig {
             hidden: self.hidden.clone(),
             left_out: visible.left_out,
             views: Views::Crops(visible.views),
+            details: Vec::new(),
         }
     }
 
@@ -173,25 +144,6 @@ impl CameraRig {
             rig.views = Views::Mosaics(Mosaic::of(grid, &crops));
         }
         rig
-    }
-
-    /// Builds a rig from `views`, without those that can show no person.
-    fn of_views(
-        geometry: CameraGeometry,
-        hidden: Hidden,
-        views: Vec<VirtualView>,
-        frame_width: u32,
-        frame_height: u32,
-    ) -> Self {
-        let tables = RemapTable::of_views(&views, &geometry.lens, frame_width, frame_height);
-        let visible = Visible::of(views.into_iter().zip(tables), &hidden);
-        Self {
-            geometry,
-            frame: BBox::of_frame(frame_width, frame_height),
-            hidden,
-            left_out: visible.left_out,
-            views: Views::Virtual(visible.views),
-        }
     }
 
     /// Blanks the masked areas of the frame. Must run before any other use of the frame.
@@ -212,6 +164,20 @@ impl CameraRig {
     /// Returns the box of the whole frame.
     pub(super) fn frame(&self) -> &BBox<FramePixels> {
         &self.frame
+    }
+
+    /// Returns the number of detail views.
+    pub(super) fn detail_count(&self) -> usize {
+        self.details.len()
+    }
+
+    /// Returns the virtual views; empty for a rig of other views.
+    pub(super) fn virtual_views(&self) -> impl Iterator<Item = &VirtualView> {
+        let views = match &self.views {
+            Views::Virtual(views) => views.as_slice(),
+            Views::Crops(_) | Views::Mosaics(_) | Views::Direct(_) => &[],
+        };
+        views.iter().map(|(view, _)| view)
     }
 
     /// Returns the number of views that the network processes.
@@ -259,7 +225,10 @@ impl CameraRig {
     /// Returns the memory of the tables and masks in bytes. Shared memory counts once.
     pub(super) fn bytes(&self) -> usize {
         let tables = match &self.views {
-            Views::Virtual(views) => RemapTable::bytes(views.iter().map(|(_, table)| table)),
+            Views::Virtual(views) => {
+                let views = views.iter().chain(&self.details);
+                RemapTable::bytes(views.map(|(_, table)| table))
+            }
             Views::Crops(crops) => RemapTable::bytes(crops.iter().map(|(_, table)| table)),
             Views::Mosaics(mosaics) => RemapTable::bytes(mosaics.iter().flat_map(Mosaic::tables)),
             Views::Direct(_) => 0,

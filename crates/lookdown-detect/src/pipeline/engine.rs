@@ -2,12 +2,14 @@
 //! and merges detections; the inference threads render views and run inference.
 
 mod camera;
+mod crop_pass;
+mod detail_pass;
 mod first_pass;
 mod follow_pass;
+mod further_looks;
 mod given_views;
 mod observation;
 mod placed;
-mod second_pass;
 
 use std::{
     num::NonZeroUsize,
@@ -271,7 +273,7 @@ impl Engine {
         let mut observation = Observation {
             profile: job.parameters.profile,
             tuning: self.tuning(&job.parameters, &model),
-            passes: Vec::with_capacity(2),
+            passes: Vec::with_capacity(3),
             is_searched: true,
             follow: None,
             unchanged_views: 0,
@@ -311,9 +313,7 @@ impl Engine {
             self.cached_views(job, &observation),
         );
         observation.wait_for(&first)?;
-        if let Some(second) = self.second_pass(job, &observation) {
-            observation.wait_for(&second)?;
-        }
+        self.look_again(job, &mut observation)?;
         if let Some(key) = key {
             self.inference_cache.store(key, &observation.passes);
         }

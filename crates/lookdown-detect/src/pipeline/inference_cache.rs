@@ -14,7 +14,7 @@ use crate::{
     metrics::IntCounter,
 };
 
-/// Maximum memory of all cached frames: detections and the remap tables of second passes.
+/// Maximum memory of all cached frames: detections and the remap tables of later passes.
 const MAX_BYTES: usize = 32 << 20;
 
 /// The key of a frame: its content, its views and its model.
@@ -48,7 +48,7 @@ struct CachedFrame {
 }
 
 struct CachedPass {
-    /// The views of a second pass, owned by this entry alone; `None` for the camera's views.
+    /// The views of a later pass, owned by this entry alone; `None` for the camera's views.
     own_rig: Option<Arc<CameraRig>>,
     model: Weak<Model>,
     per_view: Vec<Vec<ViewDetection>>,

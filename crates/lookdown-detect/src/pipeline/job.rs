@@ -134,7 +134,7 @@ pub struct DetectedFrame {
 
 impl DetectedFrame {
     /// Returns the outlines of the views in corner-origin frame pixels: the plan's views, then the
-    /// views of the second pass. Empty if the detector processed the whole frame.
+    /// views and crops of the later passes. Empty if the detector processed the whole frame.
     #[must_use]
     pub fn view_outlines(&self) -> Vec<Vec<Pixel>> {
         let rigs = self.rigs.iter();

@@ -95,27 +95,31 @@ pub(super) fn persons(
         .collect()
 }
 
-/// Targets of the second pass may be this many margins away from an area: their feet are less exact
-/// than those of persons.
+/// Possible persons may be this many margins away from an area: their feet are less exact than
+/// those of persons.
 const TARGET_MARGINS: f64 = 2.0;
 
-/// The refinement that turns boxes of the first pass into targets of the second.
-const TARGET_REFINEMENT: RefinementParameters = RefinementParameters {
-    refinement: Refinement::Fusion,
-    iou_threshold: 0.5,
-    sigma: 0.3,
-    score_threshold: 0.03,
-    max_detections: 500,
-};
+/// The least probability with which something is worth a further look. `docs/lab/results.md` has
+/// the accuracy and the cost with other values.
+const TARGET_PROBABILITY: f64 = 0.035;
 
-/// Merges the boxes of the first pass into possible persons within the frame, highest score first.
-pub(super) fn second_pass_targets(
+/// Merges the boxes of the passes so far into possible persons within the frame, highest score
+/// first.
+pub(super) fn possible_persons(
     passes: &[Pass],
     rig: &CameraRig,
     profile: Profile,
     tuning: &Tuning,
 ) -> Vec<CropTarget> {
-    let (mapped, mut merged) = merged(passes, rig, profile, tuning, &TARGET_REFINEMENT);
+    let calibration = ScoreCalibration::of(tuning, Refinement::Fusion);
+    let parameters = RefinementParameters {
+        refinement: Refinement::Fusion,
+        iou_threshold: 0.5,
+        sigma: 0.3,
+        score_threshold: calibration.merged(TARGET_PROBABILITY),
+        max_detections: 500,
+    };
+    let (mapped, mut merged) = merged(passes, rig, profile, tuning, &parameters);
     if !rig.geometry().areas.foot_filter.areas.is_empty() {
         merged.retain(|merged| may_count(merged, &mapped, rig));
     }
@@ -132,7 +136,7 @@ pub(super) fn second_pass_targets(
     targets.collect()
 }
 
-/// Returns true if a merged box of the first pass may become a person in the margin of an area.
+/// Returns true if a merged box may become a person in the margin of an area.
 fn may_count(merged: &MergedDetection, mapped: &[Mapped], rig: &CameraRig) -> bool {
     let members: Vec<&Mapped> = merged
         .members

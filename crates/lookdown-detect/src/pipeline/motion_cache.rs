@@ -8,7 +8,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use lookdown_lens::geometry::FrameCrop;
+use lookdown_lens::geometry::{FrameCrop, VirtualView};
 use parking_lot::{Mutex, MutexGuard};
 
 use super::{camera_cache::CameraCache, camera_rig::CameraRig};
@@ -26,12 +26,17 @@ pub(super) struct MotionCache(CameraCache<CachedCamera>);
 
 struct CachedCamera {
     views: Arc<CameraViews>,
-    /// The crops of the last second pass.
-    crops: Mutex<Option<CameraCrops>>,
+    /// The detail views of the last frame.
+    details: ChangingViews<VirtualView>,
+    /// The crops of the last frame.
+    crops: ChangingViews<FrameCrop>,
 }
 
-struct CameraCrops {
-    crops: Vec<FrameCrop>,
+/// The views of a pass that are other ones in each frame.
+struct ChangingViews<V>(Mutex<Option<PlacedViews<V>>>);
+
+struct PlacedViews<V> {
+    places: Vec<V>,
     views: Arc<CameraViews>,
 }
 
@@ -61,37 +66,63 @@ impl MotionCache {
     ) -> Arc<CameraViews> {
         let no_views = || CachedCamera {
             views: CameraViews::new(rig, model, vec![None; rig.view_count()]),
-            crops: Mutex::default(),
+            details: ChangingViews(Mutex::default()),
+            crops: ChangingViews(Mutex::default()),
         };
         let is_stale = |known: &CachedCamera| !known.views.are_of(rig, model);
         let entry = self.0.get_or_renew(camera, no_views, is_stale);
         Arc::clone(&entry.views)
     }
 
-    /// Returns the cached crops of a camera, filled where the last second pass had the same crop.
+    /// Returns the cached detail views of a camera, filled where the last frame had the same view.
     /// `None` if the camera is not in the cache.
+    pub(super) fn of_details(
+        &self,
+        camera: &str,
+        rig: &Arc<CameraRig>,
+        model: &Arc<Model>,
+    ) -> Option<Arc<CameraViews>> {
+        let views = rig.virtual_views().cloned().collect();
+        let known = self.0.get(camera)?;
+        Some(known.details.replace(views, rig, model))
+    }
+
+    /// Returns the cached crops of a camera, filled where the last frame had the same crop. `None`
+    /// if the camera is not in the cache.
     pub(super) fn of_crops(
         &self,
         camera: &str,
         rig: &Arc<CameraRig>,
         model: &Arc<Model>,
     ) -> Option<Arc<CameraViews>> {
+        let crops = rig.crops().copied().collect();
         let known = self.0.get(camera)?;
-        let mut last = known.crops.lock();
+        Some(known.crops.replace(crops, rig, model))
+    }
+}
+
+impl<V: PartialEq> ChangingViews<V> {
+    /// Replaces the views by those at `places`. Those that are the same keep what is cached.
+    fn replace(
+        &self,
+        places: Vec<V>,
+        rig: &Arc<CameraRig>,
+        model: &Arc<Model>,
+    ) -> Arc<CameraViews> {
+        let mut last = self.0.lock();
         let before = last.take();
         let before = before.filter(|before| before.views.are_of_model(model));
-        let crops: Vec<FrameCrop> = rig.crops().copied().collect();
-        let cached = crops.iter().map(|crop| {
+        let cached = places.iter().map(|place| {
             let before = before.as_ref()?;
-            let same = before.crops.iter().position(|other| other == crop)?;
+            let same = before.places.iter().position(|other| other == place)?;
             before.views.lock()[same].clone()
         });
         let views = CameraViews::new(rig, model, cached.collect());
-        *last = Some(CameraCrops {
-            crops,
+        *last = Some(PlacedViews {
+            places,
             views: Arc::clone(&views),
         });
-        Some(views)
+        views
     }
 }
 

@@ -38,14 +38,14 @@ pub struct PlannedViews {
     pub seen_share: f64,
     /// The mean number of views that cover a position in the lens image.
     pub mean_views: f64,
-    /// The number of network inputs of the first pass over every frame.
+    /// The maximum number of network inputs for the views: detail views are processed only where
+    /// the others show a possible person.
     pub images: usize,
-    /// The maximum number of additional upright crops around possible persons, with mirrored
-    /// copies.
+    /// The maximum number of additional upright crops, with mirrored copies.
     pub crops_at_most: usize,
-    /// The number of runs of the network in the first pass.
+    /// The maximum number of runs of the network for the views.
     pub batches: usize,
-    /// The number of pixels of the network inputs of the first pass.
+    /// The number of pixels of these network inputs.
     pub pixels: u64,
 }
 

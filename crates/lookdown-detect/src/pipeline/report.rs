@@ -98,6 +98,8 @@ pub struct ViewCounts {
     pub masked: usize,
     /// Views that cannot show a person in an area of the camera.
     pub outside_areas: usize,
+    /// Detail views where the other views show no possible person.
+    pub not_needed: usize,
 }
 
 /// The calibration on which a report is based.

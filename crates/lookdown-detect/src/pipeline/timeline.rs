@@ -37,7 +37,7 @@ impl Stage {
     }
 }
 
-/// A time span in one stage. A frame with a second pass is in some stages twice.
+/// A time span in one stage. A frame with several passes is in some stages more than once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StageSpan {
     /// The stage.

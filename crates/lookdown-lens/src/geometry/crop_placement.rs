@@ -2,9 +2,12 @@
 
 use std::ops::RangeInclusive;
 
-use nalgebra::Vector2;
+use nalgebra::{Rotation3, Unit, Vector2, Vector3};
 
-use super::{FrameCrop, Pixel, QuarterTurn};
+use super::{
+    FrameCrop, Lens, Mount, Pixel, QuarterTurn,
+    pixels::{PixelConvention, cross_half_pixel},
+};
 
 /// The share of a crop's side within which a person must lie to be wholly in it.
 const WITHIN: f64 = 0.96;
@@ -15,6 +18,9 @@ const SERVED_FILL: RangeInclusive<f64> = 0.6..=1.6;
 const SERVED_COSINE: f64 = 0.6;
 /// The greatest enlargement, crop pixels per frame pixel: beyond it there is nothing to see.
 const MAX_SCALE: f64 = 3.0;
+/// Angle from straight down to the middles of the sides of the crop around the nadir, radians: a
+/// person below a ceiling fills about a third of it.
+const NADIR_CROP_REACH: f64 = 37.0 * std::f64::consts::PI / 180.0;
 /// Most neighbors that are considered for one crop; bounds the work.
 const MAX_NEIGHBORS: usize = 32;
 /// Boxes smaller than this, pixels, are taken to be of this size.
@@ -32,7 +38,9 @@ pub struct CropTarget {
 }
 
 impl CropTarget {
-    fn center(&self) -> Pixel {
+    /// Returns the middle of the box.
+    #[must_use]
+    pub fn center(&self) -> Pixel {
         let [x_min, y_min, x_max, y_max] = self.bbox;
         Pixel::new(f64::midpoint(x_min, x_max), f64::midpoint(y_min, y_max))
     }
@@ -60,6 +68,29 @@ pub fn place_crops(targets: &[CropTarget], most: usize, fill: f64, side: u32) ->
         crops.push(crop);
     }
     crops
+}
+
+/// Returns the crop of `side` × `side` pixels around the point straight below the camera. `None` if
+/// the lens does not show it.
+#[must_use]
+pub fn nadir_crop(lens: &Lens, mount: &Mount, side: u32) -> Option<FrameCrop> {
+    let nadir = mount.nadir();
+    let center = lens.project(&nadir)?;
+    let across = Unit::try_new(Vector3::z().cross(&nadir), 1e-6);
+    let across = across.unwrap_or_else(Vector3::x_axis);
+    let reaches = [NADIR_CROP_REACH, -NADIR_CROP_REACH].map(|angle| {
+        let edge = lens.project(&(Rotation3::from_axis_angle(&across, angle) * nadir))?;
+        Some((edge - center).norm())
+    });
+    let reach = reaches.into_iter().flatten().fold(0.0, f64::max);
+    (reach > 0.0).then(|| FrameCrop {
+        turn: QuarterTurn::None,
+        is_mirrored: false,
+        center: cross_half_pixel(center, PixelConvention::CornerOrigin),
+        scale: (f64::from(side) / (2.0 * reach)).min(MAX_SCALE),
+        width: side,
+        height: side,
+    })
 }
 
 /// A crop that serves `first` and as many of the others as it can.

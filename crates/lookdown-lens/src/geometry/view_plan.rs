@@ -65,6 +65,8 @@ const PAPER_FIRST_AZIMUTH: f64 = 3.14;
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViewPlan {
     directions: Vec<ViewDirection>,
+    /// The number of directions, from the first on, in which every frame is looked at.
+    constant_count: usize,
 }
 
 impl ViewPlan {
@@ -80,8 +82,14 @@ impl ViewPlan {
                 field_of_view: reading.radians(),
             })
         });
+        Self::constant(directions.collect())
+    }
+
+    /// A plan without detail views.
+    fn constant(directions: Vec<ViewDirection>) -> Self {
         Self {
-            directions: directions.collect(),
+            constant_count: directions.len(),
+            directions,
         }
     }
 
@@ -95,9 +103,14 @@ impl ViewPlan {
                 field_of_view: ring.field_of_view,
             })
         });
-        Self {
-            directions: directions.collect(),
-        }
+        Self::constant(directions.collect())
+    }
+
+    /// Adds rings of detail views: narrow ones, for those parts of a frame in which the others show
+    /// a possible person.
+    fn with_details(mut self, rings: &[Ring]) -> Self {
+        self.directions.extend(Self::rings(rings).directions);
+        self
     }
 
     /// Five wide views: one more than the least that sees everything from close to the nadir to the
@@ -107,17 +120,22 @@ impl ViewPlan {
         Self::rings(&[Ring::of_degrees(0.9, 5, 90.0)])
     }
 
-    /// 18 views: wide around the nadir, and narrow at the rim, where people are small.
+    /// Eight wide views from the nadir to the rim, and eight narrow detail views at the rim, where
+    /// people are small.
     #[must_use]
     pub fn balanced() -> Self {
-        Self::rings(&[
-            Ring::of_degrees(0.05, 2, 75.0),
-            Ring::of_degrees(0.8, 8, 90.0),
-            Ring::of_degrees(1.25, 8, 45.0),
-        ])
+        let wide = Self::rings(&[Ring::of_degrees(0.8, 8, 90.0)]);
+        wide.with_details(&[Ring::of_degrees(1.25, 8, 45.0)])
     }
 
-    /// The directions, in plan order.
+    /// The number of views in which every frame is looked at. They come first; the others are
+    /// detail views.
+    #[must_use]
+    pub fn constant_count(&self) -> usize {
+        self.constant_count
+    }
+
+    /// The directions, in plan order: detail views last.
     #[must_use]
     pub fn directions(&self) -> &[ViewDirection] {
         &self.directions

@@ -63,13 +63,14 @@ pub(in crate::api) struct ViewPlanInfo {
 /// The cost of a frame.
 #[derive(Serialize, ToSchema)]
 pub(in crate::api) struct PlanCost {
-    /// Number of images that the model receives for every frame.
+    /// Largest number of images that the model receives for the views of a frame: narrow views are
+    /// left out where the wide ones show no possible person.
     images: usize,
-    /// Largest number of additional upright crops of the frame around possible persons.
+    /// Largest number of additional upright crops of the frame.
     crops_at_most: usize,
-    /// Number of batches for the images of every frame.
+    /// Largest number of batches for these images.
     batches: usize,
-    /// Number of pixels of the images of every frame.
+    /// Number of pixels of these images.
     pixels: u64,
 }
 

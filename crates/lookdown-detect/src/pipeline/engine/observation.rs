@@ -54,7 +54,18 @@ impl Observation {
             outside: left_out.outside,
             masked: left_out.masked,
             outside_areas: left_out.outside_areas,
+            not_needed: self.details_not_needed(),
         }
+    }
+
+    /// Returns the number of detail views of a search that show no possible person.
+    fn details_not_needed(&self) -> usize {
+        if !self.is_searched {
+            return 0;
+        }
+        let later = self.passes.iter().skip(1);
+        let details = later.map(|pass| pass.rig.virtual_views().count());
+        self.camera.rig.detail_count() - details.sum::<usize>()
     }
 
     /// Returns how the persons of the frame were found.

@@ -57,7 +57,7 @@ fn a_report_names_its_camera_calibration_and_model() {
     assert_eq!(named.camera, "north");
     assert_eq!(named.calibration.id, "lobby");
     assert!(named.calibration.assumed_circle.is_none() && named.warnings.is_empty());
-    assert_eq!((named.views.inferred, named.batch_count), (19, 5));
+    assert_eq!((named.views.inferred, named.batch_count), (10, 3));
     assert_eq!(named.model.name, "blob");
 
     let assumed = engine.detect(&job(image, &[])).unwrap().report;
@@ -70,7 +70,7 @@ fn a_report_names_its_camera_calibration_and_model() {
 }
 
 #[test]
-fn balanced_and_quality_have_a_second_pass() {
+fn balanced_and_quality_have_crops() {
     let engine = engine_with_lobby();
     let image = frame_with_disc(600, [420.0, 300.0], 20.0);
     let report = |profile| {
@@ -78,8 +78,8 @@ fn balanced_and_quality_have_a_second_pass() {
         engine.detect(&job(image.clone(), &named)).unwrap().report
     };
     let (balanced, quality) = (report("balanced"), report("quality"));
-    // One blob: a crop in both.
-    assert_eq!((balanced.views.inferred, quality.views.inferred), (19, 20));
+    // Eight wide views, a crop of the blob and one at the nadir; `quality` mirrors both.
+    assert_eq!((balanced.views.inferred, quality.views.inferred), (10, 12));
     // A mirrored crop shares the vote of its original.
     assert_eq!(quality.persons[0].views, balanced.persons[0].views);
 }
@@ -111,7 +111,23 @@ fn crops_make_boxes_exact_and_oriented_boxes_agree() {
 }
 
 #[test]
-fn an_empty_room_has_no_crops_in_the_second_pass() {
+fn detail_views_run_only_where_something_may_be() {
+    let engine = engine_with_lobby();
+    // The middles of the detail views lie 72° off the axis.
+    for (off_axis, expected) in [(30.0_f64, 0..=0), (72.0, 1..=2)] {
+        let x = 300.0 + 190.9859 * off_axis.to_radians();
+        let image = frame_with_disc(600, [x, 300.0], 16.0);
+        let named = [("calibration", "lobby"), ("profile", "balanced")];
+        let report = engine.detect(&job(image, &named)).unwrap().report;
+        assert_eq!(report.persons.len(), 1, "at {off_axis}°");
+        let details = 8 - report.views.not_needed;
+        assert!(expected.contains(&details), "{details} at {off_axis}°");
+        assert_eq!(report.views.inferred, 8 + details + 2);
+    }
+}
+
+#[test]
+fn an_empty_room_has_no_crops_but_that_at_the_nadir() {
     let engine = engine_with_lobby();
     let image = frame_with_disc(600, [420.0, 300.0], 0.0);
     let views = |profile| {
@@ -122,7 +138,7 @@ fn an_empty_room_has_no_crops_in_the_second_pass() {
     };
     assert_eq!(
         (views("fast"), views("balanced"), views("quality")),
-        (5, 18, 18)
+        (5, 9, 10)
     );
 }
 
@@ -136,9 +152,9 @@ fn views_without_motion_skip_inference() {
         engine.detect(&job(image, &named)).unwrap().report
     };
     let first = report([420.0, 300.0], &[]);
-    assert_eq!((first.views.inferred, first.views.unchanged), (19, 0));
+    assert_eq!((first.views.inferred, first.views.unchanged), (10, 0));
     let same = report([420.0, 300.0], &[]);
-    assert_eq!((same.views.inferred, same.views.unchanged), (0, 19));
+    assert_eq!((same.views.inferred, same.views.unchanged), (0, 10));
     assert_eq!(same.persons[0].bbox, first.persons[0].bbox);
     assert_eq!(same.batch_count, 0);
 
@@ -156,6 +172,23 @@ fn views_without_motion_skip_inference() {
 }
 
 #[test]
+fn detail_views_without_motion_skip_inference() {
+    let engine = engine_with_lobby();
+    let image = frame_with_disc(600, [540.0, 300.0], 16.0);
+    let named = [("calibration", "lobby"), ("motion", "true")];
+    let views = || {
+        engine
+            .detect(&job(image.clone(), &named))
+            .unwrap()
+            .report
+            .views
+    };
+    let (first, same) = (views(), views());
+    assert!(first.not_needed < 8, "{first:?}");
+    assert_eq!((same.inferred, same.unchanged), (0, first.inferred));
+}
+
+#[test]
 fn a_cached_frame_is_refined_without_inference() {
     let engine = engine_with_lobby();
     let report = |disc: [f64; 2], more: &[(&str, &str)]| {
@@ -166,9 +199,9 @@ fn a_cached_frame_is_refined_without_inference() {
     };
     let unchanged = |disc: [f64; 2], more: &[(&str, &str)]| report(disc, more).views.unchanged;
     let first = report([420.0, 300.0], &[]);
-    assert_eq!((first.views.inferred, first.views.unchanged), (19, 0));
+    assert_eq!((first.views.inferred, first.views.unchanged), (10, 0));
     let again = report([420.0, 300.0], &[("refine", "nms")]);
-    assert_eq!((again.views.inferred, again.views.unchanged), (0, 19));
+    assert_eq!((again.views.inferred, again.views.unchanged), (0, 10));
     assert_eq!(
         (again.batch_count, again.timings.inference.as_nanos()),
         (0, 0)

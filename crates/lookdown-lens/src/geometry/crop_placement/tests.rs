@@ -1,6 +1,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::geometry::Ray;
 
 const SIDE: u32 = 416;
 const FILL: f64 = 0.3;
@@ -81,4 +82,39 @@ fn a_crop_moves_to_the_side_with_more_neighbors() {
     let crops = place_crops(&crowd, 1, FILL, SIDE);
     assert!(shows(&crops[0], &crowd[2]) && shows(&crops[0], &crowd[3]));
     assert!(!shows(&crops[0], &crowd[1]));
+}
+
+/// The greatest and the least angle from straight down to the middles of the sides of the crop at
+/// the nadir, degrees, of a camera tilted by `tilt`.
+fn reach_of_nadir_crop(tilt: f64) -> Option<(f64, f64)> {
+    let lens = Lens::equidistant_circle(499.5, 499.5, 500.0, 1.57).unwrap();
+    let tilt = tilt.to_radians();
+    let up = Unit::new_normalize(Ray::new(tilt.sin(), 0.0, -tilt.cos()));
+    let mount = Mount::new(up, None);
+    let crop = nadir_crop(&lens, &mount, SIDE)?;
+    let half = f64::from(SIDE) / 2.0;
+    let middles = [
+        (half, 0.0),
+        (half, 2.0 * half),
+        (0.0, half),
+        (2.0 * half, half),
+    ];
+    let angles = middles.map(|(x, y)| {
+        let at = crop.frame_from_crop(&Pixel::new(x, y));
+        let ray = lens.unproject(&cross_half_pixel(at, PixelConvention::PixelCenter));
+        ray.unwrap().angle(&mount.nadir()).to_degrees()
+    });
+    Some((
+        angles.iter().copied().fold(0.0, f64::max),
+        angles.iter().copied().fold(180.0, f64::min),
+    ))
+}
+
+#[test]
+fn the_crop_at_the_nadir_shows_what_is_below_the_camera() {
+    let (greatest, least) = reach_of_nadir_crop(0.0).unwrap();
+    assert!((greatest - 37.0).abs() < 0.1 && (least - 37.0).abs() < 0.1);
+    let (greatest, least) = reach_of_nadir_crop(30.0).unwrap();
+    assert!(greatest < 43.0 && least > 30.0, "{greatest} {least}");
+    assert_eq!(reach_of_nadir_crop(95.0), None);
 }

