@@ -15,6 +15,6 @@ mod warnings;
 pub use areas::Areas;
 pub use calibrated_camera::{Calibration, CameraGeometry, FrameSizeMismatch};
 pub use error::CalibrationError;
-pub use file::content as read_content;
+pub use file::{content as read_content, read_camera};
 pub use formats::{CalibrationFile, FormatError};
 pub use id::CalibrationId;

@@ -1,19 +1,13 @@
 //! Calibrations from files of all formats.
 
-use std::{
-    path::{Path, PathBuf},
-    sync::Arc,
-};
+use std::{path::PathBuf, sync::Arc};
 
 use lookdown_lens::calibration::{
-    Calibration, CalibrationFile, export::Target, native::NativeImage, read_content,
+    Calibration, export::Target, formats::Camera, native::NativeImage, read_camera,
 };
 use pyo3::prelude::*;
 
-use crate::{
-    error::{LookdownError, python_error},
-    lens::PyLens,
-};
+use crate::{error::python_error, lens::PyLens};
 
 /// A camera: its lens, mount, zones and masks.
 #[pyclass(name = "Calibration", module = "lookdown", frozen)]
@@ -30,12 +24,9 @@ impl PyCalibration {
     #[pyo3(signature = (path, camera=None))]
     fn read(py: Python<'_>, path: PathBuf, camera: Option<&str>) -> PyResult<Self> {
         py.detach(|| {
-            let calibration = match camera {
-                None => Calibration::read(&path).map_err(python_error)?,
-                Some(camera) => read_camera(&path, camera)?,
-            };
+            let (calibration, stated) = read_camera(&path, camera).map_err(python_error)?;
             Ok(Self {
-                file: native_file(&path, &calibration)?,
+                file: native_file(&calibration, &stated)?,
                 camera: Arc::new(calibration),
             })
         })
@@ -86,41 +77,11 @@ impl PyCalibration {
     }
 }
 
-/// Returns the native file of a calibration that was read from this file.
-fn native_file(path: &Path, calibration: &Calibration) -> PyResult<String> {
-    let content = read_content(path).map_err(python_error)?;
-    let file = CalibrationFile::parse(&content).map_err(python_error)?;
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let id = calibration.id().to_string();
-    let ids = file.calibrations(&stem, &content).into_iter();
-    let mut cameras = ids.zip(file.cameras).filter(|((named, _), _)| *named == id);
-    let changed = || {
-        python_error(format!(
-            "{}: the file changed: read it again",
-            path.display()
-        ))
-    };
-    let (_, described) = cameras.next().ok_or_else(changed)?;
+/// Returns the native file of a calibration with this description.
+fn native_file(calibration: &Calibration, stated: &Camera) -> PyResult<String> {
     let (width, height) = calibration.image_size();
-    let native = described.camera.map_err(python_error)?;
-    let native = native.to_native(id, NativeImage { width, height });
+    let id = calibration.id().to_string();
+    let native = stated.to_native(id, NativeImage { width, height });
     let written = Target::Native.write(&native).map_err(python_error)?;
     Ok(written.content)
-}
-
-/// Reads one camera of a file, by its ID.
-fn read_camera(path: &Path, camera: &str) -> PyResult<Calibration> {
-    let content = read_content(path).map_err(python_error)?;
-    let file = CalibrationFile::parse(&content).map_err(python_error)?;
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let cameras = file.calibrations(&stem, &content);
-    let ids: Vec<_> = cameras.iter().map(|(id, _)| id.clone()).collect();
-    let found = cameras.into_iter().find(|(id, _)| id == camera);
-    let (_, calibration) = found.ok_or_else(|| {
-        LookdownError::new_err(format!(
-            "camera: the file holds {}, not {camera:?}",
-            ids.join(", ")
-        ))
-    })?;
-    calibration.map_err(python_error)
 }

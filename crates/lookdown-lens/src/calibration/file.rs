@@ -39,27 +39,53 @@ impl Calibration {
     /// # Errors
     /// [`CalibrationError`] when it cannot be read, is malformed, describes no camera or several.
     pub fn read(path: &Path) -> Result<Self, CalibrationError> {
-        let content = content(path)?;
-        let file = CalibrationFile::parse(&content)
-            .map_err(|problem| CalibrationError::in_file(path, problem))?;
-        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-        let mut cameras = file.calibrations(&stem, &content);
-        let calibration = match &cameras[..] {
-            [_] => cameras.swap_remove(0).1,
-            several => {
-                let ids: Vec<_> = several.iter().map(|(id, _)| id.as_str()).collect();
-                Err(FormatError::invalid(
-                    "cameras",
-                    format!(
-                        "the file holds {}: name one of {}, or take one out with `lookdown calibration \
-                         convert --camera`",
-                        ids.len(),
-                        ids.join(", ")
-                    ),
-                ))
-            }
-        };
-        calibration.map_err(|problem| CalibrationError::in_file(path, problem))
+        read_camera(path, None).map(|(calibration, _)| calibration)
+    }
+}
+
+/// Reads a file of any format: its only camera, or the one with this ID, checked and as stated.
+///
+/// # Errors
+/// [`CalibrationError`] when the file cannot be read or is malformed, when it does not have that
+/// camera or has several, or when the camera cannot be used.
+pub fn read_camera(
+    path: &Path,
+    id: Option<&str>,
+) -> Result<(Calibration, Camera), CalibrationError> {
+    let in_file = |problem| CalibrationError::in_file(path, problem);
+    let content = content(path)?;
+    let mut file = CalibrationFile::parse(&content).map_err(in_file)?;
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let mut checked = file.calibrations(&stem, &content);
+    let index = match id {
+        Some(id) => checked.iter().position(|(found, _)| found == id),
+        None => (checked.len() == 1).then_some(0),
+    };
+    let Some(index) = index else {
+        let ids: Vec<_> = checked.iter().map(|(id, _)| id.as_str()).collect();
+        return Err(in_file(not_one_of(&ids, id)));
+    };
+    let calibration = checked.swap_remove(index).1.map_err(in_file)?;
+    let stated = file.cameras.swap_remove(index).camera.map_err(in_file)?;
+    Ok((calibration, stated))
+}
+
+/// The problem of a file with these cameras, of which none has the ID that is wanted, or of which
+/// one must be wanted.
+fn not_one_of(ids: &[&str], wanted: Option<&str>) -> FormatError {
+    let names = ids.join(", ");
+    match wanted {
+        Some(wanted) => {
+            FormatError::invalid("camera", format!("the file holds {names}, not {wanted:?}"))
+        }
+        None => FormatError::invalid(
+            "cameras",
+            format!(
+                "the file holds {}: name one of {names}, or take one out with `lookdown calibration \
+                 convert --camera`",
+                ids.len()
+            ),
+        ),
     }
 }
 

@@ -278,3 +278,33 @@ fn what_yaml_and_toml_parsers_say_is_one_line_with_the_place() {
         assert!(!error.contains('\n'), "{error}");
     }
 }
+
+#[test]
+fn one_of_several_cameras_is_read_by_its_id() {
+    let camera = |focal: u32| {
+        format!(
+            "  camera_model: pinhole\n  intrinsics: [{focal}, {focal}, 400, 300]\n  \
+             distortion_model: equidistant\n  distortion_coeffs: [0.01, 0, 0, 0]\n  \
+             resolution: [800, 600]\n"
+        )
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("rig.yaml");
+    let text = format!("cam0:\n{}cam1:\n{}", camera(300), camera(310));
+    std::fs::write(&path, text).unwrap();
+
+    let (calibration, stated) = read_camera(&path, Some("rig-cam1")).unwrap();
+    assert_eq!(calibration.id().as_str(), "rig-cam1");
+    let focal = serde_json::to_value(&stated.lens).unwrap()["fx"].as_f64();
+    assert_eq!(focal, Some(310.0));
+    let problem = |id| read_camera(&path, id).unwrap_err().to_string();
+    for (id, part) in [
+        (
+            Some("cam1"),
+            "the file holds rig-cam0, rig-cam1, not \"cam1\"",
+        ),
+        (None, "the file holds 2: name one of rig-cam0, rig-cam1"),
+    ] {
+        assert!(problem(id).contains(part), "{}", problem(id));
+    }
+}
