@@ -108,8 +108,7 @@ impl Profile {
     pub fn tuning(self) -> Tuning {
         let (even_odds, crop_vote) = match self {
             Self::Fast => (0.26, 1.0),
-            Self::Balanced => (0.25, 0.7),
-            Self::Quality => (0.26, 0.7),
+            Self::Balanced | Self::Quality => (0.26, 0.7),
             Self::Paper | Self::Direct => (0.25, 1.0),
         };
         Tuning {
