@@ -159,7 +159,12 @@ fn views_without_motion_skip_inference() {
     assert_eq!(same.batch_count, 0);
 
     let moved = report([420.0, 330.0], &[]);
-    assert!(moved.views.inferred > 0 && moved.views.unchanged > 6);
+    // The views on the other side of the camera.
+    assert!(
+        moved.views.inferred > 0 && moved.views.unchanged > 2,
+        "{:?}",
+        moved.views
+    );
     let [x, y] = moved.persons[0].bbox.center();
     assert!((x - 420.0).abs() < 6.0 && (y - 330.0).abs() < 6.0);
     assert_eq!(moved.persons.len(), 1);
@@ -211,7 +216,7 @@ fn a_cached_frame_is_refined_without_inference() {
     let parameters = [("calibration", "lobby"), ("refine", "nms")];
     let image = frame_with_disc(600, [420.0, 300.0], 20.0);
     let anew = engine.detect(&job(image, &parameters)).unwrap().report;
-    assert_eq!(anew.views.inferred, 19);
+    assert_eq!(anew.views.inferred, 10);
     assert_eq!(anew.persons[0].bbox, again.persons[0].bbox);
     assert_eq!(anew.persons[0].score, again.persons[0].score);
 
@@ -220,7 +225,7 @@ fn a_cached_frame_is_refined_without_inference() {
     assert_eq!(unchanged([420.0, 300.0], &[("model", "blob")]), 0);
     // The cache holds two frames: the first one was evicted.
     assert_eq!(unchanged([420.0, 300.0], &[]), 0);
-    assert_eq!(unchanged([420.0, 300.0], &[("model", "blob")]), 19);
+    assert_eq!(unchanged([420.0, 300.0], &[("model", "blob")]), 10);
 }
 
 #[test]
