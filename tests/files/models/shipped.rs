@@ -18,16 +18,10 @@ use serde_json::Value;
 
 use crate::models::folder::of_repository;
 
-/// Runs a model on the office sample in the views of the paper, which suit all models, with a low
-/// score threshold.
-fn detect(model: &str) -> DetectionReport {
+/// Runs detection on the office sample.
+fn detect(parameters: &[(&str, &str)]) -> DetectionReport {
     let settings = settings::load(None, []).unwrap();
-    let parameters = DetectParameters::parse([
-        ("model", model),
-        ("profile", "paper"),
-        ("score_threshold", "0.05"),
-    ])
-    .unwrap();
+    let parameters = DetectParameters::parse(parameters.iter().copied()).unwrap();
     let engine = engine_for(&settings, std::slice::from_ref(&parameters)).unwrap();
     let calibration = of_repository("samples/calibrations/office.json");
     let image = fs::read(of_repository("samples/office.jpg")).unwrap();
@@ -57,6 +51,24 @@ fn annotated() -> Vec<BBox<FramePixels>> {
     boxes.collect()
 }
 
+/// Returns how many of these persons a report has.
+fn found(report: &DetectionReport, annotated: &[BBox<FramePixels>]) -> usize {
+    let persons = || report.persons.iter();
+    let is_found =
+        |truth: &&BBox<FramePixels>| persons().any(|person| person.bbox.iou(truth) > 0.4);
+    annotated.iter().filter(is_found).count()
+}
+
+#[test]
+fn the_default_models_find_all_persons_of_a_sample() {
+    let annotated = annotated();
+    for profile in ["fast", "balanced", "quality"] {
+        let report = detect(&[("profile", profile)]);
+        let found = found(&report, &annotated);
+        assert_eq!(found, annotated.len(), "{profile}");
+    }
+}
+
 #[test]
 fn every_fetched_model_finds_the_persons_of_a_sample() {
     let folders = fs::read_dir(of_repository("models")).unwrap();
@@ -69,15 +81,14 @@ fn every_fetched_model_finds_the_persons_of_a_sample() {
     let annotated = annotated();
     for folder in fetched {
         let name = folder.file_name().unwrap().to_str().unwrap();
-        let report = detect(name);
+        // The views of the paper suit all models.
+        let report = detect(&[
+            ("model", name),
+            ("profile", "paper"),
+            ("score_threshold", "0.05"),
+        ]);
         assert_eq!(report.model.name, name);
-        let is_found = |truth: &&BBox<FramePixels>| {
-            report
-                .persons
-                .iter()
-                .any(|person| person.bbox.iou(truth) > 0.4)
-        };
-        let found = annotated.iter().filter(is_found).count();
+        let found = found(&report, &annotated);
         // The smallest model misses some persons.
         assert!(
             2 * found >= annotated.len(),

@@ -46,8 +46,9 @@ use super::{Frame, MaskedPixels, NetworkInput};
 /// grid; only an affine map to the frame is each view's own.
 ///
 /// How far that is from where the lens really is, was measured with a lens of each model on a frame
-/// of 1680 pixels: in the `balanced` plan at 416 pixels at most 0.17 pixels of the frame and 0.13
-/// of the view (means 0.04 and 0.03), in views of 300 pixels and 90° 0.35 and 0.18 (0.12 and 0.06).
+/// of 1680 pixels: in the views of the `balanced` plan and two of 75° at the nadir, at 416 pixels,
+/// at most 0.17 pixels of the frame and 0.13 of the view (means 0.04 and 0.03), in views of 300
+/// pixels and 90° 0.35 and 0.18 (0.12 and 0.06).
 /// Two models are off by more where they distort most: `rectilinear`, which stretches its rim, by
 /// up to 2.6 pixels of the frame, which are 0.2 of the view; `orthographic`, which squeezes it, by
 /// up to 1.1 pixels of the view, which are 0.6 of the frame. Narrower or larger views are off by

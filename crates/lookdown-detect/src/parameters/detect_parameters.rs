@@ -309,6 +309,11 @@ impl DetectParameters {
         let calibration = self.calibration.as_ref().map(CalibrationId::as_str);
         self.camera.as_deref().or(calibration)
     }
+
+    /// Returns the name of the camera whose views without motion need no inference.
+    pub(crate) fn motion_camera(&self) -> Option<&str> {
+        self.camera_name().filter(|_| self.motion)
+    }
 }
 
 /// Parses a value of the parameter `profile`.

@@ -87,8 +87,9 @@ impl CameraRig {
         }
     }
 
-    /// Returns a rig of the same camera with those detail views that show the middle of a target.
-    pub(super) fn with_details_of(&self, targets: &[CropTarget]) -> Self {
+    /// Returns a rig of the same camera with those detail views that show the middle of a target;
+    /// `None` if there are none.
+    pub(super) fn with_details_of(&self, targets: &[CropTarget]) -> Option<Self> {
         let lens = &self.geometry.lens;
         let rays: Vec<_> = targets
             .iter()
@@ -99,14 +100,15 @@ impl CameraRig {
             .collect();
         let shown = self.details.iter();
         let shown = shown.filter(|(view, _)| rays.iter().any(|ray| view.holds(ray)));
-        Self {
+        let shown: Vec<_> = shown.cloned().collect();
+        (!shown.is_empty()).then(|| Self {
             geometry: self.geometry.clone(),
             frame: self.frame,
             hidden: self.hidden.clone(),
-            views: Views::Virtual(shown.cloned().collect()),
+            views: Views::Virtual(shown),
             details: Vec::new(),
             left_out: LeftOut::default(),
-        }
+        })
     }
 
     /// Returns a rig of the same camera with crops of the frame instead of views.

@@ -338,8 +338,7 @@ impl Engine {
 
     /// Returns the camera's views in the motion cache, if the request enables motion detection.
     fn cached_views(&self, job: &DetectJob, seen: &Observation) -> Option<Arc<CameraViews>> {
-        let parameters = &job.parameters;
-        let camera = parameters.camera_name().filter(|_| parameters.motion)?;
+        let camera = job.parameters.motion_camera()?;
         Some(self.motion_cache.of(camera, &seen.camera.rig, &seen.model))
     }
 

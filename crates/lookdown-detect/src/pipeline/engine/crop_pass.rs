@@ -8,9 +8,7 @@ use super::{Engine, Observation};
 use crate::{
     inference::Model,
     parameters::{DetectParameters, Tuning},
-    pipeline::{
-        DetectJob, Stage, camera_rig::CameraRig, motion_cache::CameraViews, network::PassTask,
-    },
+    pipeline::{DetectJob, Stage, camera_rig::CameraRig, network::PassTask},
 };
 
 impl Engine {
@@ -28,31 +26,13 @@ impl Engine {
             return None;
         };
         let rig = Arc::new(rig);
-        let cached_views = self.cached_crops(job, &rig, &model);
-        timeline.enter(Stage::Queue, Instant::now());
-        let frame = Arc::clone(&observation.frame);
-        let ticket = job.ticket.clone();
-        let task = self
-            .inference
-            .queue_pass(rig, model, frame, ticket, cached_views);
-        Some(task)
+        let camera = job.parameters.motion_camera();
+        let cached = camera.and_then(|camera| self.motion_cache.of_crops(camera, &rig, &model));
+        Some(self.queue_later(job, observation, rig, model, cached))
     }
 
-    /// Returns the camera's crops in the motion cache, if the request enables motion detection.
-    fn cached_crops(
-        &self,
-        job: &DetectJob,
-        rig: &Arc<CameraRig>,
-        model: &Arc<Model>,
-    ) -> Option<Arc<CameraViews>> {
-        let parameters = &job.parameters;
-        let camera = parameters.camera_name().filter(|_| parameters.motion)?;
-        let _first = rig.crops().next()?;
-        self.motion_cache.of_crops(camera, rig, model)
-    }
-
-    /// Plans upright crops for the profile's model of crops, or for the model that the
-    /// request names.
+    /// Plans upright crops for the profile's model of crops, or for the model that the request
+    /// names.
     fn crops(
         &self,
         job: &DetectJob,

@@ -1,11 +1,17 @@
 //! The further looks of a search: detail views and crops where persons are possible.
 
-use std::time::Instant;
+use std::{sync::Arc, time::Instant};
 
 use lookdown_lens::geometry::crop_placement::CropTarget;
 
 use super::{Engine, Observation};
-use crate::pipeline::{DetectJob, PipelineError, Stage, merge};
+use crate::{
+    inference::Model,
+    pipeline::{
+        DetectJob, PipelineError, Stage, camera_rig::CameraRig, merge, motion_cache::CameraViews,
+        network::PassTask,
+    },
+};
 
 impl Engine {
     /// Looks again where the first pass shows a possible person, if the profile does so.
@@ -26,6 +32,22 @@ impl Engine {
             observation.wait_for(&crops)?;
         }
         Ok(())
+    }
+
+    /// Queues a later pass over a frame.
+    pub(super) fn queue_later(
+        &self,
+        job: &DetectJob,
+        observation: &Observation,
+        rig: Arc<CameraRig>,
+        model: Arc<Model>,
+        cached_views: Option<Arc<CameraViews>>,
+    ) -> Arc<PassTask> {
+        job.ticket.timeline.enter(Stage::Queue, Instant::now());
+        let frame = Arc::clone(&observation.frame);
+        let ticket = job.ticket.clone();
+        self.inference
+            .queue_pass(rig, model, frame, ticket, cached_views)
     }
 }
 
