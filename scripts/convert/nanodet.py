@@ -18,6 +18,8 @@ SIZE = 416
 CLASSES = 80
 PERSON_CLASS = 0
 DISTANCE_BINS = 11
+# The cells that are decoded, as many as a view has candidates by default (`inference.max_detections_per_view`).
+BEST_CELLS = 300
 # Stride in pixels -> the convolution that predicts classes and distances there, and the addition of its bias.
 HEADS = {
     8: ("PartitionedCall/convolution_29", "PartitionedCall/Add_29"),
@@ -55,16 +57,8 @@ def convert(model_json: Path, onnx_file: Path) -> None:
         channels_first_feeds=frozenset({"input_1"}),
         resize_factors=RESIZE_FACTORS,
     )
-    levels = [_level(builder, translator.feature_map(output), stride) for stride, (_, output) in HEADS.items()]
-    boxes, scores = zip(*levels, strict=True)
-    builder.save_detector(
-        onnx_file,
-        boxes=builder.node("Concat", list(boxes), axis=1),
-        scores=builder.node("Concat", list(scores), axis=1),
-        size=SIZE,
-        anchors=sum((SIZE // stride) ** 2 for stride in HEADS),
-        description=DESCRIPTION,
-    )
+    boxes, scores = decode(builder, [translator.feature_map(output) for _, output in HEADS.values()])
+    builder.save_detector(onnx_file, boxes=boxes, scores=scores, size=SIZE, anchors=BEST_CELLS, description=DESCRIPTION)
 
 
 def _keep_person_class(graph: TfGraph) -> None:
@@ -81,24 +75,37 @@ def _take_red_first(graph: TfGraph) -> None:
     graph.constants[name] = graph.constant(name)[:, :, ::-1, :]
 
 
-def _level(builder: OnnxBuilder, head: str, stride: int) -> tuple[str, str]:
-    """Boxes `[N, cells, 4]` and scores `[N, cells]` of one stride's head `[N, 1 + 44, rows, columns]`."""
-    logits, bins = builder.split(head, [1, 4 * DISTANCE_BINS], axis=1)
-    scores = builder.reshape(builder.node("Sigmoid", [logits]), [0, -1])
-    chances = builder.node("Softmax", [builder.reshape(bins, [0, 4, DISTANCE_BINS, -1])], axis=2)
-    strides = builder.constant(numpy.arange(DISTANCE_BINS, dtype=numpy.float32).reshape(1, 1, -1, 1))
-    over_bins = builder.constant(numpy.array([2], numpy.int64))
-    distances = builder.node("ReduceSum", [builder.node("Mul", [chances, strides]), over_bins], keepdims=0)
-    outwards = builder.constant(numpy.array([-stride, -stride, stride, stride], numpy.float32))
-    shifts = builder.node("Mul", [builder.node("Transpose", [distances], perm=[0, 2, 1]), outwards])
-    return builder.node("Add", [shifts, builder.constant(_cell_centres(stride))]), scores
+def decode(builder: OnnxBuilder, heads: list[str]) -> tuple[str, str]:
+    """Boxes `[N, BEST_CELLS, 4]` and scores `[N, BEST_CELLS]` of the heads `[N, 1 + 44, rows, columns]`, best first.
+
+    Only the best cells are decoded: the distributions of all others would cost more than a convolution.
+    """
+    flat = [builder.reshape(head, [0, 1 + 4 * DISTANCE_BINS, -1]) for head in heads]
+    logits, bins = builder.split(builder.node("Concat", flat, axis=2), [1, 4 * DISTANCE_BINS], axis=1)
+    best, cells = builder.top(builder.reshape(logits, [0, -1]), BEST_CELLS)
+    in_each_bin = builder.node(
+        "Expand", [builder.reshape(cells, [0, 1, -1]), _integers(builder, 1, 4 * DISTANCE_BINS, 1)]
+    )
+    best_bins = builder.reshape(builder.node("GatherElements", [bins, in_each_bin], axis=2), [0, 4, DISTANCE_BINS, -1])
+    chances = builder.node("Softmax", [best_bins], axis=2)
+    distances = builder.constant(numpy.arange(DISTANCE_BINS, dtype=numpy.float32).reshape(1, 1, -1, 1))
+    means = builder.node("ReduceSum", [builder.node("Mul", [chances, distances]), _integers(builder, 2)], keepdims=0)
+    centres, outwards = (numpy.concatenate(parts) for parts in zip(*map(_cells, HEADS), strict=True))
+    centres, outwards = (builder.node("Gather", [builder.constant(of_all), cells]) for of_all in (centres, outwards))
+    shifts = builder.node("Mul", [builder.node("Transpose", [means], perm=[0, 2, 1]), outwards])
+    return builder.node("Add", [shifts, centres]), builder.node("Sigmoid", [best])
 
 
-def _cell_centres(stride: int) -> numpy.ndarray:
-    """Centers of the cells in pixels, row by row, as x, y, x, y: `[1, cells, 4]`."""
+def _cells(stride: int) -> tuple[numpy.ndarray, numpy.ndarray]:
+    """Of the cells of a stride, row by row: the centers as x, y, x, y, and a step outward at each side, in pixels."""
     along = (numpy.arange(SIZE // stride, dtype=numpy.float32) + 0.5) * stride
     y, x = numpy.meshgrid(along, along, indexing="ij")
-    return numpy.stack([x, y, x, y], axis=-1).reshape(1, -1, 4)
+    centres = numpy.stack([x, y, x, y], axis=-1).reshape(-1, 4)
+    return centres, numpy.full_like(centres, stride) * numpy.array([-1, -1, 1, 1], numpy.float32)
+
+
+def _integers(builder: OnnxBuilder, *values: int) -> str:
+    return builder.constant(numpy.array(values, numpy.int64))
 
 
 def _per_channel(builder: OnnxBuilder, values) -> str:
