@@ -49,11 +49,26 @@ def settings(parallel: bool) -> list[Setting]:
 @contextlib.contextmanager
 def plain_python(setting: Setting, plan: Path, refine: str) -> Iterator[Server]:
     """FastAPI, OpenCV and ONNX Runtime."""
+    with python_server("plain_python", setting, PLAN=plan, CALIBRATION=calibration(), REFINE=refine) as server:
+        yield server
+
+
+@contextlib.contextmanager
+def slicer(setting: Setting, side: int) -> Iterator[Server]:
+    """`supervision`'s InferenceSlicer over the frame itself, in slices of so many pixels."""
+    with python_server("slicer", setting, SLICE=side) as server:
+        yield server
+
+
+@contextlib.contextmanager
+def python_server(name: str, setting: Setting, **own: object) -> Iterator[Server]:
+    """The web server of `peers/app.py` with the detector of the peer's folder."""
     (port,) = free_ports(1)
-    command = [str(python_of("plain_python")), "-m", "uvicorn", "app:app", "--log-level", "warning"]
+    command = [str(python_of(name)), "-m", "uvicorn", "app:app", "--log-level", "warning"]
     command += ["--port", str(port), "--workers", str(setting.processes)]
-    environment = setting.environment() | {"PLAN": str(plan), "CALIBRATION": str(calibration()), "REFINE": refine}
-    with running("plain_python", command, port, "/ready", environment, PEERS / "plain_python") as server:
+    environment = setting.environment() | {key: str(value) for key, value in own.items()}
+    environment["PYTHONPATH"] = str(PEERS / name)
+    with running(name, command, port, "/ready", environment, PEERS) as server:
         yield server
 
 

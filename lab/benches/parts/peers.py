@@ -1,7 +1,7 @@
 """Other servers in the same run, alternating with Lookdown.
 
 (a) plain Python as one writes it, with the paper's plan and with ours; (b) the views of our plan posted to a V2
-server, which decodes, renders and merges nothing.
+server, which decodes, renders and merges nothing; (c) sliced inference over the frame itself with `supervision`.
 """
 
 import time
@@ -26,11 +26,21 @@ NAMES = {
     "plain": f"{THEIRS}our `balanced` plan",
     "paper": f"{THEIRS}the paper's plan",
     "v2": "MLServer (V2), ready views of `balanced`",
+    "slicer": "supervision's InferenceSlicer, 640 px",
 }
+SLICE = 640
+"""Side of a slice: the default of `supervision`, whose accuracy others do not surpass by much (NOTES.md)."""
+TUNED = ("plain", "v2", "slicer")
+"""The peers whose settings are searched; the paper's plan takes those of ours."""
 SLOW_CLIENTS = 4
 """Clients of the paper's plan in plain Python, enough to keep all cores busy at many seconds per frame."""
 # The comparisons.
-PAIRS = ((OURS[0], NAMES["plain"]), (OURS[1], NAMES["paper"]), (OURS[0], NAMES["v2"]))
+PAIRS = (
+    (OURS[0], NAMES["plain"]),
+    (OURS[1], NAMES["paper"]),
+    (OURS[0], NAMES["v2"]),
+    (OURS[1], NAMES["slicer"]),
+)
 
 
 def measure(effort: Effort) -> dict:
@@ -43,9 +53,10 @@ def measure(effort: Effort) -> dict:
             "plain": lambda setting: peers.plain_python(setting, plan_file(plan), "nms"),
             "paper": lambda setting: peers.plain_python(setting, plan_file(paper_plan), "soft_nms"),
             "v2": peers.v2_server,
+            "slicer": lambda setting: peers.slicer(setting, SLICE),
         }
-        asked = {"plain": plain_body(), "paper": plain_body(), "v2": v2_body(request)}
-        tuned = {name: tune(effort, starts[name], asked[name], name != "v2") for name in ("plain", "v2")}
+        asked = dict.fromkeys(starts, plain_body()) | {"v2": v2_body(request)}
+        tuned = {name: tune(effort, starts[name], asked[name], name != "v2") for name in TUNED}
         tuned["paper"] = tuned["plain"]
         setting = {name: peers.Setting(**best(rows)["setting"]) for name, rows in tuned.items()}
         servers = {name: stack.enter_context(start(setting[name])) for name, start in starts.items()}
@@ -60,7 +71,7 @@ def measure(effort: Effort) -> dict:
                 rounds[name].append(window(server, what, clients[name], effort.seconds))
         return {
             "settings": {NAMES[name]: chosen.text() for name, chosen in setting.items()},
-            "tuning": {NAMES[name]: tuned[name] for name in ("plain", "v2")},
+            "tuning": {NAMES[name]: tuned[name] for name in TUNED},
             "clients": clients,
             "rounds": rounds,
             "agreement": agreement(ours, servers["plain"]),

@@ -1,6 +1,12 @@
-"""The detector: frame, views, network, boxes mapped to the frame, suppression."""
+"""A typical person detector for fisheye frames: OpenCV's `remap`, ONNX Runtime, boxes mapped to the frame, suppression.
 
+Settings beside those of `app.py`: PLAN and CALIBRATION (files), REFINE (`nms` or `soft_nms`).
+"""
+
+import json
 import threading
+from collections.abc import Mapping
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -10,6 +16,18 @@ from views import Lens, View
 
 SCORE = 0.3
 """The minimum score of a person. Boxes below it cannot become or change a person."""
+
+
+def detector_of(settings: Mapping[str, str]) -> "Detector":
+    """The detector of these settings."""
+    return Detector(
+        settings["MODEL"],
+        json.loads(Path(settings["PLAN"]).read_text()),
+        json.loads(Path(settings["CALIBRATION"]).read_text()),
+        settings["REFINE"],
+        int(settings["THREADS"]),
+        int(settings["BATCH"]),
+    )
 
 
 class Detector:
