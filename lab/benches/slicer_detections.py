@@ -12,7 +12,7 @@ from harness.lookdown import MODEL
 from harness.places import PEERS, model
 
 sys.path.insert(0, str(PEERS / "slicer"))
-import detector  # noqa: E402
+from detector import Detector  # noqa: E402
 
 SCORE = 0.05
 """Lower than in the server, as `lookdown eval` needs it for average precision."""
@@ -20,8 +20,7 @@ SCORE = 0.05
 
 def main(data_set: Path, side: int, out: Path) -> None:
     """Writes the detections of all images."""
-    detector.SCORE = SCORE
-    slicer = detector.Detector(str(model(MODEL)), side, threads=1, workers=1)
+    slicer = Detector(str(model(MODEL)), side, threads=1, workers=1, score=SCORE)
     found = []
     for image in json.loads((data_set / "annotations.json").read_text())["images"]:
         for person in slicer.detect((data_set / "images" / image["file_name"]).read_bytes()):

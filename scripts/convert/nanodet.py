@@ -78,7 +78,7 @@ def _take_red_first(graph: TfGraph) -> None:
 def decode(builder: OnnxBuilder, heads: list[str]) -> tuple[str, str]:
     """Boxes `[N, BEST_CELLS, 4]` and scores `[N, BEST_CELLS]` of the heads `[N, 1 + 44, rows, columns]`, best first.
 
-    Only the best cells are decoded: the distributions of all others would cost more than a convolution.
+    Only the best cells are decoded: the distributions of all others would be computed for nothing.
     """
     flat = [builder.reshape(head, [0, 1 + 4 * DISTANCE_BINS, -1]) for head in heads]
     logits, bins = builder.split(builder.node("Concat", flat, axis=2), [1, 4 * DISTANCE_BINS], axis=1)

@@ -22,14 +22,14 @@ from harness.views import plan_file, v2_request, view_file
 
 INPUT_SIDE = 416
 OURS, THEIRS = ("Lookdown, `balanced`", "Lookdown, `fast`"), "plain Python, "
+SLICE = 640
+"""Side of a slice in pixels, the default of `supervision`. No other side finds many more people (NOTES.md)."""
 NAMES = {
     "plain": f"{THEIRS}our `balanced` plan",
     "paper": f"{THEIRS}the paper's plan",
     "v2": "MLServer (V2), ready views of `balanced`",
-    "slicer": "supervision's InferenceSlicer, 640 px",
+    "slicer": f"supervision's InferenceSlicer, {SLICE} px",
 }
-SLICE = 640
-"""Side of a slice: the default of `supervision`, whose accuracy others do not surpass by much (NOTES.md)."""
 TUNED = ("plain", "v2", "slicer")
 """The peers whose settings are searched; the paper's plan takes those of ours."""
 SLOW_CLIENTS = 4

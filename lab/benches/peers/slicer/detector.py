@@ -21,7 +21,8 @@ OVERLAP = 0.2
 class Detector:
     """Finds persons in frames."""
 
-    def __init__(self, model: str, side: int, threads: int, workers: int):
+    def __init__(self, model: str, side: int, threads: int, workers: int, score: float = SCORE):
+        self.score = score
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = threads
         self.session = onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
@@ -51,7 +52,7 @@ class Detector:
         tensor = np.zeros((1, 3, self.size, self.size), np.float32)
         tensor[0, :, : scaled.shape[0], : scaled.shape[1]] = scaled[..., ::-1].transpose(2, 0, 1)
         boxes, scores = (output[0] for output in self.session.run(["boxes", "scores"], {"images": tensor}))
-        good = scores >= SCORE
+        good = scores >= self.score
         found = supervision.Detections(
             xyxy=np.clip(boxes[good] * (longest / self.size), 0, (*piece.shape[1::-1],) * 2),
             confidence=scores[good],
