@@ -6,7 +6,7 @@
 
 use std::{
     sync::{Arc, Weak},
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use jiff::Timestamp;
@@ -32,6 +32,9 @@ const MAX_MOVING: usize = 32;
 const MOST_MOVED: usize = 4;
 /// Least score of boxes of crops, before they get the odds of their persons.
 const LEAST_SCORE: f64 = 1e-4;
+/// The next search of a camera is not due before so many times the time that the last one took.
+/// Searches of frames that wait for others would otherwise leave no time to follow anyone.
+const SEARCH_TIMES: u32 = 3;
 
 /// The followed persons of each camera.
 #[derive(Default)]
@@ -57,6 +60,7 @@ impl FollowCache {
             kept,
             origin,
             signature,
+            started: Instant::now(),
             at,
             before,
             moving,
@@ -102,6 +106,8 @@ impl FollowOrigin {
 struct Followed {
     origin: FollowOrigin,
     searched_at: Timestamp,
+    /// Time from this search to the next one.
+    search_every: Duration,
     at: Timestamp,
     /// The signature of the searched frame.
     searched: FrameSignature,
@@ -113,14 +119,15 @@ struct Followed {
 impl Followed {
     /// Returns which persons have motion around them. `None` if the whole frame must be searched.
     fn moving(&self, signature: &FrameSignature, at: Timestamp) -> Option<Vec<bool>> {
-        let age = at.duration_since(self.searched_at);
-        if at < self.at || Duration::try_from(age).is_ok_and(|age| age >= MAX_AGE) {
+        // An error: a frame older than the searched one.
+        let age = Duration::try_from(at.duration_since(self.searched_at)).ok()?;
+        if at < self.at || age >= MAX_AGE {
             return None;
         }
         let moved = signature.moved_since(&self.searched, &self.visible)?;
         let moved = if is_noise(&moved) { Vec::new() } else { moved };
         let is_still = moved.is_empty() && self.people.are_all_seen();
-        if age.as_secs_f64() >= SEARCH_EVERY_S && !(is_still && self.origin.skips_still_frames) {
+        if age >= self.search_every && !(is_still && self.origin.skips_still_frames) {
             return None;
         }
         if moved.len() > self.visible.len() / MOST_MOVED || !self.explains(&moved, at) {
@@ -147,6 +154,7 @@ pub(super) struct FollowedFrame {
     kept: Arc<Mutex<Option<Followed>>>,
     origin: FollowOrigin,
     signature: FrameSignature,
+    started: Instant,
     at: Timestamp,
     before: Option<Followed>,
     /// The persons of `before` with motion; `None` if the whole frame is searched.
@@ -201,6 +209,7 @@ impl FollowedFrame {
                 let state = Followed {
                     origin: self.origin,
                     searched_at: self.at,
+                    search_every: search_every(self.started.elapsed()),
                     at: self.at,
                     searched: self.signature,
                     visible,
@@ -254,6 +263,11 @@ impl FoundPerson for Person {
     fn with_score(self, score: f64) -> Self {
         Self { score, ..self }
     }
+}
+
+/// Returns the time to the next search after one that took so long.
+fn search_every(took: Duration) -> Duration {
+    Duration::from_secs_f64(SEARCH_EVERY_S).max(took * SEARCH_TIMES)
 }
 
 /// Returns the seconds since the Unix epoch.

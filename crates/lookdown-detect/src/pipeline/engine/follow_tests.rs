@@ -85,6 +85,20 @@ fn the_whole_frame_is_searched_every_second() {
 }
 
 #[test]
+fn after_a_slow_search_persons_are_followed_for_longer_than_a_second() {
+    let slow = BlobDetector {
+        before: Box::new(|| {
+            std::thread::sleep(Duration::from_millis(400));
+            Ok(())
+        }),
+        ..BlobDetector::default()
+    };
+    let camera = FollowedCamera(engine(slow, Some(calibration(""))));
+    let searches = [0, 1100, 10_000].map(|at| camera.report(at, [420.0, 300.0], 20.0).search);
+    assert_eq!(searches, [Search::Full, Search::Unchanged, Search::Full]);
+}
+
+#[test]
 fn with_motion_a_still_frame_is_not_searched_for_10_s() {
     let camera = FollowedCamera::new();
     // A search finds its views in the motion cache, whose clock is that of the server.
