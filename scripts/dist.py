@@ -16,7 +16,7 @@ from pathlib import Path
 
 import sbom
 from assets.machine import supported_cpu
-from assets.pins import Pins, read_pins
+from assets.pins import Derived, Pins, read_pins
 from assets.sums import sha256_of
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -63,11 +63,14 @@ def files_of(root: Path, pins: Pins, cpu: str, runtime: Path) -> Iterator[tuple[
 
 
 def default_model_files(root: Path, pins: Pins) -> Iterator[tuple[Path, str]]:
-    """The default models, the manifests of models that `lookdown model fetch` installs, and their names in a package."""
+    """The default models with the licenses of their origins, and the manifests of models that `lookdown model fetch`
+    installs, with their names in a package."""
+    models = root / "models"
     for model in pins.models + pins.derived:
         if model.default:
-            folder = root / "models" / model.name
-            for file in (folder / "model.toml", folder / "model.onnx", *sorted(folder.glob("LICENSE-*"))):
+            origin = model.origin if isinstance(model, Derived) else model
+            licenses = sorted((models / origin.name).glob("LICENSE-*"))
+            for file in (models / model.name / "model.toml", models / model.name / "model.onnx", *licenses):
                 yield file, f"models/{model.name}/{file.name}"
     for manifest in sorted((root / "models").glob("*/model.toml")):
         if "upstream" in tomllib.loads(manifest.read_text(encoding="utf-8")):

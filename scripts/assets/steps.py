@@ -14,7 +14,7 @@ from .private_python import PrivatePython, pip_environment
 from .sums import is_whole, require_sum
 
 LIBRARY = "runtime/libonnxruntime.so"
-CONVERTED_REMEDY = "If you changed scripts/convert, write the new sum into scripts/pins.toml; if not, it is a defect."
+CONVERTED_REMEDY = "If you changed scripts/convert, write the new sum into its model.toml; if not, it is a defect."
 LOAD_LIBRARY = "import ctypes, sys; ctypes.CDLL(sys.argv[1]).OrtGetApiBase"
 
 

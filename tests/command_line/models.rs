@@ -181,7 +181,7 @@ fn manifests_of_random_networks_are_written_with_a_warning() {
 #[test]
 fn manifest_of_a_network_that_detects_persons_has_its_input() {
     let installed =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("models/nanodet_g_416_int8/model.onnx");
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("models/nanodet_g_views_416_int8/model.onnx");
     let folder = without_manifest(&installed);
     let output = write_manifest(&folder);
     let warning = String::from_utf8(output.stderr).unwrap();

@@ -169,9 +169,9 @@ fn report_names_the_models_of_views_and_crops() {
     let some = |name: &str| Some(name.to_owned());
     // The CPU decides on INT8 for `balanced` and `quality`.
     let expected = if cpu_has_integer_dot_product() {
-        "nanodet_g_416_int8"
+        "nanodet_g_views_416_int8"
     } else {
-        "nanodet_g_416"
+        "nanodet_g_views_416"
     };
     for profile in ["balanced", "quality"] {
         let report = detect("office", &["--profile", profile]);
@@ -184,7 +184,7 @@ fn report_names_the_models_of_views_and_crops() {
     assert_eq!(
         names(&fast),
         [
-            some("nanodet_g_416_int8"),
+            some("nanodet_g_views_416_int8"),
             some("nanodet_g_fisheye_416_int8")
         ]
     );
@@ -194,7 +194,7 @@ fn report_names_the_models_of_views_and_crops() {
 fn named_model_processes_the_crops_as_well() {
     let report = detect(
         "office",
-        &["--profile", "fast", "--model", "nanodet_g_416_int8"],
+        &["--profile", "fast", "--model", "nanodet_g_views_416_int8"],
     );
     assert!(report.get("crop_model").is_none());
 }

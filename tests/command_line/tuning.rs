@@ -28,7 +28,7 @@ fn manifest(folder: &TempDir) -> String {
 
 #[test]
 fn a_tuned_model_keeps_its_manifest_and_detects_with_the_tuning() {
-    let folder = copied("models/nanodet_g_416_int8");
+    let folder = copied("models/nanodet_g_views_416_int8");
     let before = manifest(&folder);
     let output = tune(&folder, "fast", &[]);
     assert!(output.status.success(), "{output:?}");
@@ -66,7 +66,7 @@ fn a_network_that_finds_nobody_is_not_tuned() {
 
 #[test]
 fn a_dry_run_changes_no_manifest_and_a_missing_one_is_named() {
-    let folder = copied("models/nanodet_g_416_int8");
+    let folder = copied("models/nanodet_g_views_416_int8");
     let before = manifest(&folder);
     assert!(tune(&folder, "direct", &["--dry-run"]).status.success());
     assert_eq!(manifest(&folder), before);

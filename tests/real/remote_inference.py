@@ -10,7 +10,7 @@ from harness.places import SAMPLES, model
 from harness.processes import Server
 from waiting import wait_until
 
-MODEL = "nanodet_g_416"
+MODEL = "nanodet_g_views_416"
 FRAME = (SAMPLES / "office.jpg").read_bytes()
 FAST = "/detect?calibration=office&profile=fast"
 BALANCED = "/detect?calibration=office"

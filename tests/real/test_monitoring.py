@@ -193,8 +193,8 @@ class Monitoring(unittest.TestCase):
             "SERVER__LISTEN": f"127.0.0.1:{port}",
             "INFERENCE__BACKEND": "v2",
             "INFERENCE__URL": f"http://127.0.0.1:{unused}",
-            "INFERENCE__MODEL": "nanodet_g_416",
-            "MODEL__PATH": str(model("nanodet_g_416").parent),
+            "INFERENCE__MODEL": "nanodet_g_views_416",
+            "MODEL__PATH": str(model("nanodet_g_views_416").parent),
             "SHUTDOWN__GRACE_MILLIS": "0",
         }
         environment = {f"LOOKDOWN__{name}": value for name, value in settings.items()}

@@ -1,7 +1,8 @@
-//! The repository: its documentation, documented variables, layers, OpenAPI document, the
-//! libraries' API, the fuzzing corpus and the workflows.
+//! The repository: its converter, documentation, documented variables, layers, OpenAPI document,
+//! the libraries' API, the fuzzing corpus and the workflows.
 #![expect(clippy::unwrap_used, reason = "a panic fails the test")]
 
+mod converter;
 mod documentation;
 mod fuzz_corpus;
 mod layering;

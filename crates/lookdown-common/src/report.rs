@@ -15,8 +15,8 @@ use utoipa::ToSchema;
     "captured_at": "2026-11-21T09:30:00Z",
     "calibration": {"id": "lobby", "revision": "9f86d081884c", "assumed": false},
     "image": {"width": 1680, "height": 1680},
-    "model": {"name": "nanodet_g_416", "revision": "a3c2e9b54d10"},
-    "crop_model": {"name": "nanodet_g_fisheye_416_int8", "revision": "690188fe8204"},
+    "model": {"name": "nanodet_g_views_416", "revision": "f22204aacebf"},
+    "crop_model": {"name": "nanodet_g_fisheye_416_int8", "revision": "ee6466ba3497"},
     "profile": "quality",
     "refinement": {
         "name": "fusion", "score_threshold": 0.3, "iou_threshold": 0.5, "sigma": 0.3,

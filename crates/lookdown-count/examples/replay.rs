@@ -1,7 +1,9 @@
 //! Counts the reports of a clip again and again, as if its camera had gone on: the number of
-//! persons of each round. `docs/lab/count-accuracy.md` has the command.
+//! persons of each round. `docs/lab/count-accuracy.md` has the command. With a fifth argument, a
+//! file, its store is kept, so that `lookdown count CLIP --store FILE --annotate OUT.mp4` goes on
+//! from it.
 
-use std::{error::Error, fs, sync::Arc, time::Duration};
+use std::{error::Error, fs, path::PathBuf, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 use lookdown_count::Recording;
@@ -16,8 +18,8 @@ const BEGIN: usize = 25;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [reports, calibration, interval_ms, rounds] = arguments.as_slice() else {
-        return Err("replay REPORTS.jsonl CALIBRATION.json INTERVAL_MS ROUNDS".into());
+    let [reports, calibration, interval_ms, rounds, kept @ ..] = arguments.as_slice() else {
+        return Err("replay REPORTS.jsonl CALIBRATION.json INTERVAL_MS ROUNDS [STORE]".into());
     };
     let (interval_ms, rounds) = (interval_ms.parse::<i64>()?, rounds.parse::<usize>()?);
     let reports = fs::read_to_string(reports)?;
@@ -27,7 +29,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (id, calibration) = file.calibrations("replay", &content).remove(0);
     let calibration = Some(Arc::new(calibration?));
     let folder = tempfile::tempdir()?;
-    let store = folder.path().join("counts.sqlite");
+    let temporary = || folder.path().join("counts.sqlite");
+    let store = kept.first().map_or_else(temporary, PathBuf::from);
     let mut recording = Recording::open(&store, LONGEST_GAP, &id, calibration)?;
     let mut at_ms = START_MS;
     for round in 1..=rounds {
@@ -41,6 +44,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             show(round, persons.get(BEGIN..).unwrap_or_default());
         }
     }
+    recording.commit()?;
     Ok(())
 }
 

@@ -9,7 +9,7 @@ from .frames import calibration
 from .places import LOOKDOWN, SAMPLES
 from .processes import Server, free_ports, running
 
-MODEL = "nanodet_g_416"
+MODEL = "nanodet_g_views_416"
 """The model of the profiles `fast` and `balanced`."""
 
 ROOMY = {

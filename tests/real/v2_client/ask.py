@@ -10,7 +10,7 @@ from tritonclient.http import InferenceServerClient, InferInput, InferRequestedO
 from tritonclient.utils import InferenceServerException
 
 MODEL = "lookdown"
-DETECTOR = "nanodet_g_416_int8"
+DETECTOR = "nanodet_g_views_416_int8"
 OUTPUTS = ("boxes", "scores", "oriented_boxes", "views", "counts", "report")
 FAST = {"calibration": "office", "profile": "fast"}
 

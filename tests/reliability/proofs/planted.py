@@ -16,7 +16,7 @@ from support.exchange import ask
 from support.lookdown import lookdown
 from support.row import Row
 
-MODEL = "nanodet_g_416"
+MODEL = "nanodet_g_views_416"
 """The model whose folder is copied."""
 LONGEST_SECONDS = 10.0
 """Longest time of a refusal."""

@@ -17,9 +17,9 @@ fn preferred(profile: Profile, int8: Int8Use) -> &'static [&'static str] {
         (Profile::Paper | Profile::Direct, _) => &[SSDLITE_INT8],
         (Profile::Fast, Int8Use::SmallProfiles)
         | (Profile::Fast | Profile::Balanced | Profile::Quality, Int8Use::All) => {
-            &[NANODET_INT8, NANODET]
+            &[VIEWS_INT8, VIEWS]
         }
-        (Profile::Fast | Profile::Balanced | Profile::Quality, _) => &[NANODET],
+        (Profile::Fast | Profile::Balanced | Profile::Quality, _) => &[VIEWS],
     }
 }
 
@@ -34,9 +34,9 @@ fn preferred_for_crops(profile: Profile, int8: Int8Use) -> &'static [&'static st
     }
 }
 
-const NANODET: &str = "nanodet_g_416";
+const VIEWS: &str = "nanodet_g_views_416";
 
-const NANODET_INT8: &str = "nanodet_g_416_int8";
+const VIEWS_INT8: &str = "nanodet_g_views_416_int8";
 
 const FISHEYE: &str = "nanodet_g_fisheye_416";
 
@@ -147,13 +147,9 @@ mod tests {
     #[test]
     fn a_model_that_was_not_fetched_has_a_fallback() {
         let all = DefaultModels::per_profile(Int8Use::SmallProfiles, |_| true);
-        assert_eq!(
-            all.names(),
-            [NANODET, FISHEYE_INT8, SSDLITE_INT8, NANODET_INT8]
-        );
-        let without =
-            DefaultModels::per_profile(Int8Use::SmallProfiles, |name| name != NANODET_INT8);
-        assert_eq!(without.of(Profile::Fast), NANODET);
+        assert_eq!(all.names(), [VIEWS, FISHEYE_INT8, SSDLITE_INT8, VIEWS_INT8]);
+        let without = DefaultModels::per_profile(Int8Use::SmallProfiles, |name| name != VIEWS_INT8);
+        assert_eq!(without.of(Profile::Fast), VIEWS);
         let few = DefaultModels::per_profile(Int8Use::SmallProfiles, |_| false);
         assert_eq!(few.names(), [FALLBACK]);
     }
@@ -166,15 +162,15 @@ mod tests {
         assert_eq!(cpu.of(Profile::Paper), SSDLITE_INT8);
         assert_eq!(
             (cpu.of(Profile::Fast), gpu.of(Profile::Fast)),
-            (NANODET_INT8, NANODET)
+            (VIEWS_INT8, VIEWS)
         );
         assert_eq!(cpu.of(Profile::Balanced), gpu.of(Profile::Balanced));
         let vnni = DefaultModels::per_profile(Int8Use::All, |_| true);
-        assert_eq!(vnni.of(Profile::Balanced), NANODET_INT8);
-        assert_eq!(vnni.of(Profile::Quality), NANODET_INT8);
+        assert_eq!(vnni.of(Profile::Balanced), VIEWS_INT8);
+        assert_eq!(vnni.of(Profile::Quality), VIEWS_INT8);
         assert_eq!(vnni.crop_model(Profile::Balanced), Some(FISHEYE_INT8));
-        let not_fetched = DefaultModels::per_profile(Int8Use::All, |name| name != NANODET_INT8);
-        assert_eq!(not_fetched.of(Profile::Balanced), NANODET);
+        let not_fetched = DefaultModels::per_profile(Int8Use::All, |name| name != VIEWS_INT8);
+        assert_eq!(not_fetched.of(Profile::Balanced), VIEWS);
     }
 
     #[test]

@@ -25,7 +25,7 @@ use body::{IndexRequest, LoadRequest, SmallBody, UnloadRequest};
 
 /// A model of the repository.
 #[derive(Serialize, ToSchema)]
-#[schema(example = json!({ "name": "nanodet_g_416", "version": "3f1c22ab90de", "state": "READY" }))]
+#[schema(example = json!({ "name": "nanodet_g_views_416", "version": "3f1c22ab90de", "state": "READY" }))]
 pub(in crate::api) struct RepositoryEntry {
     /// The name of the model.
     name: String,

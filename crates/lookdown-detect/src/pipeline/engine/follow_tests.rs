@@ -85,7 +85,7 @@ fn the_whole_frame_is_searched_every_second() {
 }
 
 #[test]
-fn after_a_slow_search_persons_are_followed_for_longer_than_a_second() {
+fn a_slow_search_is_not_repeated_after_a_second() {
     let slow = BlobDetector {
         before: Box::new(|| {
             std::thread::sleep(Duration::from_millis(400));
