@@ -40,7 +40,7 @@ const RIVAL_EVIDENCE: f64 = 12.0;
 /// Difference of two maxima that matters: share of the radius, and radians of the level.
 const RIVAL_DISTANCE: (f64, f64) = (0.03, 0.026);
 /// Largest uncertainty of the radius, as a share, and of the level, degrees.
-const MAX_UNCERTAINTY: (f64, f64) = (0.025, 0.8);
+const MAX_UNCERTAINTY: (f64, f64) = (0.028, 0.8);
 /// Standard deviation of the second coefficient of a lens from that of an ideal lens. A wider one
 /// exchanges curvature at the rim for focal length, and makes the middle too large.
 const K2_SIGMA: f64 = 0.0015;
@@ -134,6 +134,7 @@ impl RoomFit {
         #[expect(clippy::cast_precision_loss, reason = "a few frames")]
         let weight = 1.0 / frames.len() as f64;
         let mut best: Option<(Vec<Maximum>, Prior)> = None;
+        let mut others: Vec<Maximum> = Vec::new();
         for (index, circle) in circles.iter().enumerate() {
             let prior = prior(circle, known);
             let found = maxima(curves, weight, &prior, known);
@@ -143,10 +144,15 @@ impl RoomFit {
             if before
                 .is_none_or(|before| first.evaluation.evidence > before.evaluation.evidence + least)
             {
-                best = Some((found, prior));
+                let worse = best.replace((found, prior));
+                others.extend(worse.into_iter().flat_map(|(maxima, _)| maxima));
+            } else {
+                others.extend(found);
             }
         }
-        let (maxima, prior) = best.ok_or(FitRefusal::NoDirections { explained: 0.0 })?;
+        let (mut maxima, prior) = best.ok_or(FitRefusal::NoDirections { explained: 0.0 })?;
+        // The camera of another circle is a rival, too.
+        maxima.extend(others);
         checked(curves, weight, &maxima, &prior)
     }
 }
