@@ -46,7 +46,7 @@ const MAX_UNCERTAINTY: (f64, f64) = (0.028, 0.8);
 const K2_SIGMA: f64 = 0.0015;
 /// Errors of the radius are larger than the edges say, because no lens is exactly one of the
 /// family: by this factor, and by this share of the radius however many edges there are. 68 % of
-/// 177 errors in rendered frames are within 0.9 of the deviations that result, 95 % within 2.4.
+/// 177 errors in rendered frames are within 0.8 of the deviations that result, 95 % within 2.0.
 const LENS_MISFIT: f64 = 1.4;
 const LENS_FLOOR: f64 = 0.003;
 /// Standard deviation of the radius, as a share, from which further starts look for rivals.

@@ -33,8 +33,8 @@ pub enum FitRefusal {
     VerticalUnclear,
     /// Two cameras explain the edges equally well.
     #[error(
-        "two different cameras explain the edges equally well: give the model of the lens, or further frames. A camera \
-         that looks straight down often needs the model"
+        "two different cameras explain the edges equally well: give the model of the lens (a camera that looks \
+         straight down often needs it), or further frames"
     )]
     Ambiguous,
     /// The evidence is flat.
