@@ -1,5 +1,8 @@
 #!/usr/bin/env python3
-"""Measure `lookdown calibration fit` on the frames of `tilted_rooms.py`: `fit_rooms.py DATASET [--binary PATH] [--people]`.
+"""Measure `lookdown calibration fit` on frames with true calibrations: `fit_rooms.py DATASET [--binary PATH] [--people]`.
+
+DATASET is a folder of `tilted_rooms.py`, or of the generator of training frames, whose rooms two options use: `--half`
+takes every second group of four rooms, and `--rooms` names the folder of the rooms to report their kinds.
 
 Prints one line per camera, then median, 95 % quantile and greatest value of three errors: the radius at 20 to 80 degrees
 in percent, the center in percent of the width, the level in degrees. Cameras that the program refuses are counted by
@@ -22,6 +25,12 @@ from tilted_rooms import level, radius, rays
 
 LIMITS = {"radius": 2.0, "center": 0.7, "level": 1.0}
 WRONG = {"radius": 5.0, "level": 3.0}
+#: Upper ends of the groups of tilts, degrees.
+TILTS = [1, 5, 25, 36, 90]
+#: A narrower room is a corridor, meters.
+CORRIDOR = 5.0
+#: Objects in 100 square meters below which a room is sparse, and above which it is cluttered.
+SPARSE, CLUTTERED = 10, 25
 
 
 def errors(found, true):
@@ -68,6 +77,38 @@ def run(binary, *arguments):
     return None, re.sub(r"[\d.]+", "N", said), seconds
 
 
+def room_kind(path):
+    """The kind of a room of the generator, from its size and its objects."""
+    with np.load(path) as arrays:
+        about = json.loads(bytes(arrays["about"]))
+    width, depth = about["size"]
+    if min(width, depth) < CORRIDOR:
+        return "corridor"
+    density = 100 * len(about["occupied"]) / (width * depth)
+    return "sparse" if density < SPARSE else "cluttered" if density > CLUTTERED else "furnished"
+
+
+def groups(image, true, rooms):
+    """The groups that a camera belongs to."""
+    tilt = math.degrees(math.acos(min(1.0, -true["mount"]["world_up"][2])))
+    names = [f"tilt up to {next(end for end in TILTS if tilt <= end)}°"]
+    names += [f"lens {true['lens']['model']}"]
+    names += [f"degradation {image['degradation']}"] if "degradation" in image else []
+    names += [f"look {image['look']['kind']}"] if "look" in image else []
+    if rooms:
+        file = f"{image['room']}.npz"
+        names.append(f"room {room_kind(rooms / file)}")
+    return names
+
+
+def report_groups(counts):
+    """One line for each group of cameras."""
+    for name, count in sorted(counts.items()):
+        reasons = {key: value for key, value in count.items() if key not in ("cameras", "fitted", "within", "wrong")}
+        fitted, within, wrong = (count[key] for key in ("fitted", "within", "wrong"))
+        print(f"{name}: {count['cameras']} cameras, {fitted} fitted, {within} within, {wrong} wrong, refused {reasons}")
+
+
 def summary(name, values):
     """One line about a row of numbers."""
     if values:
@@ -80,31 +121,48 @@ def main():
     parser.add_argument("dataset", type=Path)
     parser.add_argument("--binary", default="target/release/lookdown")
     parser.add_argument("--people", action="store_true", help="compare places on the floor")
+    parser.add_argument("--half", type=int, choices=[0, 1], help="every second group of four rooms")
+    parser.add_argument("--rooms", type=Path, help="folder of the rooms of the generator")
+    parser.add_argument("--lens", action="store_true", help="give the true model of ideal lenses, leave others out")
     arguments = parser.parse_args()
     images = json.loads((arguments.dataset / "annotations.json").read_text())["images"]
+    if arguments.half is not None:
+        images = [image for image in images if image["room"] // 4 % 2 == arguments.half]
+    counts = collections.defaultdict(collections.Counter)
     rows, refused, places = [], collections.Counter(), collections.defaultdict(list)
     for camera, group in groupby(images, lambda image: image["calibration"]):
         shots = list(group)
         frames = [str(arguments.dataset / "images" / image["file_name"]) for image in shots]
         true = json.loads((arguments.dataset / "calibrations" / f"{camera}.json").read_text())
-        found, reason, seconds = run(arguments.binary, "fit", *frames)
+        if arguments.lens and "focal" not in true["lens"]:
+            continue
+        given = ["--lens", true["lens"]["model"]] if arguments.lens else []
+        names = groups(shots[0], true, arguments.rooms)
+        found, reason, seconds = run(arguments.binary, "fit", *given, *frames)
+        for name in names:
+            counts[name]["cameras"] += 1
         if found is None:
             refused[reason] += 1
+            for name in names:
+                counts[name][" ".join(reason.split()[:6])] += 1
             print(f"{camera}: {reason}")
             continue
         row = errors(found, true)
         outside = any(row[name] > limit for name, limit in LIMITS.items())
         wrong = any(row[name] > limit for name, limit in WRONG.items())
+        for name in names:
+            counts[name].update(fitted=1, within=int(not outside), wrong=int(wrong))
         said = {name: source["uncertainty"] for name, source in found["sources"].items()}
         print(f"{camera}: {row} {said} {seconds:.2f} s{' OUTSIDE' if outside else ''}")
         rows.append(row | {"seconds": seconds / len(frames), "outside": outside, "wrong": wrong})
-        if arguments.people and shots[0]["people"]:
+        if arguments.people and shots[0].get("people"):
             compare(places, arguments.binary, frames, found, true, shots[0]["people"])
     for name in [*LIMITS, "seconds"]:
         summary(name, [row[name] for row in rows])
     outside, wrong = (sum(row[kind] for row in rows) for kind in ("outside", "wrong"))
     print(f"{len(rows)} fitted, {len(rows) - outside} within {LIMITS}, {wrong} wrong by more than {WRONG}")
     print(f"{sum(refused.values())} refused: {dict(refused)}")
+    report_groups(counts)
     for name, values in places.items():
         summary(name, values)
 

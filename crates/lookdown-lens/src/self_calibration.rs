@@ -16,6 +16,7 @@ mod refusal;
 mod search;
 #[cfg(test)]
 mod tests;
+mod upright;
 
 pub use camera_height::{CameraHeight, HeightRefusal};
 pub use edge_curve::EdgeCurve;

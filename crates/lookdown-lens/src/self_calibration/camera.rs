@@ -12,6 +12,11 @@ const ENTRIES: usize = 1024;
 /// turns back before the circle explains every edge at the rim.
 const MIN_SLOPE: f64 = 0.02;
 
+/// Angles at which a stretched camera keeps the radius, radians.
+const STRETCH_ANGLES: [f64; 2] = [0.6, 1.35];
+/// First coefficients of stretched cameras.
+const STRETCH_SHAPES: (f64, f64) = (-0.2, 0.2);
+
 /// Coefficients of `r = f (theta + k1 theta^3 + k2 theta^5 + k3 theta^7)`.
 pub(super) type Shape = [f64; 3];
 
@@ -85,6 +90,35 @@ impl RoomCamera {
     /// The angle at a radius in pixels, or `None` where the curve turns back before.
     pub(super) fn theta(&self, radius: f64) -> Option<f64> {
         Angles::of(self, radius).map(|angles| angles.theta(radius / self.focal))
+    }
+
+    /// A camera that sees nearly the same edges straight in a room whose height, along the axis, is
+    /// multiplied, or `None` if no lens of the family does.
+    pub(super) fn stretched(&self, share: f64) -> Option<Self> {
+        let [near, far] = STRETCH_ANGLES.map(|theta| self.curve((theta.tan() * share).atan()).0);
+        let ratio = |k1: f64| {
+            let [near, far] = STRETCH_ANGLES.map(|theta| curve(ideal_shape(k1), theta).0);
+            far / near
+        };
+        let (mut low, mut high) = STRETCH_SHAPES;
+        if !(ratio(low)..ratio(high)).contains(&(far / near)) {
+            return None;
+        }
+        for _ in 0..30 {
+            let middle = f64::midpoint(low, high);
+            if ratio(middle) < far / near {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        let scale = near / curve(ideal_shape(low), STRETCH_ANGLES[0]).0;
+        Some(Self {
+            focal: self.focal * scale,
+            k1: low,
+            k2_offset: 0.0,
+            ..self.clone()
+        })
     }
 
     /// The directions of edges: the vertical, then the two horizontal ones.

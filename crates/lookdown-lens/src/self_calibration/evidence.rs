@@ -55,6 +55,10 @@ pub(super) fn evaluate(
     let share = (1.0 - OUTLIER_SHARE) / directions.len() as f64;
     let mut fits = Vec::with_capacity(directions.len());
     for (curve, weight) in curves.iter().zip(weights) {
+        if *weight <= 0.0 {
+            result.explained.push(0.0);
+            continue;
+        }
         rays.clear();
         rays.extend(curve.points.iter().map(|point| angles.ray(camera, *point)));
         let length = curve.length();

@@ -10,6 +10,7 @@ use super::{
     prior::Prior,
     refusal::FitRefusal,
     search,
+    upright::upright,
 };
 use crate::geometry::Ray;
 
@@ -27,6 +28,8 @@ const MIN_EVIDENCE: f64 = 100.0;
 const CLUTTERED_EVIDENCE: f64 = 150.0;
 /// Least share of the edges along each of the three directions.
 const MIN_SHARE: f64 = 0.02;
+/// So many edges along a direction are enough, however many there are along the others.
+const MIN_ALONG: f64 = 15.0;
 /// Least share of the edges along any of them.
 const MIN_SHARES: f64 = 0.45;
 /// Least share along any of them in a cluttered room, where most edges follow none: things of all
@@ -37,17 +40,25 @@ const RIVAL_EVIDENCE: f64 = 12.0;
 /// Difference of two maxima that matters: share of the radius, and radians of the level.
 const RIVAL_DISTANCE: (f64, f64) = (0.03, 0.026);
 /// Largest uncertainty of the radius, as a share, and of the level, degrees.
-const MAX_UNCERTAINTY: (f64, f64) = (0.025, 0.8);
+const MAX_UNCERTAINTY: (f64, f64) = (0.028, 0.8);
 /// Standard deviation of the second coefficient of a lens from that of an ideal lens. A wider one
 /// exchanges curvature at the rim for focal length, and makes the middle too large.
 const K2_SIGMA: f64 = 0.0015;
 /// Errors of the radius are larger than the edges say, because no lens is exactly one of the
 /// family: by this factor, and by this share of the radius however many edges there are. 68 % of
-/// 177 errors in rendered frames are within 0.9 of the deviations that result, 95 % within 2.4.
+/// 177 errors in rendered frames are within 0.8 of the deviations that result, 95 % within 2.0.
 const LENS_MISFIT: f64 = 1.4;
 const LENS_FLOOR: f64 = 0.003;
+/// Standard deviation of the radius, as a share, from which further starts look for rivals.
+const FLAT: f64 = 0.006;
+/// Vertical scales of the room of these starts.
+const STRETCHES: [f64; 4] = [0.8, 0.9, 1.12, 1.25];
+/// Most rounds of these starts: a further one only if one of them was better.
+const STRETCH_ROUNDS: usize = 2;
 /// Largest difference of a fit of half of the edges.
 const MAX_HALF: (f64, f64) = (0.03, 2.0);
+/// Differences within so many standard deviations of the fit of the half are not a disagreement.
+const HALF_DEVIATIONS: f64 = 2.5;
 
 /// A lens circle, detected or assumed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -123,6 +134,7 @@ impl RoomFit {
         #[expect(clippy::cast_precision_loss, reason = "a few frames")]
         let weight = 1.0 / frames.len() as f64;
         let mut best: Option<(Vec<Maximum>, Prior)> = None;
+        let mut others: Vec<Maximum> = Vec::new();
         for (index, circle) in circles.iter().enumerate() {
             let prior = prior(circle, known);
             let found = maxima(curves, weight, &prior, known);
@@ -132,10 +144,15 @@ impl RoomFit {
             if before
                 .is_none_or(|before| first.evaluation.evidence > before.evaluation.evidence + least)
             {
-                best = Some((found, prior));
+                let worse = best.replace((found, prior));
+                others.extend(worse.into_iter().flat_map(|(maxima, _)| maxima));
+            } else {
+                others.extend(found);
             }
         }
-        let (maxima, prior) = best.ok_or(FitRefusal::NoDirections { explained: 0.0 })?;
+        let (mut maxima, prior) = best.ok_or(FitRefusal::NoDirections { explained: 0.0 })?;
+        // The camera of another circle is a rival, too.
+        maxima.extend(others);
         checked(curves, weight, &maxima, &prior)
     }
 }
@@ -147,6 +164,18 @@ const CLEARLY_BETTER: f64 = 3.0;
 struct Maximum {
     camera: RoomCamera,
     evaluation: Evaluation,
+    /// False if another direction may as well be the vertical.
+    is_upright: bool,
+}
+
+impl Maximum {
+    fn of(camera: RoomCamera, evaluation: Evaluation) -> Self {
+        Self {
+            camera,
+            evaluation,
+            is_upright: true,
+        }
+    }
 }
 
 fn prior(circle: &CircleGuess, known: KnownLens) -> Prior {
@@ -177,7 +206,7 @@ fn maxima(curves: &[EdgeCurve], weight: f64, prior: &Prior, known: KnownLens) ->
             let Some((next, _)) = &found else { break };
             camera = next.clone();
         }
-        coarse.extend(found.map(|(camera, evaluation)| Maximum { camera, evaluation }));
+        coarse.extend(found.map(|(camera, evaluation)| Maximum::of(camera, evaluation)));
         if coarse.len() == COARSE_STARTS {
             break;
         }
@@ -196,10 +225,39 @@ fn maxima(curves: &[EdgeCurve], weight: f64, prior: &Prior, known: KnownLens) ->
         tried.push(camera.clone());
         let found = climb(camera, curves, &weights, prior, 1.5, 4)
             .and_then(|(camera, _)| climb(camera, curves, &weights, prior, 1.0, 12));
-        fine.extend(found.map(|(camera, evaluation)| Maximum { camera, evaluation }));
+        fine.extend(found.map(|(camera, evaluation)| Maximum::of(camera, evaluation)));
     }
     best_first(&mut fine);
+    add_stretched(&mut fine, curves, &weights, prior);
+    for maximum in &mut fine {
+        (maximum.camera, maximum.is_upright) =
+            upright(&maximum.camera, curves, &maximum.evaluation, prior.radius);
+    }
     fine
+}
+
+/// Adds the maxima that are reached from stretched cameras, where the edges hardly determine the
+/// lens, and sorts all of them. If a camera looks straight down, a room of another height with
+/// another lens has nearly the same edges.
+fn add_stretched(fine: &mut Vec<Maximum>, curves: &[EdgeCurve], weights: &[f64], prior: &Prior) {
+    for _ in 0..STRETCH_ROUNDS {
+        let Some(best) = fine.first().filter(|best| is_flat(best)) else {
+            break;
+        };
+        let (camera, evidence) = (best.camera.clone(), best.evaluation.evidence);
+        for start in STRETCHES
+            .iter()
+            .filter_map(|share| camera.stretched(*share))
+        {
+            let found = climb(start, curves, weights, prior, 1.5, 4)
+                .and_then(|(camera, _)| climb(camera, curves, weights, prior, 1.0, 10));
+            fine.extend(found.map(|(camera, evaluation)| Maximum::of(camera, evaluation)));
+        }
+        best_first(fine);
+        if fine[0].evaluation.evidence < evidence + 1.0 {
+            break;
+        }
+    }
 }
 
 fn best_first(maxima: &mut [Maximum]) {
@@ -226,15 +284,26 @@ fn checked(
     maxima: &[Maximum],
     prior: &Prior,
 ) -> Result<RoomFit, FitRefusal> {
-    let Some(Maximum { camera, evaluation }) = maxima.first() else {
+    let Some(Maximum {
+        camera,
+        evaluation,
+        is_upright,
+    }) = maxima.first()
+    else {
         return Err(FitRefusal::NoDirections { explained: 0.0 });
     };
     let explained: f64 = evaluation.shares.iter().sum();
     if !has_order(explained, evaluation.evidence) {
         return Err(FitRefusal::NoDirections { explained });
     }
-    if evaluation.shares.iter().any(|share| *share < MIN_SHARE) {
+    #[expect(clippy::cast_precision_loss, reason = "a few thousand edges")]
+    let edges = weight * curves.len() as f64;
+    let is_missing = |share: &f64| *share < MIN_SHARE && share * edges < MIN_ALONG;
+    if evaluation.shares.iter().any(is_missing) {
         return Err(FitRefusal::MissingDirection);
+    }
+    if !is_upright {
+        return Err(FitRefusal::VerticalUnclear);
     }
     let is_rival = |rival: &Maximum| {
         let (radius, level) = distance(camera, &rival.camera);
@@ -245,7 +314,7 @@ fn checked(
         return Err(FitRefusal::Ambiguous);
     }
     let mut uncertainty = curvature(camera, evaluation).ok_or(FitRefusal::Ambiguous)?;
-    let (mut radius, mut level) = (0.0_f64, 0.0_f64);
+    let mut disagreement: Option<(f64, f64)> = None;
     let (mut squares, mut center_squares) = ([0.0; 2], 0.0);
     for half in 0..4_usize {
         // Two interleaved halves, then two halves of the image.
@@ -262,10 +331,17 @@ fn checked(
             })
             .collect();
         let found = climb(camera.clone(), curves, &weights, prior, 1.0, 6);
-        let (other, _) = found.ok_or(FitRefusal::Ambiguous)?;
+        let (other, of_half) = found.ok_or(FitRefusal::Ambiguous)?;
         let (apart, turned) = distance(camera, &other);
-        radius = radius.max(apart);
-        level = level.max(turned.to_degrees());
+        let own = curvature(&other, &of_half).ok_or(FitRefusal::Ambiguous)?;
+        let limits = (
+            MAX_HALF.0.max(HALF_DEVIATIONS * own.radius),
+            MAX_HALF.1.max(HALF_DEVIATIONS * own.level_deg),
+        );
+        if apart > limits.0 || turned.to_degrees() > limits.1 {
+            let (radius, level) = disagreement.unwrap_or_default();
+            disagreement = Some((radius.max(apart), level.max(turned.to_degrees())));
+        }
         if half < 2 {
             squares[0] += apart * apart / 2.0;
             squares[1] += turned.to_degrees().powi(2) / 2.0;
@@ -283,7 +359,7 @@ fn checked(
             level_deg: uncertainty.level_deg,
         });
     }
-    if radius > MAX_HALF.0 || level > MAX_HALF.1 {
+    if let Some((radius, level)) = disagreement {
         return Err(FitRefusal::HalvesDisagree {
             radius_percent: 100.0 * radius,
             level_deg: level,
@@ -306,6 +382,12 @@ fn checked(
 fn has_order(explained: f64, evidence: f64) -> bool {
     explained >= MIN_SHARES && evidence >= MIN_EVIDENCE
         || explained >= CLUTTERED_SHARES && evidence >= CLUTTERED_EVIDENCE
+}
+
+/// Returns true if the edges hardly determine the lens.
+fn is_flat(maximum: &Maximum) -> bool {
+    curvature(&maximum.camera, &maximum.evaluation)
+        .is_none_or(|uncertainty| uncertainty.radius > FLAT)
 }
 
 /// Standard deviations from the curvature of the evidence.

@@ -26,15 +26,21 @@ pub enum FitRefusal {
         "one of the three directions of the room has no edges: give a frame that shows walls with doors or corners"
     )]
     MissingDirection,
+    /// A camera on a wall, or beside one and tilted away from it.
+    #[error(
+        "two directions of the room may be the vertical: calibrate cameras on walls with a chessboard"
+    )]
+    VerticalUnclear,
     /// Two cameras explain the edges equally well.
     #[error(
-        "two different cameras explain the edges equally well: give further frames, or the field of view of the lens"
+        "two different cameras explain the edges equally well: give the model of the lens (a camera that looks \
+         straight down often needs it), or further frames"
     )]
     Ambiguous,
     /// The evidence is flat.
     #[error(
-        "the edges determine the lens to {radius_percent:.1} % and the level to {level_deg:.1}° only: give further \
-         frames, or the field of view of the lens"
+        "the edges determine the lens to {radius_percent:.1} % and the level to {level_deg:.1}° only: give the model of \
+         the lens, or further frames"
     )]
     Uncertain {
         /// Standard deviation of the radius, percent.
@@ -63,6 +69,7 @@ impl FitRefusal {
             Self::TooFewEdges { .. } => "too_few_edges",
             Self::NoDirections { .. } => "no_directions",
             Self::MissingDirection => "missing_direction",
+            Self::VerticalUnclear => "vertical_unclear",
             Self::Ambiguous => "ambiguous",
             Self::Uncertain { .. } => "uncertain",
             Self::HalvesDisagree { .. } => "halves_disagree",

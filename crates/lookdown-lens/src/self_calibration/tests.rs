@@ -2,7 +2,10 @@
 
 use nalgebra::{Rotation3, Vector3};
 
-use super::{CircleGuess, EdgeCurve, FitRefusal, KnownLens, RoomFit};
+use super::{
+    CircleGuess, EdgeCurve, FitRefusal, KnownLens, RoomFit,
+    camera::{Angles, RoomCamera},
+};
 use crate::geometry::Ray;
 
 const FOCAL: f64 = 400.0;
@@ -159,4 +162,89 @@ fn many_exact_edges_leave_the_uncertainty_of_the_lens() {
         "{}",
         fit.uncertainty.radius
     );
+}
+
+#[test]
+fn camera_tilted_by_53_degrees_is_upright() {
+    let room = Rotation3::from_euler_angles(0.92, 0.0, 0.0);
+    let all = vec![edges(&room); 2].concat();
+    let fit = RoomFit::of(&[all], &[circle()], KnownLens::default()).unwrap();
+    let level = fit.directions[0].angle(&(room * Ray::z())).to_degrees();
+    assert!(level < 0.5, "{level}° off level");
+}
+
+#[test]
+fn camera_on_a_wall_has_no_clear_vertical() {
+    let room = Rotation3::from_euler_angles(-0.92, 0.0, 0.0);
+    let away = room * -Ray::y();
+    let ray = |[x, y]: [f64; 2]| {
+        let [x, y] = [x - CENTER[0], y - CENTER[1]];
+        let radius = x.hypot(y);
+        let (sin, cos) = (2.0 * (radius / (2.0 * FOCAL)).asin()).sin_cos();
+        Ray::new(sin * x / radius, sin * y / radius, cos)
+    };
+    let is_before = |point: &[f64; 2]| ray(*point).dot(&away) > 0.1;
+    let mut before = edges(&room);
+    before.retain(|curve| curve.points.iter().all(is_before));
+    let all = vec![before; 4].concat();
+    let fit = RoomFit::of(&[all], &[circle()], KnownLens::default());
+    assert_eq!(fit, Err(FitRefusal::VerticalUnclear));
+}
+
+#[test]
+fn stretched_lens_keeps_edges_of_a_level_room_straight() {
+    let camera = RoomCamera {
+        focal: FOCAL,
+        k1: -1.0 / 24.0,
+        k2_offset: 0.0,
+        center: CENTER,
+        room: Rotation3::identity(),
+    };
+    let other = camera.stretched(1.1).unwrap();
+    let angles = Angles::of(&other, 540.0).unwrap();
+    assert!(other.focal > 1.03 * FOCAL, "{}", other.focal);
+    for y in [-2.0, -0.5, 1.0, 3.0] {
+        let line = [-3.0, -1.0, 2.0].map(|x| pixel(&Ray::new(x, y, 1.0)));
+        let [one, middle, last] = line.map(|at| angles.ray(&other, at).ray);
+        let bend = one.cross(&last).normalize().dot(&middle);
+        assert!(bend.abs() < 0.006, "{bend} at {y}");
+    }
+}
+
+#[test]
+fn few_verticals_among_many_other_edges_are_enough() {
+    let room = Rotation3::from_euler_angles(0.14, -0.09, 0.4);
+    let (vertical, other): (Vec<_>, Vec<_>) = edges(&room)
+        .into_iter()
+        .enumerate()
+        .partition(|(index, _)| index % 7 < 4);
+    let vertical: Vec<EdgeCurve> = vertical.into_iter().map(|(_, curve)| curve).collect();
+    let other: Vec<EdgeCurve> = other.into_iter().map(|(_, curve)| curve).collect();
+    let all = [vertical, vec![other; 60].concat()].concat();
+    let fit = RoomFit::of(&[all], &[circle()], KnownLens::default()).unwrap();
+    let level = fit.directions[0].angle(&(room * Ray::z())).to_degrees();
+    assert!(level < 0.3, "{level}° off level");
+}
+
+#[test]
+fn camera_of_another_circle_is_a_rival() {
+    let room = Rotation3::from_euler_angles(0.0, 0.0, 0.4);
+    let known = KnownLens {
+        field_of_view: None,
+        k1: Some(-1.0 / 24.0),
+    };
+    let [cx, cy] = CENTER;
+    let guess = |center: [f64; 2]| CircleGuess {
+        center,
+        center_sigma: 0.01,
+        ..circle()
+    };
+    let [left, right] = [guess([cx - 8.6, cy]), guess([cx + 8.6, cy])];
+    // Both circles are equally wrong: the edges are symmetric about the true center.
+    let turned = room * Rotation3::from_euler_angles(0.0, 0.0, std::f64::consts::PI);
+    let all = [edges(&room), edges(&turned)].concat();
+    let alone = RoomFit::of(std::slice::from_ref(&all), &[left], known);
+    let both = RoomFit::of(&[all], &[left, right], known);
+    assert!(alone.is_ok(), "{alone:?}");
+    assert_eq!(both, Err(FitRefusal::Ambiguous));
 }

@@ -39,8 +39,9 @@ enum SuggestionState {
 /// A reason for not having a value.
 #[derive(Serialize, ToSchema)]
 struct Refusal {
-    /// The kind: `too_few_edges`, `no_directions`, `missing_direction`, `ambiguous`, `uncertain`,
-    /// `halves_disagree`, and `too_few_people` or `uncertain` for the height.
+    /// The kind: `too_few_edges`, `no_directions`, `missing_direction`, `vertical_unclear`,
+    /// `ambiguous`, `uncertain`, `halves_disagree`, and `too_few_people` or `uncertain` for the
+    /// height.
     #[schema(example = "too_few_edges")]
     reason: &'static str,
     /// The reason with its remedy.
