@@ -11,14 +11,17 @@ mod edge_curve;
 mod evaluation;
 mod evidence;
 mod fit;
+mod maxima;
 mod prior;
 mod refusal;
 mod search;
 #[cfg(test)]
 mod tests;
+mod uncertainty;
 mod upright;
 
 pub use camera_height::{CameraHeight, HeightRefusal};
 pub use edge_curve::EdgeCurve;
-pub use fit::{CircleGuess, FitUncertainty, KnownLens, RoomFit};
+pub use fit::{CircleGuess, KnownLens, RoomFit};
 pub use refusal::FitRefusal;
+pub use uncertainty::FitUncertainty;

@@ -1,25 +1,17 @@
-//! The fit of a camera: starts, the best maximum, its uncertainty, and reasons to refuse it.
+//! The fit of a camera: the best maximum, its uncertainty, and reasons to refuse it.
 
 use std::f64::consts::FRAC_PI_2;
 
 use super::{
-    camera::{RoomCamera, ideal_shape_slope},
     climb::climb,
     edge_curve::EdgeCurve,
-    evaluation::Evaluation,
+    maxima::{Maximum, maxima},
     prior::Prior,
     refusal::FitRefusal,
-    search,
-    upright::upright,
+    uncertainty::{FitUncertainty, curvature, distance},
 };
 use crate::geometry::Ray;
 
-/// Curves of the first steps: the longest.
-const COARSE_CURVES: usize = 300;
-/// Starts that are followed.
-const COARSE_STARTS: usize = 12;
-/// Maxima that are followed with all curves.
-const FINE_STARTS: usize = 4;
 /// Fewer curves do not determine a camera.
 const MIN_CURVES: usize = 60;
 /// Less evidence (logarithm of the likelihood ratio) may be chance.
@@ -49,12 +41,6 @@ const K2_SIGMA: f64 = 0.0015;
 /// 177 errors in rendered frames are within 0.8 of the deviations that result, 95 % within 2.0.
 const LENS_MISFIT: f64 = 1.4;
 const LENS_FLOOR: f64 = 0.003;
-/// Standard deviation of the radius, as a share, from which further starts look for rivals.
-const FLAT: f64 = 0.006;
-/// Vertical scales of the room of these starts.
-const STRETCHES: [f64; 4] = [0.8, 0.9, 1.12, 1.25];
-/// Most rounds of these starts: a further one only if one of them was better.
-const STRETCH_ROUNDS: usize = 2;
 /// Largest difference of a fit of half of the edges.
 const MAX_HALF: (f64, f64) = (0.03, 2.0);
 /// Differences within so many standard deviations of the fit of the half are not a disagreement.
@@ -79,17 +65,6 @@ pub struct KnownLens {
     /// First coefficient of an ideal lens: 0 equidistant, -1/24 equisolid, 1/12 stereographic, -1/6
     /// orthographic.
     pub k1: Option<f64>,
-}
-
-/// Standard deviations of a fit.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FitUncertainty {
-    /// Largest share of the radius between 20° and 80° from the axis.
-    pub radius: f64,
-    /// Pixels.
-    pub center: f64,
-    /// Degrees.
-    pub level_deg: f64,
 }
 
 /// A camera from the edges of a room.
@@ -133,11 +108,12 @@ impl RoomFit {
         // Frames of one camera show the same edges, so they are not independent evidence.
         #[expect(clippy::cast_precision_loss, reason = "a few frames")]
         let weight = 1.0 / frames.len() as f64;
+        let rim = known.field_of_view.map(|field| field / 2.0);
         let mut best: Option<(Vec<Maximum>, Prior)> = None;
         let mut others: Vec<Maximum> = Vec::new();
         for (index, circle) in circles.iter().enumerate() {
             let prior = prior(circle, known);
-            let found = maxima(curves, weight, &prior, known);
+            let found = maxima(curves, weight, &prior, (rim, known.k1));
             let Some(first) = found.first() else { continue };
             let least = if index == 0 { 0.0 } else { CLEARLY_BETTER };
             let before = best.as_ref().and_then(|(maxima, _)| maxima.first());
@@ -160,24 +136,6 @@ impl RoomFit {
 /// Evidence by which a further circle must be better.
 const CLEARLY_BETTER: f64 = 3.0;
 
-/// A maximum of the evidence.
-struct Maximum {
-    camera: RoomCamera,
-    evaluation: Evaluation,
-    /// False if another direction may as well be the vertical.
-    is_upright: bool,
-}
-
-impl Maximum {
-    fn of(camera: RoomCamera, evaluation: Evaluation) -> Self {
-        Self {
-            camera,
-            evaluation,
-            is_upright: true,
-        }
-    }
-}
-
 fn prior(circle: &CircleGuess, known: KnownLens) -> Prior {
     let half = known.field_of_view.map(|field| (field / 2.0, 1e-3));
     Prior {
@@ -188,94 +146,6 @@ fn prior(circle: &CircleGuess, known: KnownLens) -> Prior {
         k2_sigma: if known.k1.is_some() { 1e-5 } else { K2_SIGMA },
         rim: half.unwrap_or((FRAC_PI_2, 0.22)),
     }
-}
-
-/// The best maxima, best first, each different from the others.
-fn maxima(curves: &[EdgeCurve], weight: f64, prior: &Prior, known: KnownLens) -> Vec<Maximum> {
-    let mut longest = curves.to_vec();
-    longest.sort_by_key(|segment| std::cmp::Reverse(segment.points.len()));
-    longest.truncate(COARSE_CURVES);
-    let weights = vec![weight; curves.len()];
-    let rim = known.field_of_view.map(|field| field / 2.0);
-    let mut coarse: Vec<Maximum> = Vec::new();
-    for start in search::starts(&longest, prior, rim, known.k1) {
-        let mut found = None;
-        let mut camera = start;
-        for (blur, steps) in [(6.0, 5), (3.0, 5), (1.5, 6)] {
-            found = climb(camera.clone(), &longest, &weights, prior, blur, steps);
-            let Some((next, _)) = &found else { break };
-            camera = next.clone();
-        }
-        coarse.extend(found.map(|(camera, evaluation)| Maximum::of(camera, evaluation)));
-        if coarse.len() == COARSE_STARTS {
-            break;
-        }
-    }
-    best_first(&mut coarse);
-    let mut fine: Vec<Maximum> = Vec::new();
-    let mut tried: Vec<RoomCamera> = Vec::new();
-    for Maximum { camera, .. } in coarse {
-        let is_known = tried.iter().any(|other| {
-            let (radius, level) = distance(&camera, other);
-            radius < 0.01 && level < 0.02
-        });
-        if is_known || tried.len() == FINE_STARTS {
-            continue;
-        }
-        tried.push(camera.clone());
-        let found = climb(camera, curves, &weights, prior, 1.5, 4)
-            .and_then(|(camera, _)| climb(camera, curves, &weights, prior, 1.0, 12));
-        fine.extend(found.map(|(camera, evaluation)| Maximum::of(camera, evaluation)));
-    }
-    best_first(&mut fine);
-    add_stretched(&mut fine, curves, &weights, prior);
-    for maximum in &mut fine {
-        (maximum.camera, maximum.is_upright) =
-            upright(&maximum.camera, curves, &maximum.evaluation, prior.radius);
-    }
-    fine
-}
-
-/// Adds the maxima that are reached from stretched cameras, where the edges hardly determine the
-/// lens, and sorts all of them. If a camera looks straight down, a room of another height with
-/// another lens has nearly the same edges.
-fn add_stretched(fine: &mut Vec<Maximum>, curves: &[EdgeCurve], weights: &[f64], prior: &Prior) {
-    for _ in 0..STRETCH_ROUNDS {
-        let Some(best) = fine.first().filter(|best| is_flat(best)) else {
-            break;
-        };
-        let (camera, evidence) = (best.camera.clone(), best.evaluation.evidence);
-        for start in STRETCHES
-            .iter()
-            .filter_map(|share| camera.stretched(*share))
-        {
-            let found = climb(start, curves, weights, prior, 1.5, 4)
-                .and_then(|(camera, _)| climb(camera, curves, weights, prior, 1.0, 10));
-            fine.extend(found.map(|(camera, evaluation)| Maximum::of(camera, evaluation)));
-        }
-        best_first(fine);
-        if fine[0].evaluation.evidence < evidence + 1.0 {
-            break;
-        }
-    }
-}
-
-fn best_first(maxima: &mut [Maximum]) {
-    maxima.sort_by(|a, b| b.evaluation.evidence.total_cmp(&a.evaluation.evidence));
-}
-
-/// Largest relative difference of the radius between 20° and 80°, and the angle between verticals.
-fn distance(one: &RoomCamera, other: &RoomCamera) -> (f64, f64) {
-    let radius = angles().map(|theta| {
-        (one.focal * one.curve(theta).0 / (other.focal * other.curve(theta).0) - 1.0).abs()
-    });
-    let level = (one.room * Ray::z()).angle(&(other.room * Ray::z()));
-    (radius.fold(0.0, f64::max), level)
-}
-
-/// 20° to 80°, radians.
-fn angles() -> impl Iterator<Item = f64> {
-    (2..=8).map(|tens| (10.0 * f64::from(tens)).to_radians())
 }
 
 fn checked(
@@ -382,36 +252,4 @@ fn checked(
 fn has_order(explained: f64, evidence: f64) -> bool {
     explained >= MIN_SHARES && evidence >= MIN_EVIDENCE
         || explained >= CLUTTERED_SHARES && evidence >= CLUTTERED_EVIDENCE
-}
-
-/// Returns true if the edges hardly determine the lens.
-fn is_flat(maximum: &Maximum) -> bool {
-    curvature(&maximum.camera, &maximum.evaluation)
-        .is_none_or(|uncertainty| uncertainty.radius > FLAT)
-}
-
-/// Standard deviations from the curvature of the evidence.
-fn curvature(camera: &RoomCamera, evaluation: &Evaluation) -> Option<FitUncertainty> {
-    let covariance = evaluation.normal.clone().try_inverse()?;
-    let ideal = ideal_shape_slope(camera.k1);
-    let radius = angles().map(|theta| {
-        let (radius, _) = camera.curve(theta);
-        let (square, cube) = (theta * theta, theta.powi(3));
-        let along = cube * (ideal[0] + square * (ideal[1] + square * ideal[2]));
-        let slopes = [1.0, along / radius, cube * square / radius];
-        let mut variance = 0.0;
-        for (row, slope) in slopes.iter().enumerate() {
-            for (column, other) in slopes.iter().enumerate() {
-                variance += slope * other * covariance[(row, column)];
-            }
-        }
-        variance.max(0.0).sqrt()
-    });
-    let both =
-        |first: usize| (covariance[(first, first)] + covariance[(first + 1, first + 1)]).sqrt();
-    Some(FitUncertainty {
-        radius: radius.fold(0.0, f64::max),
-        center: both(3),
-        level_deg: both(5).to_degrees(),
-    })
 }

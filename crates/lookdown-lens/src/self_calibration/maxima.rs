@@ -1,0 +1,129 @@
+//! The maxima of the evidence: starts, those that are followed, and rivals.
+
+use super::{
+    camera::RoomCamera,
+    climb::climb,
+    edge_curve::EdgeCurve,
+    evaluation::Evaluation,
+    prior::Prior,
+    search,
+    uncertainty::{curvature, distance},
+    upright::upright,
+};
+
+/// Curves of the first steps: the longest.
+const COARSE_CURVES: usize = 300;
+/// Starts that are followed.
+const COARSE_STARTS: usize = 12;
+/// Maxima that are followed with all curves.
+const FINE_STARTS: usize = 4;
+/// Standard deviation of the radius, as a share, from which further starts look for rivals.
+const FLAT: f64 = 0.006;
+/// Vertical scales of the room of these starts.
+const STRETCHES: [f64; 4] = [0.8, 0.9, 1.12, 1.25];
+/// Most rounds of these starts: a further one only if one of them was better.
+const STRETCH_ROUNDS: usize = 2;
+
+/// A maximum of the evidence.
+pub(super) struct Maximum {
+    pub(super) camera: RoomCamera,
+    pub(super) evaluation: Evaluation,
+    /// False if another direction may as well be the vertical.
+    pub(super) is_upright: bool,
+}
+
+impl Maximum {
+    fn of(camera: RoomCamera, evaluation: Evaluation) -> Self {
+        Self {
+            camera,
+            evaluation,
+            is_upright: true,
+        }
+    }
+}
+
+/// The best maxima, best first, each different from the others. `known` are the angle at the circle,
+/// radians, and the first coefficient of the lens.
+pub(super) fn maxima(
+    curves: &[EdgeCurve],
+    weight: f64,
+    prior: &Prior,
+    known: (Option<f64>, Option<f64>),
+) -> Vec<Maximum> {
+    let mut longest = curves.to_vec();
+    longest.sort_by_key(|segment| std::cmp::Reverse(segment.points.len()));
+    longest.truncate(COARSE_CURVES);
+    let weights = vec![weight; curves.len()];
+    let (rim, k1) = known;
+    let mut coarse: Vec<Maximum> = Vec::new();
+    for start in search::starts(&longest, prior, rim, k1) {
+        let mut found = None;
+        let mut camera = start;
+        for (blur, steps) in [(6.0, 5), (3.0, 5), (1.5, 6)] {
+            found = climb(camera.clone(), &longest, &weights, prior, blur, steps);
+            let Some((next, _)) = &found else { break };
+            camera = next.clone();
+        }
+        coarse.extend(found.map(|(camera, evaluation)| Maximum::of(camera, evaluation)));
+        if coarse.len() == COARSE_STARTS {
+            break;
+        }
+    }
+    best_first(&mut coarse);
+    let mut fine: Vec<Maximum> = Vec::new();
+    let mut tried: Vec<RoomCamera> = Vec::new();
+    for Maximum { camera, .. } in coarse {
+        let is_known = tried.iter().any(|other| {
+            let (radius, level) = distance(&camera, other);
+            radius < 0.01 && level < 0.02
+        });
+        if is_known || tried.len() == FINE_STARTS {
+            continue;
+        }
+        tried.push(camera.clone());
+        let found = climb(camera, curves, &weights, prior, 1.5, 4)
+            .and_then(|(camera, _)| climb(camera, curves, &weights, prior, 1.0, 12));
+        fine.extend(found.map(|(camera, evaluation)| Maximum::of(camera, evaluation)));
+    }
+    best_first(&mut fine);
+    add_stretched(&mut fine, curves, &weights, prior);
+    for maximum in &mut fine {
+        (maximum.camera, maximum.is_upright) =
+            upright(&maximum.camera, curves, &maximum.evaluation, prior.radius);
+    }
+    fine
+}
+
+/// Adds the maxima that are reached from stretched cameras, where the edges hardly determine the
+/// lens, and sorts all of them. If a camera looks straight down, a room of another height with
+/// another lens has nearly the same edges.
+fn add_stretched(fine: &mut Vec<Maximum>, curves: &[EdgeCurve], weights: &[f64], prior: &Prior) {
+    for _ in 0..STRETCH_ROUNDS {
+        let Some(best) = fine.first().filter(|best| is_flat(best)) else {
+            break;
+        };
+        let (camera, evidence) = (best.camera.clone(), best.evaluation.evidence);
+        for start in STRETCHES
+            .iter()
+            .filter_map(|share| camera.stretched(*share))
+        {
+            let found = climb(start, curves, weights, prior, 1.5, 4)
+                .and_then(|(camera, _)| climb(camera, curves, weights, prior, 1.0, 10));
+            fine.extend(found.map(|(camera, evaluation)| Maximum::of(camera, evaluation)));
+        }
+        best_first(fine);
+        if fine[0].evaluation.evidence < evidence + 1.0 {
+            break;
+        }
+    }
+}
+
+fn best_first(maxima: &mut [Maximum]) {
+    maxima.sort_by(|a, b| b.evaluation.evidence.total_cmp(&a.evaluation.evidence));
+}
+
+/// Returns true if the edges hardly determine the lens.
+fn is_flat(maximum: &Maximum) -> bool {
+    curvature(&maximum.camera, &maximum.evaluation)
+        .is_none_or(|uncertainty| uncertainty.radius > FLAT)
+}

@@ -1,0 +1,58 @@
+//! Standard deviations of a fit, and differences of two cameras in the same values.
+
+use super::{
+    camera::{RoomCamera, ideal_shape_slope},
+    evaluation::Evaluation,
+};
+use crate::geometry::Ray;
+
+/// Standard deviations of a fit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FitUncertainty {
+    /// Largest share of the radius between 20° and 80° from the axis.
+    pub radius: f64,
+    /// Pixels.
+    pub center: f64,
+    /// Degrees.
+    pub level_deg: f64,
+}
+
+/// Standard deviations from the curvature of the evidence.
+pub(super) fn curvature(camera: &RoomCamera, evaluation: &Evaluation) -> Option<FitUncertainty> {
+    let covariance = evaluation.normal.clone().try_inverse()?;
+    let ideal = ideal_shape_slope(camera.k1);
+    let radius = angles().map(|theta| {
+        let (radius, _) = camera.curve(theta);
+        let (square, cube) = (theta * theta, theta.powi(3));
+        let along = cube * (ideal[0] + square * (ideal[1] + square * ideal[2]));
+        let slopes = [1.0, along / radius, cube * square / radius];
+        let mut variance = 0.0;
+        for (row, slope) in slopes.iter().enumerate() {
+            for (column, other) in slopes.iter().enumerate() {
+                variance += slope * other * covariance[(row, column)];
+            }
+        }
+        variance.max(0.0).sqrt()
+    });
+    let both =
+        |first: usize| (covariance[(first, first)] + covariance[(first + 1, first + 1)]).sqrt();
+    Some(FitUncertainty {
+        radius: radius.fold(0.0, f64::max),
+        center: both(3),
+        level_deg: both(5).to_degrees(),
+    })
+}
+
+/// Largest relative difference of the radius between 20° and 80°, and the angle between verticals.
+pub(super) fn distance(one: &RoomCamera, other: &RoomCamera) -> (f64, f64) {
+    let radius = angles().map(|theta| {
+        (one.focal * one.curve(theta).0 / (other.focal * other.curve(theta).0) - 1.0).abs()
+    });
+    let level = (one.room * Ray::z()).angle(&(other.room * Ray::z()));
+    (radius.fold(0.0, f64::max), level)
+}
+
+/// 20° to 80°, radians.
+fn angles() -> impl Iterator<Item = f64> {
+    (2..=8).map(|tens| (10.0 * f64::from(tens)).to_radians())
+}
