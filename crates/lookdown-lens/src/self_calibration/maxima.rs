@@ -42,8 +42,8 @@ impl Maximum {
     }
 }
 
-/// The best maxima, best first, each different from the others. `known` are the angle at the circle,
-/// radians, and the first coefficient of the lens.
+/// The best maxima, best first, each different from the others. `known` are the angle at the
+/// circle, radians, and the first coefficient of the lens.
 pub(super) fn maxima(
     curves: &[EdgeCurve],
     weight: f64,
