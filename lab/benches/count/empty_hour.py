@@ -1,4 +1,4 @@
-"""Writes an hour's time lapse of a room without people whose light changes: `empty_hour.py FRAME FOLDER [--frames N]`.
+"""Writes a time lapse of a room without people with the light of an hour: `empty_hour.py FRAME FOLDER [--frames N]`.
 
 FRAME shows the room, such as one of `lab/training/make.py empty`. A cloud passes twice, the sun moves to a side of the
 room, lamps are switched on in the last quarter, and each frame has noise and a JPEG of its own. `lookdown detect` and
