@@ -113,7 +113,7 @@ impl RoomFit {
         let mut others: Vec<Maximum> = Vec::new();
         for (index, circle) in circles.iter().enumerate() {
             let prior = prior(circle, known);
-            let found = maxima(curves, weight, &prior, (rim, known.k1));
+            let found = maxima(curves, weight, &prior, rim, known.k1);
             let Some(first) = found.first() else { continue };
             let least = if index == 0 { 0.0 } else { CLEARLY_BETTER };
             let before = best.as_ref().and_then(|(maxima, _)| maxima.first());

@@ -42,19 +42,19 @@ impl Maximum {
     }
 }
 
-/// The best maxima, best first, each different from the others. `known` are the angle at the
-/// circle, radians, and the first coefficient of the lens.
+/// The best maxima, best first, each different from the others, with the known angle at the circle,
+/// radians, and the known first coefficient of the lens.
 pub(super) fn maxima(
     curves: &[EdgeCurve],
     weight: f64,
     prior: &Prior,
-    known: (Option<f64>, Option<f64>),
+    rim: Option<f64>,
+    k1: Option<f64>,
 ) -> Vec<Maximum> {
     let mut longest = curves.to_vec();
     longest.sort_by_key(|segment| std::cmp::Reverse(segment.points.len()));
     longest.truncate(COARSE_CURVES);
     let weights = vec![weight; curves.len()];
-    let (rim, k1) = known;
     let mut coarse: Vec<Maximum> = Vec::new();
     for start in search::starts(&longest, prior, rim, k1) {
         let mut found = None;
