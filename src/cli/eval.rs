@@ -50,6 +50,7 @@ fn detect_groups(arguments: &Arguments, output: &mut Output) -> anyhow::Result<(
     let settings = arguments.settings_file.load()?;
     let data_set = arguments.truth.open(&arguments.settings_file)?;
     let engine = engine_for(&settings, &groups.concat())?;
+    let engine = engine.with_plan_turn(f64::from(arguments.turn_deg).to_radians());
     for group in groups {
         for row in detect_group(&engine, &data_set, &group, &settings)? {
             if let Some(folder) = &arguments.save_detections {

@@ -53,6 +53,15 @@ pub(in crate::cli) struct Arguments {
     /// Width of Gaussian Soft-NMS [default: 0.3]
     #[arg(long, value_name = "NUMBER")]
     pub(super) sigma: Option<String>,
+    /// Turn the views of the profile about the vertical by this angle, degrees: the mean of
+    /// several turns depends less on where people happen to be in the views
+    #[arg(
+        long,
+        value_name = "DEGREES",
+        default_value_t = 0,
+        value_parser = clap::value_parser!(u16).range(..360)
+    )]
+    pub(super) turn_deg: u16,
     /// Print one JSON object per row instead of a table
     #[arg(long)]
     pub(super) json: bool,
@@ -69,7 +78,7 @@ pub(in crate::cli) struct Arguments {
         long,
         value_name = "FILE|FOLDER",
         conflicts_with_all = ["profile", "refine", "paper", "model", "score_threshold",
-                              "iou_threshold", "sigma", "save_detections"]
+                              "iou_threshold", "sigma", "save_detections", "turn_deg"]
     )]
     pub(super) from_detections: Vec<PathBuf>,
     #[command(flatten)]

@@ -111,6 +111,8 @@ pub struct Engine {
     /// Round-robin counter for views that bypass the network's queue.
     next_session: AtomicUsize,
     inference_cache: InferenceCache,
+    /// The turn of all view plans, radians.
+    plan_turn: f64,
     options: EngineOptions,
     metrics: Arc<DetectMetrics>,
 }
@@ -146,9 +148,18 @@ impl Engine {
                 options.inference_cache_frames,
                 metrics.inference_cache_hits.clone(),
             ),
+            plan_turn: 0.0,
             options,
             metrics,
         })
+    }
+
+    /// Turns the views of all plans about the plan's axis, radians. A person is then seen in other
+    /// views, so that several turns tell how much of a precision is chance.
+    #[must_use]
+    pub fn with_plan_turn(mut self, angle: f64) -> Self {
+        self.plan_turn = angle;
+        self
     }
 
     /// Returns the default models.

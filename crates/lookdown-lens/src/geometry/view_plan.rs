@@ -128,6 +128,15 @@ impl ViewPlan {
         wide.with_details(&[Ring::of_degrees(1.25, 8, 45.0)])
     }
 
+    /// The same plan with each azimuth larger by `angle`, radians.
+    #[must_use]
+    pub fn turned(mut self, angle: f64) -> Self {
+        for direction in &mut self.directions {
+            direction.azimuth += angle;
+        }
+        self
+    }
+
     /// The number of views in which every frame is looked at. They come first; the others are
     /// detail views.
     #[must_use]

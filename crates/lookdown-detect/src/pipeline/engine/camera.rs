@@ -164,7 +164,7 @@ impl Engine {
             input_size: (input.width, input.height),
         };
         self.rigs.get_or_build(&key, || {
-            let plan = profile.view_plan();
+            let plan = profile.view_plan().map(|plan| plan.turned(self.plan_turn));
             let (width, height) = (frame.width(), frame.height());
             self.remappers
                 .install(|| CameraRig::new(geometry, width, height, plan.as_ref(), input))

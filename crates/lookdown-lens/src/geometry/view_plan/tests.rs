@@ -1,3 +1,5 @@
+use nalgebra::{Rotation3, Vector3};
+
 use super::*;
 use crate::geometry::Pixel;
 
@@ -34,5 +36,20 @@ fn the_rings_of_a_plan_reach_the_rim_of_a_180_degree_lens() {
             reach > 85_f64.to_radians(),
             "a plan of {count} reaches {reach}"
         );
+    }
+}
+
+#[test]
+fn a_turned_plan_looks_in_the_directions_that_a_turned_camera_would_see() {
+    let angle = 0.3_f64;
+    let views = |plan: ViewPlan| plan.views(&Mount::default(), 301, 301);
+    let pixel = Pixel::new(40.0, 250.0);
+    let spin = Rotation3::from_axis_angle(&Vector3::z_axis(), angle);
+    for (view, turned) in views(ViewPlan::balanced())
+        .iter()
+        .zip(views(ViewPlan::balanced().turned(angle)))
+    {
+        let expected = spin * view.ray_in_camera(&pixel);
+        assert!((turned.ray_in_camera(&pixel) - expected).norm() < 1e-12);
     }
 }
