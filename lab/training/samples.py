@@ -2,11 +2,8 @@
 
 A frame is turned by a multiple of 90°, so that axis-parallel boxes stay exact; persons who then stand farther than
 `UPRIGHT_LIMIT` from upright are ignored, since another turn has them upright.
-
-    python lab/training/samples.py pack --frames WORK/frames/train --out WORK/packs/train --count 4000 --size 416
 """
 
-import argparse
 import json
 import math
 from pathlib import Path
@@ -235,69 +232,3 @@ class Mixed:
     def sample(self, rng, size, tile_share=0.5, view_share=0.0):
         source = self.empty if rng.random() < self.share else self.people
         return source.sample(rng, size, tile_share, view_share)
-
-
-class Pack:
-    """Samples packed into files of JPEG bytes: small enough to be sent to another machine."""
-
-    def __init__(self, folder):
-        self.files = [np.load(p, allow_pickle=False) for p in sorted(Path(folder).glob("*.npz"))]
-        self.where = [(f, k) for f in self.files for k in range(len(f["start"]) - 1)]
-        self.cache = {
-            id(f): {name: f[name] for name in ("bytes", "start", "boxes", "ignore", "first")} for f in self.files
-        }
-
-    def sample(self, rng, size, tile_share=None, view_share=None):
-        file, k = self.where[int(rng.integers(len(self.where)))]
-        c = self.cache[id(file)]
-        image = cv2.imdecode(c["bytes"][c["start"][k] : c["start"][k + 1]], cv2.IMREAD_COLOR)[..., ::-1]
-        boxes, ignore = (c[name][c["first"][k] : c["first"][k + 1]] for name in ("boxes", "ignore"))
-        if image.shape[0] != size:
-            boxes = boxes * (size / image.shape[0])
-            image = cv2.resize(np.ascontiguousarray(image), (size, size), interpolation=cv2.INTER_AREA)
-        image, boxes = varied(image, boxes, rng)
-        return image, boxes.astype(np.float32), ignore
-
-
-def pack(frames, out, count, size, seed, per_file=500, quality=88):
-    """Writes packed samples; skips files that exist."""
-    out.mkdir(parents=True, exist_ok=True)
-    source = Frames(frames)
-    for number in range(math.ceil(count / per_file)):
-        path = out / f"{number:04d}.npz"
-        if path.exists():
-            continue
-        rng, data, start, boxes, ignore, first = np.random.default_rng([seed, number]), [], [0], [], [], [0]
-        for _ in range(min(per_file, count - number * per_file)):
-            image, b, i = source.sample(rng, size)
-            encoded = cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])[1].ravel()
-            data.append(encoded)
-            start.append(start[-1] + len(encoded))
-            boxes.append(b)
-            ignore.append(i)
-            first.append(first[-1] + len(b))
-        np.savez(
-            path,
-            bytes=np.concatenate(data),
-            start=np.array(start),
-            boxes=np.concatenate(boxes),
-            ignore=np.concatenate(ignore),
-            first=np.array(first),
-        )
-        print(f"{path}: {start[-1] / 1e6:.1f} MB", flush=True)
-
-
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", choices=("pack",))
-    parser.add_argument("--frames", type=Path, required=True)
-    parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--count", type=int, default=4000)
-    parser.add_argument("--size", type=int, default=416)
-    parser.add_argument("--seed", type=int, default=1_000_000)
-    options = parser.parse_args()
-    pack(options.frames, options.out, options.count, options.size, options.seed)
-
-
-if __name__ == "__main__":
-    main()

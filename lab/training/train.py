@@ -1,14 +1,11 @@
-"""Tunes NanoDet-g on composed frames, averages with the COCO weights, and exports ONNX.
+"""Tunes NanoDet-g on a pool of samples (pool.py), averages with the given weights, and exports ONNX.
 
-    python lab/training/train.py --source WORK/frames/train --model models/nanodet_g_416/model.onnx --out WORK/runs/first --minutes 60
+    python lab/training/train.py --pool WORK/pools/views --model models/nanodet_g_416/model.onnx --out WORK/runs/first --minutes 60
 
-With `--hold`, the network keeps its first answers within persons and learns from all other cells that they are negatives:
+With `--hold`, the network keeps its first answers within persons and learns from all other cells that they are negatives.
 
-    python lab/training/train.py --source WORK/frames/train --empty WORK/frames/train-empty --hold 2 --frozen 18 \\
-        --model models/nanodet_g_fisheye_416/model.onnx --out WORK/runs/hold --minutes 30
-
-`--source` is a folder of frames or of packed samples (samples.py). Stopped runs go on from `OUT/last.pt`. Results: the tuned
-weights (`tuned.onnx`, an exponential moving average) and their average with the given model (`averaged.onnx`).
+Stopped runs go on from `OUT/last.pt`. Results: the tuned weights (`tuned.onnx`, an exponential moving average) and their
+average with the given model (`averaged.onnx`).
 """
 
 import argparse
@@ -21,30 +18,26 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from losses import hold_loss, sample_losses
+from losses import ABSENT, IGNORED, PERSON, batch_losses, hold_loss, within
 from network import Network, averaged, boxes_of, export
-
-from samples import EmptyFrames, Frames, Mixed, Pack
 
 
 def options_of():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--source", type=Path, required=True)
+    parser.add_argument("--pool", type=Path, required=True, action="append")
     parser.add_argument("--model", type=Path, required=True, help="the ONNX file of nanodet_g_416")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--minutes", type=float, default=60)
     parser.add_argument("--steps", type=int, help="ends after so many steps where that is sooner")
     parser.add_argument("--batch", type=int, default=8)
-    parser.add_argument("--size", type=int, default=416)
     parser.add_argument("--rate", type=float, default=4e-4, help="largest learning rate")
     parser.add_argument("--frozen", type=int, default=4, help="convolutions at the input that keep their weights")
     parser.add_argument(
-        "--tiles", type=float, default=0.5, help="share of whole quarter-turn tiles; the rest are crops"
+        "--least", type=float, default=0.0, help="persons with a lower score of the teachers are ignored"
     )
-    parser.add_argument("--views", type=float, default=0.0, help="share of upright perspective views among all samples")
-    parser.add_argument("--empty", type=Path, help="a folder of frames without people: hard negatives")
-    parser.add_argument("--empty-share", type=float, default=0.5, help="share of samples without people")
-    parser.add_argument("--false-alarms", type=Path, help="COCO results in the empty frames: places of crops")
+    parser.add_argument(
+        "--full", type=float, default=0.0, help="a teachers' score below this one scales what a person's cells learn"
+    )
     parser.add_argument(
         "--hold",
         type=float,
@@ -58,19 +51,55 @@ def options_of():
     return parser.parse_args()
 
 
-def feeder(source, o, workers=1):
-    """A queue of batches that threads fill: images (n × size × size × 3), list of boxes, list of ignore flags."""
-    batches = queue.Queue(8)
+class Pool:
+    """The samples of pool.py."""
 
-    def fill(number):
-        rng = np.random.default_rng([o.seed, number, time.time_ns() % 2**31])
+    def __init__(self, folder):
+        self.images = np.load(folder / "images.npy", mmap_mode="r")
+        boxes = np.load(folder / "boxes.npz")
+        self.first, self.boxes, self.ignore, self.teacher = (
+            boxes[name] for name in ("first", "boxes", "ignore", "teacher")
+        )
+
+    def samples(self, chosen, o):
+        """Images (b × size × size × 3), boxes (b × g × 4), their kinds and how far to trust them (b × g)."""
+        rows = [slice(self.first[k], self.first[k + 1]) for k in chosen]
+        g = max(1, *(row.stop - row.start for row in rows))
+        boxes, kind, trust = (np.zeros((len(rows), g, *more), np.float32) for more in ((4,), (), ()))
+        for n, row in enumerate(rows):
+            count, teacher = row.stop - row.start, self.teacher[row]
+            boxes[n, :count] = self.boxes[row]
+            kind[n, :count] = np.where(self.ignore[row] | (teacher < o.least), IGNORED, PERSON)
+            trust[n, :count] = np.clip(teacher / o.full, 0, 1) if o.full else 1
+        return self.images[chosen], boxes, kind, trust
+
+
+def feeder(o):
+    """A queue of batches of all pools in equal parts, which a thread fills."""
+    pools, batches, rng = [Pool(folder) for folder in o.pool], queue.Queue(8), np.random.default_rng(o.seed)
+
+    def fill():
+        turn = 0
         while True:
-            drawn = [source.sample(rng, o.size, o.tiles, o.views) for _ in range(o.batch)]
-            batches.put((np.stack([d[0] for d in drawn]), [d[1] for d in drawn], [d[2] for d in drawn]))
+            pool = pools[turn % len(pools)]
+            batches.put(pool.samples(np.sort(rng.integers(len(pool.images), size=o.batch)), o))
+            turn += 1
 
-    for number in range(workers):
-        threading.Thread(target=fill, args=(number,), daemon=True).start()
+    threading.Thread(target=fill, daemon=True).start()
     return batches
+
+
+def varied(batch, device):
+    """A batch on the device: images as floats, mirrored half of the time, with small changes of color."""
+    images, boxes, kind, trust = (torch.from_numpy(np.ascontiguousarray(part)).to(device) for part in batch)
+    x, size = images.permute(0, 3, 1, 2).float(), images.shape[2]
+    uniform = lambda low, high, *shape: torch.empty(len(x), *shape, device=device).uniform_(low, high)
+    mirrored = uniform(0, 1) < 0.5
+    x = torch.where(mirrored[:, None, None, None], x.flip(3), x)
+    boxes = torch.where(mirrored[:, None, None], boxes[..., [2, 1, 0, 3]] * boxes.new_tensor([-1, 1, -1, 1]), boxes)
+    boxes = boxes + mirrored[:, None, None] * boxes.new_tensor([size, 0, size, 0]) * (kind != ABSENT)[..., None]
+    x = x * uniform(0.9, 1.1, 1, 1, 1) + uniform(-8, 8, 1, 1, 1)
+    return (x * uniform(0.97, 1.03, 3, 1, 1)).clamp(0, 255), boxes, kind, trust
 
 
 def optimiser_of(network, o):
@@ -86,45 +115,27 @@ def optimiser_of(network, o):
     ), trained
 
 
-def source_of(o):
-    """The samples of frames with people, mixed with those of frames without."""
-    source = Frames(o.source) if (o.source / "annotations.json").exists() else Pack(o.source)
-    return Mixed(source, EmptyFrames(o.empty, o.false_alarms), o.empty_share) if o.empty else source
-
-
 def held_loss(network, first, batch, o):
     """Loss of a batch that keeps the answers of the network `first` within persons, and its parts (score, hold, 0)."""
-    images, boxes, _ = batch
-    x = torch.from_numpy(np.ascontiguousarray(images)).to(o.device).permute(0, 3, 1, 2).float()
+    x, boxes, kind, trust = batch
     logits, sides, points, strides = network(x)
-    with_people = [n for n in range(len(images)) if len(boxes[n])]
     with torch.no_grad():
-        kept = dict(zip(with_people, zip(*first(x[with_people])[:2]))) if with_people else {}
-    score = hold = logits.sum() * 0
-    for n in range(len(images)):
-        persons = torch.as_tensor(boxes[n], dtype=torch.float32, device=o.device)
-        score = score + sample_losses(logits[n], sides[n], None, points, strides, persons[:0], persons)[0][0]
-        if n in kept:
-            hold = hold + hold_loss(logits[n], sides[n], *kept[n], points, persons)
-    score, hold = score / len(images), hold / len(images)
+        kept = first(x)[:2]
+    negatives = torch.where(kind == ABSENT, kind, IGNORED)
+    found = boxes_of(sides, points, strides)
+    score = batch_losses(logits, sides, found, points, strides, boxes, negatives, trust)[0][0] / len(x)
+    held = (within(points, boxes) & (kind != ABSENT)[..., None]).any(1)
+    hold = hold_loss(logits, sides, *kept, held) / len(x)
     return score + o.hold * hold, torch.stack([score, hold, hold * 0]).detach()
 
 
-def step_loss(network, batch, device):
-    """Loss of a batch and its parts (score, box, sides) as floats."""
-    images, boxes, ignore = batch
-    x = torch.from_numpy(np.ascontiguousarray(images)).to(device).permute(0, 3, 1, 2).float()
+def step_loss(network, batch):
+    """Loss of a batch, and its parts (score, box, sides)."""
+    x, boxes, kind, trust = batch
     logits, sides, points, strides = network(x)
     found = boxes_of(sides, points, strides)
-    parts, weight = torch.zeros(3, device=device), 0.0
-    for n in range(len(images)):
-        all_boxes, flags = (
-            torch.as_tensor(boxes[n], dtype=torch.float32, device=device),
-            torch.as_tensor(ignore[n], device=device).bool(),
-        )
-        loss, w = sample_losses(logits[n], sides[n], found[n], points, strides, all_boxes[~flags], all_boxes[flags])
-        parts, weight = parts + loss, weight + w
-    parts = parts / max(weight, 2.0)
+    parts, weight = batch_losses(logits, sides, found, points, strides, boxes, kind, trust)
+    parts = parts / weight.clamp(2.0)
     return parts[0] + 2 * parts[1] + 0.25 * parts[2], parts.detach()
 
 
@@ -132,7 +143,6 @@ def train(o):
     o.out.mkdir(parents=True, exist_ok=True)
     torch.set_num_threads(o.threads)
     torch.manual_seed(o.seed)
-    source = source_of(o)
     network = Network(o.model).to(o.device)
     first = copy.deepcopy(network)
     optimiser, trained = optimiser_of(network, o)
@@ -143,7 +153,7 @@ def train(o):
         mean.load_state_dict(kept["mean"])
         optimiser.load_state_dict(kept["optimiser"])
         step, spent = kept["step"], kept["spent"]
-    batches, start, sums = feeder(source, o, max(1, o.threads - 1)), time.time() - spent, np.zeros(4)
+    batches, start, sums = feeder(o), time.time() - spent, torch.zeros(4, device=o.device)
     save = lambda: torch.save(
         dict(
             network=network.state_dict(),
@@ -160,10 +170,8 @@ def train(o):
         rate = o.rate * min(1, step / 40) * (0.05 + 0.475 * (1 + math.cos(math.pi * min(1, progress()))))
         for group in optimiser.param_groups:
             group["lr"] = rate
-        if o.hold:
-            loss, parts = held_loss(network, first, batches.get(), o)
-        else:
-            loss, parts = step_loss(network, batches.get(), o.device)
+        batch = varied(batches.get(), o.device)
+        loss, parts = held_loss(network, first, batch, o) if o.hold else step_loss(network, batch)
         optimiser.zero_grad()
         loss.backward()
         torch.nn.utils.clip_grad_norm_(trained, 10.0)
@@ -172,7 +180,7 @@ def train(o):
         with torch.no_grad():
             for a, b in zip(mean.parameters(), network.parameters()):
                 a.mul_(decay).add_(b, alpha=1 - decay)
-        sums += (*parts.cpu().numpy(), 1)
+        sums += torch.cat([parts, parts.new_ones(1)])
         if step % 20 == 0:
             each = (time.time() - start) / step / o.batch
             print(
@@ -180,7 +188,7 @@ def train(o):
                 f"{each:.3f} s an image, {max(0, o.minutes - (time.time() - start) / 60):.0f} min left",
                 flush=True,
             )
-            sums[:] = 0
+            sums.zero_()
         if step % 200 == 0:
             save()
     save()

@@ -22,6 +22,9 @@ from .progress import Progress
 SMALLEST_AREA, SMALLEST_SHARE = 40, 0.2
 """Persons with fewer visible pixels, or a smaller visible share, are marked `ignore`."""
 
+CROWD_AREA = 150
+"""Square meters from which a room may hold a crowd."""
+
 
 def random_camera(rng, room):
     """A random frame size, lens, place of the circle, turn and tilt that the room's panorama can serve."""
@@ -42,9 +45,10 @@ def random_camera(rng, room):
 
 
 def wanted_persons(rng, room):
-    """5 to 40 persons, fewer in small rooms."""
+    """5 to 40 persons, 30 to 90 in a quarter of the large rooms, fewer in small rooms."""
     area = room["size"][0] * room["size"][1]
-    return int(np.clip(np.exp(rng.uniform(math.log(5), math.log(40))), 3, max(5, area / 5)))
+    low, high, each = (30, 90, 2.5) if area > CROWD_AREA and rng.random() < 0.25 else (5, 40, 5)
+    return int(np.clip(np.exp(rng.uniform(math.log(low), math.log(high))), 3, max(5, area / each)))
 
 
 def annotate(composition, calibration):

@@ -61,8 +61,9 @@ def free(room, x, y, margin):
     return True
 
 
-def place(rng, room, files, wanted, prefer_light=None, tries=400):
-    """Placements with about `wanted` persons. Each file is used at most twice in a frame."""
+def place(rng, room, files, wanted, prefer_light=None):
+    """Placements with about `wanted` persons. Each file is used at most twice in a frame, more often in a crowd."""
+    tries, most_uses = max(400, 20 * wanted), 2 + wanted // 30
     fits = [
         (f, k)
         for f in files
@@ -79,7 +80,7 @@ def place(rng, room, files, wanted, prefer_light=None, tries=400):
             break
         off = np.abs(angles - random_angle(rng))
         file, k = fits[rng.choice(np.argsort(off)[:NEAREST])]
-        if used.get(id(file), 0) >= 2 or persons + len(file.about["persons"]) > wanted + 3:
+        if used.get(id(file), 0) >= most_uses or persons + len(file.about["persons"]) > wanted + 3:
             continue
         azimuth = float(rng.uniform(0, 2 * math.pi))
         if taken and rng.random() < 0.3:  # Near another one: people stand in groups and occlude.
