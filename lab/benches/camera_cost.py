@@ -2,7 +2,8 @@
 
 `camera_cost.py [--seconds N] [--rounds N] [--cameras N] [--form run|three] [--scene walkers|empty] [BINARY...]`, after
 `scripts/setup.py runtime model`, `cargo build --release`, and the installation of `ffmpeg`, `gir1.2-gst-rtsp-server-1.0`
-and GStreamer's plugins. The stream has 960² pixels and 10 frames per second. Five of them are processed with `fast`.
+and GStreamer's plugins; with `--file`, `ffmpeg` alone. The stream has 960² pixels and 10 frames per second. Five of them
+are processed with `fast`. `taskset -c 0,1 camera_cost.py --file` measures on two of the cores.
 "Walkers" is the rendered clip of `tests/real/walks`. "Empty" is the median of its frames with new noise in each
 frame, so that the H.264 encoder makes noise of its own. Several binaries run in alternating windows.
 
@@ -34,6 +35,8 @@ STREAM_RATE = 10
 WANTED_RATE = 5
 """Frames per second that are processed."""
 EMPTY_FRAMES = 50
+FILE_SECONDS = 150
+"""Length of a file: more than start, warm-up and window."""
 WARM_UP_SECONDS = 12.0
 """Longer than detections of views without motion are kept, 10 s."""
 TICKS_PER_SECOND = os.sysconf("SC_CLK_TCK")
@@ -45,12 +48,13 @@ def main(options: argparse.Namespace) -> None:
     with tempfile.TemporaryDirectory() as name:
         scenes = {scene: frames_of(scene, Path(name) / scene) for scene in options.scenes or SCENES}
         with contextlib.ExitStack() as stack:
-            ports = {scene: stack.enter_context(rtsp_server(folder)) for scene, folder in scenes.items()}
+            serve = video_file if options.file else rtsp_server
+            urls = {scene: stack.enter_context(serve(folder)) for scene, folder in scenes.items()}
             for number in range(options.rounds):
-                for scene, port in ports.items():
+                for scene, url in urls.items():
                     for binary in options.binaries:
                         with tempfile.TemporaryDirectory() as folder:
-                            window = measured(options, binary, Path(folder), port)
+                            window = measured(options, binary, Path(folder), url)
                         told = {"round": number, "scene": scene, "form": options.form, "binary": str(binary)}
                         print(json.dumps(told | window), flush=True)
 
@@ -73,22 +77,32 @@ def frames_of(scene: str, folder: Path) -> Path:
 
 
 @contextlib.contextmanager
-def rtsp_server(folder: Path) -> Iterator[int]:
+def video_file(folder: Path) -> Iterator[str]:
+    """Writes the frames of a folder as H.264 to a file that lasts for a window, with the settings of the RTSP server."""
+    path = folder / "stream.mp4"
+    frames = ["-stream_loop", "-1", "-framerate", str(STREAM_RATE), "-i", folder / "%d.jpg", "-t", str(FILE_SECONDS)]
+    coded = ["-c:v", "libx264", "-preset", "ultrafast", "-tune", "zerolatency", "-g", str(STREAM_RATE)]
+    subprocess.run(["ffmpeg", "-v", "error", *frames, *coded, "-b:v", "2M", "-pix_fmt", "yuv420p", path], check=True)
+    yield str(path)
+
+
+@contextlib.contextmanager
+def rtsp_server(folder: Path) -> Iterator[str]:
     """Serves the frames of a folder as H.264."""
     (port,) = free_ports(1)
     # GStreamer is only available to Debian's Python.
     command = ["/usr/bin/python3", RTSP_SERVER, str(port), folder, str(STREAM_RATE)]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
         try:
-            yield port
+            yield f"rtsp://127.0.0.1:{port}/stream"
         finally:
             process.kill()
 
 
-def measured(options: argparse.Namespace, binary: Path, folder: Path, source: int) -> dict:
+def measured(options: argparse.Namespace, binary: Path, folder: Path, url: str) -> dict:
     """A window with this binary."""
     form = one_process if options.form == "run" else three_processes
-    with form(installation(options, binary, folder, source)) as servers:
+    with form(installation(options, binary, folder, url)) as servers:
         deadline = time.monotonic() + 60
         while reports_of(servers[0]) < options.cameras:
             if time.monotonic() > deadline:
@@ -154,7 +168,7 @@ def children(servers: list[Server]) -> list[int]:
     return [int(child) for task in tasks for child in (task / "children").read_text(encoding="ascii").split()]
 
 
-def installation(options: argparse.Namespace, binary: Path, folder: Path, source: int) -> Installation:
+def installation(options: argparse.Namespace, binary: Path, folder: Path, url: str) -> Installation:
     """The cameras of a window, all of the same stream."""
     calibrations = folder / "calibrations"
     calibrations.mkdir()
@@ -164,11 +178,12 @@ def installation(options: argparse.Namespace, binary: Path, folder: Path, source
         binary=binary.resolve(),
         folder=folder,
         calibrations=calibrations,
-        camera_defaults={"profile": "fast", "every": every, "calibration": "walks", "follow": options.follow},
+        camera_defaults={"profile": "fast", "every": every, "calibration": "walks", "follow": options.follow}
+        | ({"hwaccel": options.hwaccel} if options.hwaccel else {}),
         cameras=[
             {
                 "name": f"walks{number}",
-                "url": f"rtsp://127.0.0.1:{source}/stream",
+                "url": url,
                 "parameters.score_threshold": 0.06,
             }
             for number in range(options.cameras)
@@ -184,5 +199,7 @@ if __name__ == "__main__":
     parser.add_argument("--cameras", type=int, default=1, help="cameras of a window, all of the same stream")
     parser.add_argument("--form", choices=("run", "three"), default="run")
     parser.add_argument("--every-frame", dest="follow", action="store_false", help="search every frame")
+    parser.add_argument("--file", action="store_true", help="play a video file instead of an RTSP stream")
+    parser.add_argument("--hwaccel", help="decode in hardware: a method that `ffmpeg -hwaccels` lists")
     parser.add_argument("--scene", dest="scenes", action="append", choices=SCENES, help="both if none is given")
     main(parser.parse_args())
