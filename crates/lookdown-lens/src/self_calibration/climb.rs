@@ -1,14 +1,17 @@
 //! The way to the nearest maximum of the evidence.
 
-use nalgebra::{DVector, Rotation3, Vector3};
+use nalgebra::{Rotation3, Vector3};
 
 use super::{
-    camera::RoomCamera, edge_curve::EdgeCurve, evaluation::Evaluation, evidence::evaluate,
+    camera::RoomCamera,
+    edge_curve::EdgeCurve,
+    evaluation::{Evaluation, Parameters},
+    evidence::evaluate,
     prior::Prior,
 };
 
 /// The camera after a step of its parameters.
-fn stepped(camera: &RoomCamera, step: &DVector<f64>) -> RoomCamera {
+pub(super) fn stepped(camera: &RoomCamera, step: &Parameters) -> RoomCamera {
     RoomCamera {
         focal: camera.focal * step[0].exp(),
         k1: camera.k1 + step[1],
@@ -30,7 +33,7 @@ pub(super) fn climb(
     let mut current = evaluate(&camera, curves, weights, prior, blur, true)?;
     let mut damping = 1e-3;
     for _ in 0..steps {
-        let mut damped = current.normal.clone();
+        let mut damped = current.normal;
         for index in 0..damped.nrows() {
             damped[(index, index)] *= 1.0 + damping;
         }

@@ -136,7 +136,7 @@ impl RoomFit {
 /// Evidence by which a further circle must be better.
 const CLEARLY_BETTER: f64 = 3.0;
 
-fn prior(circle: &CircleGuess, known: KnownLens) -> Prior {
+pub(super) fn prior(circle: &CircleGuess, known: KnownLens) -> Prior {
     let half = known.field_of_view.map(|field| (field / 2.0, 1e-3));
     Prior {
         center: circle.center,

@@ -19,7 +19,7 @@ pub struct FitUncertainty {
 
 /// Standard deviations from the curvature of the evidence.
 pub(super) fn curvature(camera: &RoomCamera, evaluation: &Evaluation) -> Option<FitUncertainty> {
-    let covariance = evaluation.normal.clone().try_inverse()?;
+    let covariance = evaluation.normal.try_inverse()?;
     let ideal = ideal_shape_slope(camera.k1);
     let radius = angles().map(|theta| {
         let (radius, _) = camera.curve(theta);
