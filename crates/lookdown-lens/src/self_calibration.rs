@@ -14,6 +14,7 @@ mod fit;
 mod maxima;
 mod prior;
 mod refusal;
+mod residual;
 mod search;
 #[cfg(test)]
 mod tests;

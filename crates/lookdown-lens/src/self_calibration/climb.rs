@@ -10,6 +10,11 @@ use super::{
     prior::Prior,
 };
 
+/// Growth of the steps after each success, and their greatest length, in those of Gauss and Newton.
+/// These are too short where edges are about to follow another direction or none.
+const LONGER: f64 = 1.6;
+const LONGEST: f64 = 8.0;
+
 /// The camera after a step of its parameters.
 pub(super) fn stepped(camera: &RoomCamera, step: &Parameters) -> RoomCamera {
     RoomCamera {
@@ -31,7 +36,7 @@ pub(super) fn climb(
     steps: usize,
 ) -> Option<(RoomCamera, Evaluation)> {
     let mut current = evaluate(&camera, curves, weights, prior, blur, true)?;
-    let mut damping = 1e-3;
+    let (mut damping, mut stride) = (1e-3, 1.0);
     for _ in 0..steps {
         let mut damped = current.normal;
         for index in 0..damped.nrows() {
@@ -40,17 +45,19 @@ pub(super) fn climb(
         let Some(cholesky) = damped.cholesky() else {
             break;
         };
-        let step = cholesky.solve(&current.right);
+        let step = stride * cholesky.solve(&current.right);
         let next = stepped(&camera, &step);
         match evaluate(&next, curves, weights, prior, blur, true) {
             Some(evaluation) if evaluation.evidence > current.evidence => {
                 let gain = evaluation.evidence - current.evidence;
                 (camera, current) = (next, evaluation);
                 damping = (damping * 0.2).max(1e-6);
+                stride = (stride * LONGER).min(LONGEST);
                 if gain < 1e-3 {
                     break;
                 }
             }
+            _ if stride > 1.0 => stride = 1.0,
             _ => {
                 damping *= 10.0;
                 if damping > 1e4 {

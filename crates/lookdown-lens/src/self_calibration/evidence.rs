@@ -8,10 +8,11 @@
 use std::f64::consts::{PI, TAU};
 
 use super::{
-    camera::{Angles, RoomCamera, SeenRay, ideal_shape_slope},
+    camera::{Angles, RoomCamera, SeenRay},
     edge_curve::EdgeCurve,
     evaluation::{Evaluation, Normal, PARAMETERS, Parameters},
     prior::Prior,
+    residual::{LensSlopes, Residual, own_slope, squared_pixels_per_unit},
 };
 use crate::geometry::Ray;
 
@@ -105,13 +106,6 @@ pub(super) fn evaluate(
     Some(result)
 }
 
-/// Square of the distance in pixels from a plane, per unit of the scalar product with its normal.
-fn squared_pixels_per_unit(seen: &SeenRay, normal: &Ray) -> f64 {
-    let outward = normal.dot(&seen.outward);
-    let around = normal.dot(&seen.around);
-    1.0 / (outward * outward + around * around).max(1e-14)
-}
-
 /// The plane through a direction that fits rays best, and the sum of its squared residuals, or
 /// `None` if a first, unweighted plane is farther.
 fn best_plane(rays: &[SeenRay], direction: &Ray, farthest: f64) -> Option<(Ray, f64)> {
@@ -142,6 +136,15 @@ fn best_plane(rays: &[SeenRay], direction: &Ray, farthest: f64) -> Option<(Ray, 
         return None;
     }
     let normal = thinnest(moments, &first, &second);
+    // A step of the plane's angle to the least sum, so that its slope with the angle is zero.
+    let turned = direction.cross(&normal);
+    let [mut slopes, mut slope_residuals] = [0.0; 2];
+    for seen in rays {
+        let (residual, slope) = own_slope(seen, &normal, &turned);
+        slopes += slope * slope;
+        slope_residuals += slope * residual;
+    }
+    let normal = (normal - turned * (slope_residuals / slopes.max(1e-12))).normalize();
     let squares = rays
         .iter()
         .map(|seen| squared_pixels_per_unit(seen, &normal) * normal.dot(&seen.ray).powi(2));
@@ -191,10 +194,8 @@ fn add_curve(
     directions: &[Ray; 3],
     scale: f64,
 ) {
-    let direction = &directions[fit.direction];
-    let turned = direction.cross(&fit.normal);
-    let ideal = ideal_shape_slope(camera.k1);
-    let mut row = [0.0; PARAMETERS];
+    let turned = directions[fit.direction].cross(&fit.normal);
+    let lens = LensSlopes::of(camera);
     let mut normal = [[0.0; PARAMETERS]; PARAMETERS];
     let mut right = [0.0; PARAMETERS];
     // Sums for the elimination of the plane's own angle.
@@ -202,23 +203,11 @@ fn add_curve(
     let mut own_residual = 0.0;
     let mut own_rows = [0.0; PARAMETERS];
     for seen in rays {
-        let factor = squared_pixels_per_unit(seen, &fit.normal).sqrt();
-        let residual = factor * fit.normal.dot(&seen.ray);
-        let outward = factor * fit.normal.dot(&seen.outward);
-        let around = factor * fit.normal.dot(&seen.around);
-        let per_focal = outward * camera.focal;
-        let square = seen.theta * seen.theta;
-        let cube = square * seen.theta;
-        row[0] = -per_focal * seen.radius;
-        let along = ideal[0] + square * (ideal[1] + square * ideal[2]);
-        row[1] = -per_focal * cube * along;
-        row[2] = -per_focal * cube * square;
-        row[3] = -(outward * seen.side[0] - around * seen.side[1]);
-        row[4] = -(outward * seen.side[1] + around * seen.side[0]);
-        // The normal turns with the room.
-        let turn = fit.normal.cross(&seen.ray) * factor;
-        row[5..8].copy_from_slice(turn.as_slice());
-        let own_slope = factor * turned.dot(&seen.ray);
+        let Residual {
+            residual,
+            row,
+            own_slope,
+        } = Residual::of(seen, &fit.normal, &turned, &lens);
         own += own_slope * own_slope;
         own_residual += own_slope * residual;
         for index in 0..PARAMETERS {

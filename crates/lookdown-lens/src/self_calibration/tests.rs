@@ -5,6 +5,10 @@ use nalgebra::{Rotation3, Vector3};
 use super::{
     CircleGuess, EdgeCurve, FitRefusal, KnownLens, RoomFit,
     camera::{Angles, RoomCamera},
+    climb::stepped,
+    evaluation::{PARAMETERS, Parameters},
+    evidence::evaluate,
+    fit::prior,
 };
 use crate::geometry::Ray;
 
@@ -247,4 +251,32 @@ fn camera_of_another_circle_is_a_rival() {
     let both = RoomFit::of(&[all], &[left, right], known);
     assert!(alone.is_ok(), "{alone:?}");
     assert_eq!(both, Err(FitRefusal::Ambiguous));
+}
+
+#[test]
+fn right_side_is_the_slope_of_the_evidence() {
+    let curves = edges(&Rotation3::from_euler_angles(0.14, -0.09, 0.4));
+    let weights = vec![1.0; curves.len()];
+    let prior = prior(&circle(), KnownLens::default());
+    let camera = RoomCamera {
+        focal: FOCAL * 1.01,
+        k1: -0.04,
+        k2_offset: 0.001,
+        center: CENTER,
+        room: Rotation3::from_euler_angles(0.142, -0.088, 0.401),
+    };
+    let at = |camera: &RoomCamera| evaluate(camera, &curves, &weights, &prior, 1.5, true).unwrap();
+    let right = at(&camera).right;
+    for index in 0..PARAMETERS {
+        let mut step = Parameters::zeros();
+        step[index] = if index == 3 || index == 4 { 1e-3 } else { 1e-6 };
+        let [before, after] = [-step, step].map(|step| at(&stepped(&camera, &step)).evidence);
+        let slope = (after - before) / (2.0 * step[index]);
+        let off = (slope / right[index] - 1.0).abs();
+        assert!(
+            off < 0.01,
+            "parameter {index}: {slope}, not {}",
+            right[index]
+        );
+    }
 }
