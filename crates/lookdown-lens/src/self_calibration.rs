@@ -11,6 +11,7 @@ mod edge_curve;
 mod evaluation;
 mod evidence;
 mod fit;
+mod halves;
 mod maxima;
 mod prior;
 mod refusal;
@@ -18,6 +19,7 @@ mod residual;
 mod search;
 #[cfg(test)]
 mod tests;
+mod triples;
 mod uncertainty;
 mod upright;
 

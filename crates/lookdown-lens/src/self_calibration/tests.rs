@@ -9,6 +9,7 @@ use super::{
     evaluation::{PARAMETERS, Parameters},
     evidence::evaluate,
     fit::prior,
+    triples::Triples,
 };
 use crate::geometry::Ray;
 
@@ -243,12 +244,12 @@ fn camera_of_another_circle_is_a_rival() {
         center_sigma: 0.01,
         ..circle()
     };
-    let [left, right] = [guess([cx - 8.6, cy]), guess([cx + 8.6, cy])];
+    let [above, below] = [guess([cx, cy - 9.5]), guess([cx, cy + 9.5])];
     // Both circles are equally wrong: the edges are symmetric about the true center.
     let turned = room * Rotation3::from_euler_angles(0.0, 0.0, std::f64::consts::PI);
     let all = [edges(&room), edges(&turned)].concat();
-    let alone = RoomFit::of(std::slice::from_ref(&all), &[left], known);
-    let both = RoomFit::of(&[all], &[left, right], known);
+    let alone = RoomFit::of(std::slice::from_ref(&all), &[above], known);
+    let both = RoomFit::of(&[all], &[above, below], known);
     assert!(alone.is_ok(), "{alone:?}");
     assert_eq!(both, Err(FitRefusal::Ambiguous));
 }
@@ -279,4 +280,42 @@ fn right_side_is_the_slope_of_the_evidence() {
             right[index]
         );
     }
+}
+
+#[test]
+fn halves_of_the_image_with_two_lenses_are_refused() {
+    let room = Rotation3::from_euler_angles(0.14, -0.09, 0.4);
+    let mut both = vec![edges(&room); 2].concat();
+    for curve in &mut both {
+        let factor = if curve.points[0][0] < CENTER[0] {
+            0.97
+        } else {
+            1.03
+        };
+        for [x, y] in &mut curve.points {
+            *x = CENTER[0] + factor * (*x - CENTER[0]);
+            *y = CENTER[1] + factor * (*y - CENTER[1]);
+        }
+    }
+    let fit = RoomFit::of(&[both], &[circle()], KnownLens::default());
+    assert!(
+        matches!(fit, Err(FitRefusal::HalvesDisagree { .. })),
+        "{fit:?}"
+    );
+}
+
+#[test]
+fn vertical_without_edges_is_found_from_the_horizontal_ones() {
+    let room = Rotation3::from_euler_angles(0.3, -0.2, 0.4);
+    let triples = Triples::new();
+    let near = |ray: &Ray, axis: Ray| f64::from(ray.dot(&(room * axis)).abs() > 0.995);
+    let values: Vec<f64> = triples
+        .rays
+        .iter()
+        .map(|ray| near(ray, Ray::x()) + near(ray, Ray::y()))
+        .collect();
+    let scores = triples.scores(&values);
+    let (best, _) = scores.iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+    let off = best.angle(&(room * Ray::z())).to_degrees();
+    assert!(off < 9.0, "{off}°");
 }
