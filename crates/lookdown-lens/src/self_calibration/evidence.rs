@@ -204,7 +204,7 @@ fn add_curve(
     let mut own_rows = [0.0; PARAMETERS];
     for seen in rays {
         let Residual {
-            residual,
+            pixels: residual,
             row,
             own_slope,
         } = Residual::of(seen, &fit.normal, &turned, &lens);

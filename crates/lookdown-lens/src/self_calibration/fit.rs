@@ -4,11 +4,11 @@ use std::f64::consts::FRAC_PI_2;
 
 use super::{
     edge_curve::EdgeCurve,
-    halves::{halves, spread},
+    halves::{halves, spread, widened},
     maxima::{Maximum, fine_maxima, maxima},
     prior::Prior,
     refusal::FitRefusal,
-    uncertainty::{FitUncertainty, curvature, distance},
+    uncertainty::{FitUncertainty, distance, loose_curvature},
 };
 use crate::geometry::Ray;
 
@@ -38,9 +38,7 @@ const MAX_UNCERTAINTY: (f64, f64) = (0.028, 0.8);
 const K2_SIGMA: f64 = 0.0015;
 /// Errors are larger than the edges say, because no lens is exactly one of the family and edges
 /// come in groups: by this factor, and for the radius by this share however many edges there are.
-/// 68 % of 396 errors of the radius in rendered frames are within 0.8 of the deviations that result,
-/// 95 % within 2.0.
-const MISFIT: f64 = 1.3;
+const MISFIT: f64 = 1.2;
 const LENS_FLOOR: f64 = 0.003;
 
 /// A lens circle, detected or assumed.
@@ -140,8 +138,8 @@ impl RoomFit {
     }
 }
 
-/// Evidence that a circle after the first one loses: it is wrong more often, and it leaves the center
-/// more room.
+/// Evidence that a circle after the first one loses: it is wrong more often, and it leaves the
+/// center more room.
 const OTHER_CIRCLE: f64 = 6.0;
 
 fn is_ordered(maxima: &[Maximum]) -> bool {
@@ -200,24 +198,26 @@ fn checked(
     if maxima[1..].iter().any(is_rival) {
         return Err(FitRefusal::Ambiguous);
     }
-    let edges = curvature(camera, evaluation).ok_or(FitRefusal::Ambiguous)?;
     let halves = halves(camera, curves, weight, prior).ok_or(FitRefusal::Ambiguous)?;
-    let factor = MISFIT * spread(&halves);
+    let edges = loose_curvature(camera, evaluation, prior).ok_or(FitRefusal::Ambiguous)?;
+    let edges = widened(edges, &halves);
+    let spread = spread(&halves);
+    let factor = MISFIT * spread;
     let uncertainty = FitUncertainty {
         radius: (factor * edges.radius).hypot(LENS_FLOOR),
         center: factor * edges.center,
         level_deg: factor * edges.level_deg,
     };
+    if let Some(half) = halves.iter().find(|half| half.disagrees(spread)) {
+        return Err(FitRefusal::HalvesDisagree {
+            radius_percent: 100.0 * half.radius,
+            level_deg: half.level_deg,
+        });
+    }
     if uncertainty.radius > MAX_UNCERTAINTY.0 || uncertainty.level_deg > MAX_UNCERTAINTY.1 {
         return Err(FitRefusal::Uncertain {
             radius_percent: 100.0 * uncertainty.radius,
             level_deg: uncertainty.level_deg,
-        });
-    }
-    if let Some(half) = halves.iter().find(|half| half.disagrees()) {
-        return Err(FitRefusal::HalvesDisagree {
-            radius_percent: 100.0 * half.radius,
-            level_deg: half.level_deg,
         });
     }
     let [k1, k2, k3] = camera.shape();

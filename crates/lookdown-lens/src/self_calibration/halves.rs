@@ -1,12 +1,14 @@
 //! Fits of halves of the edges: whether they like another camera much better.
 
+use std::f64::consts::FRAC_1_SQRT_2;
+
 use super::{
     camera::RoomCamera,
     climb::climb,
     edge_curve::EdgeCurve,
     evidence::evaluate,
     prior::Prior,
-    uncertainty::{FitUncertainty, curvature, distance},
+    uncertainty::{FitUncertainty, distance, loose_curvature},
 };
 
 /// Most steps of a fit.
@@ -34,10 +36,11 @@ pub(super) struct Half {
 }
 
 impl Half {
-    /// Returns true if the half clearly shows another camera.
-    pub(super) fn disagrees(&self) -> bool {
-        let is_far = self.radius > NEAR.0.max(DEVIATIONS * self.own.radius)
-            || self.level_deg > NEAR.1.max(DEVIATIONS * self.own.level_deg);
+    /// Returns true if the half clearly shows another camera, with the factor of [`spread`].
+    pub(super) fn disagrees(&self, spread: f64) -> bool {
+        let deviations = DEVIATIONS * spread;
+        let is_far = self.radius > NEAR.0.max(deviations * self.own.radius)
+            || self.level_deg > NEAR.1.max(deviations * self.own.level_deg);
         is_far && self.gain > MAX_GAIN
     }
 }
@@ -68,10 +71,25 @@ pub(super) fn halves(
             gain: evaluation.evidence - before.evidence,
             radius,
             level_deg: level.to_degrees(),
-            own: curvature(&other, &evaluation)?,
+            own: loose_curvature(&other, &evaluation, prior)?,
         })
     };
     (0..4).map(fitted).collect()
+}
+
+/// The larger one of the standard deviations of all edges and of those that the halves imply: a
+/// half has half of the information.
+pub(super) fn widened(all: FitUncertainty, halves: &[Half]) -> FitUncertainty {
+    #[expect(clippy::cast_precision_loss, reason = "four halves")]
+    let share = FRAC_1_SQRT_2 / halves.len() as f64;
+    let mean = |value: fn(&FitUncertainty) -> f64| {
+        share * halves.iter().map(|half| value(&half.own)).sum::<f64>()
+    };
+    FitUncertainty {
+        radius: all.radius.max(mean(|own| own.radius)),
+        center: all.center.max(mean(|own| own.center)),
+        level_deg: all.level_deg.max(mean(|own| own.level_deg)),
+    }
 }
 
 /// The factor by which halves differ more than the edges say, at least 1.

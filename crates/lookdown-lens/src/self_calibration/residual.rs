@@ -1,8 +1,8 @@
 //! The distance of a point from a plane in pixels, and its change with the parameters of a camera.
 //!
-//! The distance is `F n·u`, with the normal `n`, the ray `u` and `F = 1 / |grad(n·u)|`. The change of
-//! `F` counts as well: it is small for each point, but it has the same sign for all of them. Terms of
-//! the square of the distance are left out.
+//! The distance is `F n·u`, with the normal `n`, the ray `u` and `F = 1 / |grad(n·u)|`. The change
+//! of `F` counts as well: it is small for each point, but it has the same sign for all of them.
+//! Terms of the square of the distance are left out.
 
 use super::{
     camera::{RoomCamera, SeenRay, Shape, ideal_shape_slope},
@@ -12,8 +12,8 @@ use crate::geometry::Ray;
 
 /// A residual with its slopes.
 pub(super) struct Residual {
-    /// Pixels.
-    pub residual: f64,
+    /// Signed distance from the plane.
+    pub pixels: f64,
     /// Change with each parameter.
     pub row: [f64; PARAMETERS],
     /// Change with the angle of the plane around its direction.
@@ -113,7 +113,7 @@ impl Residual {
                 * (residual * square);
         row[5..8].copy_from_slice(turn.as_slice());
         Self {
-            residual,
+            pixels: residual,
             row,
             own_slope,
         }

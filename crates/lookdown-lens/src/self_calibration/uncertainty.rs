@@ -3,8 +3,12 @@
 use super::{
     camera::{RoomCamera, ideal_shape_slope},
     evaluation::{Evaluation, Normal, Parameters},
+    prior::Prior,
 };
 use crate::geometry::Ray;
+
+/// Factor of the difference from an ideal lens that uncertainties allow for.
+const LOOSER: f64 = 2.0;
 
 /// Standard deviations of a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,7 +23,11 @@ pub struct FitUncertainty {
 
 /// Standard deviations from the curvature of the evidence.
 pub(super) fn curvature(camera: &RoomCamera, evaluation: &Evaluation) -> Option<FitUncertainty> {
-    let covariance = evaluation.normal.try_inverse()?;
+    deviations(camera, &evaluation.normal)
+}
+
+fn deviations(camera: &RoomCamera, normal: &Normal) -> Option<FitUncertainty> {
+    let covariance = normal.try_inverse()?;
     let (_, variance) = softest_radius(camera, &covariance);
     let both =
         |first: usize| (covariance[(first, first)] + covariance[(first + 1, first + 1)]).sqrt();
@@ -28,6 +36,20 @@ pub(super) fn curvature(camera: &RoomCamera, evaluation: &Evaluation) -> Option<
         center: both(3),
         level_deg: both(5).to_degrees(),
     })
+}
+
+/// Standard deviations if the lens may differ more from an ideal one than the fit assumes. They are
+/// larger where the edges hardly tell the second coefficient, as for a camera that looks straight
+/// down.
+pub(super) fn loose_curvature(
+    camera: &RoomCamera,
+    evaluation: &Evaluation,
+    prior: &Prior,
+) -> Option<FitUncertainty> {
+    let mut normal = evaluation.normal;
+    let information = 1.0 / (prior.k2_sigma * prior.k2_sigma);
+    normal[(2, 2)] -= information * (1.0 - 1.0 / (LOOSER * LOOSER));
+    deviations(camera, &normal)
 }
 
 /// The step of all parameters that changes the most uncertain radius by its standard deviation and
