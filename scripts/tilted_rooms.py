@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 """Make frames of tilted cameras from the rendered rooms of a data set, with their true calibrations.
 
-    python scripts/tilted_rooms.py DATASET OUT [--variants 4] [--frames 1] [--seed 1] [--first 0] [--step 1]
+    python scripts/tilted_rooms.py DATASET OUT [--variants 4] [--frames 1] [--seed 1] [--first 0] [--step 1] [--wall]
 
 Each frame of the data set is remapped to another lens: a model of five, a tilt of 0 to 25 degrees, a
 center off by up to 2 % of the width, a circle cut at 75 to 100 degrees. Some variants add noise, blur,
 compression or darkness. With several frames of each camera, things of the size of people are in the way in each, and
-the degradations differ. OUT becomes a data set folder for `fit_rooms.py`; its images have the `people` with their feet.
+the degradations differ. With `--wall`, the cameras look horizontally, upright within 10 degrees, below a plain ceiling.
+OUT becomes a data set folder for `fit_rooms.py`; its images have the `people` with their feet.
 Needs numpy and opencv-python-headless.
 """
 
@@ -98,6 +99,15 @@ def remap(frame, source, lens, down):
     return cv2.remap(frame, at[..., 0], at[..., 1], cv2.INTER_CUBIC, borderMode=cv2.BORDER_CONSTANT)
 
 
+def with_ceiling(frame, lens, down, gray):
+    """The frame with a plain ceiling above the horizon, which no frame of a level camera shows."""
+    height, width = frame.shape[:2]
+    pixels = np.stack(np.meshgrid(np.arange(width), np.arange(height)), -1)
+    frame = frame.copy()
+    frame[rays(lens, pixels) @ down < 0] = gray
+    return frame
+
+
 def people(persons, source, lens, down):
     """The feet of the persons in the new frame, and their places on the floor in meters."""
     found = []
@@ -147,6 +157,7 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--first", type=int, default=0, help="number of the first room")
     parser.add_argument("--step", type=int, default=1, help="take each STEPth room")
+    parser.add_argument("--wall", action="store_true", help="cameras that look horizontally")
     arguments = parser.parse_args()
     generator = np.random.default_rng(arguments.seed)
     for folder in ["images", "calibrations"]:
@@ -163,9 +174,13 @@ def main():
             name = f"{Path(room['file_name']).stem}_{variant}"
             lens = made_lens(generator, width, height)
             tilt, toward = math.radians(generator.uniform(0, 25)), generator.uniform(0, 2 * math.pi)
+            if arguments.wall:
+                tilt, toward = math.radians(generator.uniform(80, 95)), math.radians(generator.uniform(80, 100))
             flat = math.sin(tilt)
             down = [flat * math.cos(toward), flat * math.sin(toward), math.cos(tilt)]
             remapped = remap(frame, source["lens"], lens, np.array(down))
+            if arguments.wall:
+                remapped = with_ceiling(remapped, lens, np.array(down), float(generator.uniform(120, 220)))
             persons = [person for person in dataset["annotations"] if person["image_id"] == room["id"]]
             mount = source["mount"] | {"world_up": [-round(value, 8) for value in down]}
             calibration = {"id": name, "image": source["image"], "lens": lens, "mount": mount}

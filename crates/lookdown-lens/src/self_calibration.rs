@@ -11,12 +11,15 @@ mod edge_curve;
 mod evaluation;
 mod evidence;
 mod fit;
+mod halves;
 mod maxima;
 mod prior;
 mod refusal;
+mod residual;
 mod search;
 #[cfg(test)]
 mod tests;
+mod triples;
 mod uncertainty;
 mod upright;
 

@@ -61,18 +61,16 @@ pub(super) struct RoomCamera {
 pub(super) struct SeenRay {
     /// The unit vector.
     pub ray: Ray,
-    /// Derivative to the angle from the axis.
+    /// Its change per pixel away from the center.
     pub outward: Ray,
-    /// Derivative to the position around the axis, of unit length.
+    /// Its change per pixel around the center.
     pub around: Ray,
     /// Direction in the image from the center, a unit vector.
     pub side: [f64; 2],
     /// Angle from the axis.
     pub theta: f64,
-    /// Change of the angle per pixel.
-    pub theta_per_pixel: f64,
-    /// Angle around the axis per pixel, times the sine of the angle from it.
-    pub around_per_pixel: f64,
+    /// Distance from the center in focal lengths.
+    pub radius: f64,
 }
 
 impl RoomCamera {
@@ -192,19 +190,22 @@ impl Angles {
     /// The ray of a pixel.
     pub(super) fn ray(&self, camera: &RoomCamera, [x, y]: [f64; 2]) -> SeenRay {
         let [x, y] = [x - camera.center[0], y - camera.center[1]];
-        let radius = x.hypot(y).max(1e-6);
-        let side = [x / radius, y / radius];
-        let theta = self.theta(radius / camera.focal);
+        let pixels = (x * x + y * y).sqrt().max(1e-6);
+        let side = [x / pixels, y / pixels];
+        let radius = pixels / camera.focal;
+        let theta = self.theta(radius);
         let (sin, cos) = theta.sin_cos();
         let (_, slope) = curve(self.shape, theta);
+        let theta_per_pixel = 1.0 / (camera.focal * slope.max(MIN_SLOPE));
+        let (out, down) = (cos * theta_per_pixel, -sin * theta_per_pixel);
+        let around_per_pixel = sin / pixels;
         SeenRay {
             ray: Ray::new(sin * side[0], sin * side[1], cos),
-            outward: Ray::new(cos * side[0], cos * side[1], -sin),
-            around: Ray::new(-side[1], side[0], 0.0),
+            outward: Ray::new(out * side[0], out * side[1], down),
+            around: Ray::new(-around_per_pixel * side[1], around_per_pixel * side[0], 0.0),
             side,
             theta,
-            theta_per_pixel: 1.0 / (camera.focal * slope.max(MIN_SLOPE)),
-            around_per_pixel: sin / radius,
+            radius,
         }
     }
 }

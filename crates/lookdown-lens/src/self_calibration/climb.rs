@@ -1,14 +1,22 @@
 //! The way to the nearest maximum of the evidence.
 
-use nalgebra::{DVector, Rotation3, Vector3};
+use nalgebra::{Rotation3, Vector3};
 
 use super::{
-    camera::RoomCamera, edge_curve::EdgeCurve, evaluation::Evaluation, evidence::evaluate,
+    camera::RoomCamera,
+    edge_curve::EdgeCurve,
+    evaluation::{Evaluation, Parameters},
+    evidence::evaluate,
     prior::Prior,
 };
 
+/// Growth of the steps after each success, and their greatest length, in those of Gauss and Newton.
+/// These are too short where edges are about to follow another direction or none.
+const LONGER: f64 = 1.6;
+const LONGEST: f64 = 8.0;
+
 /// The camera after a step of its parameters.
-fn stepped(camera: &RoomCamera, step: &DVector<f64>) -> RoomCamera {
+pub(super) fn stepped(camera: &RoomCamera, step: &Parameters) -> RoomCamera {
     RoomCamera {
         focal: camera.focal * step[0].exp(),
         k1: camera.k1 + step[1],
@@ -28,26 +36,28 @@ pub(super) fn climb(
     steps: usize,
 ) -> Option<(RoomCamera, Evaluation)> {
     let mut current = evaluate(&camera, curves, weights, prior, blur, true)?;
-    let mut damping = 1e-3;
+    let (mut damping, mut stride) = (1e-3, 1.0);
     for _ in 0..steps {
-        let mut damped = current.normal.clone();
+        let mut damped = current.normal;
         for index in 0..damped.nrows() {
             damped[(index, index)] *= 1.0 + damping;
         }
         let Some(cholesky) = damped.cholesky() else {
             break;
         };
-        let step = cholesky.solve(&current.right);
+        let step = stride * cholesky.solve(&current.right);
         let next = stepped(&camera, &step);
         match evaluate(&next, curves, weights, prior, blur, true) {
             Some(evaluation) if evaluation.evidence > current.evidence => {
                 let gain = evaluation.evidence - current.evidence;
                 (camera, current) = (next, evaluation);
                 damping = (damping * 0.2).max(1e-6);
+                stride = (stride * LONGER).min(LONGEST);
                 if gain < 1e-3 {
                     break;
                 }
             }
+            _ if stride > 1.0 => stride = 1.0,
             _ => {
                 damping *= 10.0;
                 if damping > 1e4 {

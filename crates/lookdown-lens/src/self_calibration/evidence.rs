@@ -7,13 +7,12 @@
 
 use std::f64::consts::{PI, TAU};
 
-use nalgebra::{DMatrix, DVector};
-
 use super::{
-    camera::{Angles, RoomCamera, SeenRay, ideal_shape_slope},
+    camera::{Angles, RoomCamera, SeenRay},
     edge_curve::EdgeCurve,
-    evaluation::{Evaluation, PARAMETERS},
+    evaluation::{Evaluation, Normal, PARAMETERS, Parameters},
     prior::Prior,
+    residual::{LensSlopes, Residual, own_slope, squared_pixels_per_unit},
 };
 use crate::geometry::Ray;
 
@@ -23,6 +22,10 @@ const SIGMA_PIXELS: f64 = 0.2;
 const SIGMA_DIRECTION: f64 = 0.004;
 /// Share of curves along none of the directions, before they are seen.
 const OUTLIER_SHARE: f64 = 0.4;
+/// Squared distances from a first plane, in variances, from which a curve has no likelihood along a
+/// direction. It would be below 1e-40.
+const FAR: f64 = 200.0;
+
 /// One curve along one direction.
 struct Fitted {
     normal: Ray,
@@ -44,8 +47,8 @@ pub(super) fn evaluate(
     let directions = camera.directions();
     let mut result = Evaluation {
         evidence: 0.0,
-        normal: DMatrix::zeros(PARAMETERS, PARAMETERS),
-        right: DVector::zeros(PARAMETERS),
+        normal: Normal::zeros(),
+        right: Parameters::zeros(),
         shares: vec![0.0; directions.len()],
         explained: Vec::with_capacity(curves.len()),
     };
@@ -71,7 +74,10 @@ pub(super) fn evaluate(
         let gain = (PI / (TAU.sqrt() * sigma_angle)).max(1.0);
         fits.clear();
         for (index, direction) in directions.iter().enumerate() {
-            let (normal, squares) = best_plane(&rays, direction);
+            let farthest = FAR * sigma * sigma;
+            let Some((normal, squares)) = best_plane(&rays, direction, farthest) else {
+                continue;
+            };
             let likelihood = share * gain * (-0.5 * squares / (sigma * sigma)).exp();
             fits.push(Fitted {
                 normal,
@@ -100,35 +106,72 @@ pub(super) fn evaluate(
     Some(result)
 }
 
-/// Distance in pixels from a plane, per unit of the scalar product with its normal.
-fn pixels_per_unit(seen: &SeenRay, normal: &Ray) -> f64 {
-    let outward = normal.dot(&seen.outward) * seen.theta_per_pixel;
-    let around = normal.dot(&seen.around) * seen.around_per_pixel;
-    1.0 / outward.hypot(around).max(1e-7)
-}
-
-/// The plane through a direction that fits rays best, and the sum of its squared residuals.
-fn best_plane(rays: &[SeenRay], direction: &Ray) -> (Ray, f64) {
+/// The plane through a direction that fits rays best, and the sum of its squared residuals, or
+/// `None` if a first, unweighted plane is farther.
+fn best_plane(rays: &[SeenRay], direction: &Ray, farthest: f64) -> Option<(Ray, f64)> {
     let (first, second) = across(direction);
-    let mut normal: Option<Ray> = None;
-    for _ in 0..2 {
-        let [mut xx, mut xy, mut yy] = [0.0; 3];
-        for seen in rays {
-            let (x, y) = (first.dot(&seen.ray), second.dot(&seen.ray));
-            let weight = normal.map_or(1.0, |normal| pixels_per_unit(seen, &normal).powi(2));
-            xx += weight * x * x;
-            xy += weight * x * y;
-            yy += weight * y * y;
-        }
-        // The eigenvector of the smaller eigenvalue.
-        let angle = 0.5 * (2.0 * xy).atan2(xx - yy) + PI / 2.0;
-        normal = Some(first * angle.cos() + second * angle.sin());
+    let mut moments = [0.0; 3];
+    for seen in rays {
+        add_moments(
+            &mut moments,
+            1.0,
+            first.dot(&seen.ray),
+            second.dot(&seen.ray),
+        );
     }
-    let normal = normal.unwrap_or(first);
+    let normal = thinnest(moments, &first, &second);
+    let mut moments = [0.0; 3];
+    let mut squares = 0.0;
+    for seen in rays {
+        let weight = squared_pixels_per_unit(seen, &normal);
+        squares += weight * normal.dot(&seen.ray).powi(2);
+        add_moments(
+            &mut moments,
+            weight,
+            first.dot(&seen.ray),
+            second.dot(&seen.ray),
+        );
+    }
+    if squares > farthest {
+        return None;
+    }
+    let normal = thinnest(moments, &first, &second);
+    // A step of the plane's angle to the least sum, so that its slope with the angle is zero.
+    let turned = direction.cross(&normal);
+    let [mut slopes, mut slope_residuals] = [0.0; 2];
+    for seen in rays {
+        let (residual, slope) = own_slope(seen, &normal, &turned);
+        slopes += slope * slope;
+        slope_residuals += slope * residual;
+    }
+    let normal = (normal - turned * (slope_residuals / slopes.max(1e-12))).normalize();
     let squares = rays
         .iter()
-        .map(|seen| (normal.dot(&seen.ray) * pixels_per_unit(seen, &normal)).powi(2));
-    (normal, squares.sum())
+        .map(|seen| squared_pixels_per_unit(seen, &normal) * normal.dot(&seen.ray).powi(2));
+    Some((normal, squares.sum()))
+}
+
+fn add_moments([xx, xy, yy]: &mut [f64; 3], weight: f64, x: f64, y: f64) {
+    *xx += weight * x * x;
+    *xy += weight * x * y;
+    *yy += weight * y * y;
+}
+
+/// The direction of least moment: the eigenvector of the smaller eigenvalue.
+fn thinnest([xx, xy, yy]: [f64; 3], first: &Ray, second: &Ray) -> Ray {
+    let (difference, twice) = (xx - yy, 2.0 * xy);
+    let length = (difference * difference + twice * twice).sqrt();
+    // (-sin, cos) of half the angle of (difference, twice), without cancellation.
+    let (x, y) = if difference > 0.0 {
+        (-twice, length + difference)
+    } else {
+        (-(length - difference), twice)
+    };
+    let norm = (x * x + y * y).sqrt();
+    if norm < f64::MIN_POSITIVE {
+        return *second;
+    }
+    first * (x / norm) + second * (y / norm)
 }
 
 /// Two unit vectors across a direction and each other.
@@ -151,53 +194,36 @@ fn add_curve(
     directions: &[Ray; 3],
     scale: f64,
 ) {
-    let direction = &directions[fit.direction];
-    let turned = direction.cross(&fit.normal);
-    let ideal = ideal_shape_slope(camera.k1);
-    let mut row = [0.0; PARAMETERS];
+    let turned = directions[fit.direction].cross(&fit.normal);
+    let lens = LensSlopes::of(camera);
+    let mut normal = [[0.0; PARAMETERS]; PARAMETERS];
+    let mut right = [0.0; PARAMETERS];
     // Sums for the elimination of the plane's own angle.
     let mut own = 0.0;
     let mut own_residual = 0.0;
     let mut own_rows = [0.0; PARAMETERS];
     for seen in rays {
-        let factor = pixels_per_unit(seen, &fit.normal);
-        let residual = factor * fit.normal.dot(&seen.ray);
-        let outward = factor * fit.normal.dot(&seen.outward);
-        let around = factor * fit.normal.dot(&seen.around);
-        let theta = seen.theta;
-        let (radius, _) = camera.curve(theta);
-        // Change of the angle with the radius in focal lengths.
-        let per_focal = seen.theta_per_pixel * camera.focal;
-        let cube = theta.powi(3);
-        row[0] = -outward * per_focal * radius;
-        let along = ideal[0] + theta * theta * (ideal[1] + theta * theta * ideal[2]);
-        row[1] = -outward * per_focal * cube * along;
-        row[2] = -outward * per_focal * cube * theta * theta;
-        let (out, round) = (
-            outward * seen.theta_per_pixel,
-            around * seen.around_per_pixel,
-        );
-        row[3] = -(out * seen.side[0] - round * seen.side[1]);
-        row[4] = -(out * seen.side[1] + round * seen.side[0]);
-        // The normal turns with the room.
-        let turn = fit.normal.cross(&seen.ray) * factor;
-        row[5..8].copy_from_slice(turn.as_slice());
-        let own_slope = factor * turned.dot(&seen.ray);
+        let Residual {
+            pixels: residual,
+            row,
+            own_slope,
+        } = Residual::of(seen, &fit.normal, &turned, &lens);
         own += own_slope * own_slope;
         own_residual += own_slope * residual;
         for index in 0..PARAMETERS {
             own_rows[index] += own_slope * row[index];
-            result.right[index] -= scale * row[index] * residual;
-            for other in 0..=index {
-                result.normal[(index, other)] += scale * row[index] * row[other];
+            right[index] -= row[index] * residual;
+            for other in 0..PARAMETERS {
+                normal[index][other] += row[index] * row[other];
             }
         }
     }
     let own = own.max(1e-12);
     for index in 0..PARAMETERS {
-        result.right[index] += scale * own_rows[index] * own_residual / own;
+        result.right[index] += scale * (right[index] + own_rows[index] * own_residual / own);
         for other in 0..=index {
-            result.normal[(index, other)] -= scale * own_rows[index] * own_rows[other] / own;
+            result.normal[(index, other)] +=
+                scale * (normal[index][other] - own_rows[index] * own_rows[other] / own);
         }
     }
 }

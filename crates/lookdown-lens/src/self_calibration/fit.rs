@@ -3,12 +3,12 @@
 use std::f64::consts::FRAC_PI_2;
 
 use super::{
-    climb::climb,
     edge_curve::EdgeCurve,
-    maxima::{Maximum, maxima},
+    halves::{halves, spread, widened},
+    maxima::{Maximum, fine_maxima, maxima},
     prior::Prior,
     refusal::FitRefusal,
-    uncertainty::{FitUncertainty, curvature, distance},
+    uncertainty::{FitUncertainty, distance, loose_curvature},
 };
 use crate::geometry::Ray;
 
@@ -19,9 +19,9 @@ const MIN_EVIDENCE: f64 = 100.0;
 /// Least evidence in a cluttered room.
 const CLUTTERED_EVIDENCE: f64 = 150.0;
 /// Least share of the edges along each of the three directions.
-const MIN_SHARE: f64 = 0.02;
+const MIN_SHARE: f64 = 0.015;
 /// So many edges along a direction are enough, however many there are along the others.
-const MIN_ALONG: f64 = 15.0;
+const MIN_ALONG: f64 = 10.0;
 /// Least share of the edges along any of them.
 const MIN_SHARES: f64 = 0.45;
 /// Least share along any of them in a cluttered room, where most edges follow none: things of all
@@ -36,15 +36,10 @@ const MAX_UNCERTAINTY: (f64, f64) = (0.028, 0.8);
 /// Standard deviation of the second coefficient of a lens from that of an ideal lens. A wider one
 /// exchanges curvature at the rim for focal length, and makes the middle too large.
 const K2_SIGMA: f64 = 0.0015;
-/// Errors of the radius are larger than the edges say, because no lens is exactly one of the
-/// family: by this factor, and by this share of the radius however many edges there are. 68 % of
-/// 177 errors in rendered frames are within 0.8 of the deviations that result, 95 % within 2.0.
-const LENS_MISFIT: f64 = 1.4;
+/// Errors are larger than the edges say, because no lens is exactly one of the family and edges
+/// come in groups: by this factor, and for the radius by this share however many edges there are.
+const MISFIT: f64 = 1.2;
 const LENS_FLOOR: f64 = 0.003;
-/// Largest difference of a fit of half of the edges.
-const MAX_HALF: (f64, f64) = (0.03, 2.0);
-/// Differences within so many standard deviations of the fit of the half are not a disagreement.
-const HALF_DEVIATIONS: f64 = 2.5;
 
 /// A lens circle, detected or assumed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -111,15 +106,25 @@ impl RoomFit {
         let rim = known.field_of_view.map(|field| field / 2.0);
         let mut best: Option<(Vec<Maximum>, Prior)> = None;
         let mut others: Vec<Maximum> = Vec::new();
-        for (index, circle) in circles.iter().enumerate() {
+        for circle in circles {
             let prior = prior(circle, known);
-            let found = maxima(curves, weight, &prior, rim, known.k1);
+            // Directions that are clear with one circle are those with another one.
+            let clear = best.as_ref().filter(|(maxima, _)| is_ordered(maxima));
+            let mut found = match clear {
+                Some((maxima, _)) => {
+                    let starts = maxima.iter().map(|maximum| maximum.camera.clone());
+                    fine_maxima(starts, curves, weight, &prior)
+                }
+                None => maxima(curves, weight, &prior, rim, known.k1),
+            };
+            if best.is_some() {
+                for maximum in &mut found {
+                    maximum.evaluation.evidence -= OTHER_CIRCLE;
+                }
+            }
             let Some(first) = found.first() else { continue };
-            let least = if index == 0 { 0.0 } else { CLEARLY_BETTER };
             let before = best.as_ref().and_then(|(maxima, _)| maxima.first());
-            if before
-                .is_none_or(|before| first.evaluation.evidence > before.evaluation.evidence + least)
-            {
+            if before.is_none_or(|before| first.evaluation.evidence > before.evaluation.evidence) {
                 let worse = best.replace((found, prior));
                 others.extend(worse.into_iter().flat_map(|(maxima, _)| maxima));
             } else {
@@ -133,10 +138,20 @@ impl RoomFit {
     }
 }
 
-/// Evidence by which a further circle must be better.
-const CLEARLY_BETTER: f64 = 3.0;
+/// Evidence that a circle after the first one loses: it is wrong more often, and it leaves the
+/// center more room.
+const OTHER_CIRCLE: f64 = 6.0;
 
-fn prior(circle: &CircleGuess, known: KnownLens) -> Prior {
+fn is_ordered(maxima: &[Maximum]) -> bool {
+    maxima.first().is_some_and(|first| {
+        has_order(
+            first.evaluation.shares.iter().sum(),
+            first.evaluation.evidence,
+        )
+    })
+}
+
+pub(super) fn prior(circle: &CircleGuess, known: KnownLens) -> Prior {
     let half = known.field_of_view.map(|field| (field / 2.0, 1e-3));
     Prior {
         center: circle.center,
@@ -183,56 +198,26 @@ fn checked(
     if maxima[1..].iter().any(is_rival) {
         return Err(FitRefusal::Ambiguous);
     }
-    let mut uncertainty = curvature(camera, evaluation).ok_or(FitRefusal::Ambiguous)?;
-    let mut disagreement: Option<(f64, f64)> = None;
-    let (mut squares, mut center_squares) = ([0.0; 2], 0.0);
-    for half in 0..4_usize {
-        // Two interleaved halves, then two halves of the image.
-        let weights: Vec<f64> = curves
-            .iter()
-            .enumerate()
-            .map(|(index, curve)| {
-                let first = curve.points[0];
-                let side = match half {
-                    0 | 1 => index % 2 == half,
-                    _ => (first[0] < camera.center[0]) == (half == 2),
-                };
-                if side { weight } else { 0.0 }
-            })
-            .collect();
-        let found = climb(camera.clone(), curves, &weights, prior, 1.0, 6);
-        let (other, of_half) = found.ok_or(FitRefusal::Ambiguous)?;
-        let (apart, turned) = distance(camera, &other);
-        let own = curvature(&other, &of_half).ok_or(FitRefusal::Ambiguous)?;
-        let limits = (
-            MAX_HALF.0.max(HALF_DEVIATIONS * own.radius),
-            MAX_HALF.1.max(HALF_DEVIATIONS * own.level_deg),
-        );
-        if apart > limits.0 || turned.to_degrees() > limits.1 {
-            let (radius, level) = disagreement.unwrap_or_default();
-            disagreement = Some((radius.max(apart), level.max(turned.to_degrees())));
-        }
-        if half < 2 {
-            squares[0] += apart * apart / 2.0;
-            squares[1] += turned.to_degrees().powi(2) / 2.0;
-            let [x, y] = [0, 1].map(|axis| other.center[axis] - camera.center[axis]);
-            center_squares += f64::midpoint(x * x, y * y);
-        }
+    let halves = halves(camera, curves, weight, prior).ok_or(FitRefusal::Ambiguous)?;
+    let edges = loose_curvature(camera, evaluation, prior).ok_or(FitRefusal::Ambiguous)?;
+    let edges = widened(edges, &halves);
+    let spread = spread(&halves);
+    let factor = MISFIT * spread;
+    let uncertainty = FitUncertainty {
+        radius: (factor * edges.radius).hypot(LENS_FLOOR),
+        center: factor * edges.center,
+        level_deg: factor * edges.level_deg,
+    };
+    if let Some(half) = halves.iter().find(|half| half.disagrees(spread)) {
+        return Err(FitRefusal::HalvesDisagree {
+            radius_percent: 100.0 * half.radius,
+            level_deg: half.level_deg,
+        });
     }
-    let edges = uncertainty.radius.max(squares[0].sqrt());
-    uncertainty.radius = (LENS_MISFIT * edges).hypot(LENS_FLOOR);
-    uncertainty.level_deg = uncertainty.level_deg.max(squares[1].sqrt());
-    uncertainty.center = uncertainty.center.max(center_squares.sqrt());
     if uncertainty.radius > MAX_UNCERTAINTY.0 || uncertainty.level_deg > MAX_UNCERTAINTY.1 {
         return Err(FitRefusal::Uncertain {
             radius_percent: 100.0 * uncertainty.radius,
             level_deg: uncertainty.level_deg,
-        });
-    }
-    if let Some((radius, level)) = disagreement {
-        return Err(FitRefusal::HalvesDisagree {
-            radius_percent: 100.0 * radius,
-            level_deg: level,
         });
     }
     let [k1, k2, k3] = camera.shape();

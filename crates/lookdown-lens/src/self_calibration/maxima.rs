@@ -2,12 +2,12 @@
 
 use super::{
     camera::RoomCamera,
-    climb::climb,
+    climb::{climb, stepped},
     edge_curve::EdgeCurve,
     evaluation::Evaluation,
     prior::Prior,
     search,
-    uncertainty::{curvature, distance},
+    uncertainty::{curvature, distance, radius_step},
     upright::upright,
 };
 
@@ -17,6 +17,10 @@ const COARSE_CURVES: usize = 300;
 const COARSE_STARTS: usize = 12;
 /// Maxima that are followed with all curves.
 const FINE_STARTS: usize = 4;
+/// Most steps to a maximum with all curves.
+const FINE_STEPS: usize = 12;
+/// Standard deviations of the radius by which two further starts are beside the best maximum.
+const ASIDE: f64 = 3.0;
 /// Standard deviation of the radius, as a share, from which further starts look for rivals.
 const FLAT: f64 = 0.006;
 /// Vertical scales of the room of these starts.
@@ -70,9 +74,21 @@ pub(super) fn maxima(
         }
     }
     best_first(&mut coarse);
+    let starts = coarse.into_iter().map(|maximum| maximum.camera);
+    fine_maxima(starts, curves, weight, prior)
+}
+
+/// The maxima next to starts, best first.
+pub(super) fn fine_maxima(
+    starts: impl Iterator<Item = RoomCamera>,
+    curves: &[EdgeCurve],
+    weight: f64,
+    prior: &Prior,
+) -> Vec<Maximum> {
+    let weights = vec![weight; curves.len()];
     let mut fine: Vec<Maximum> = Vec::new();
     let mut tried: Vec<RoomCamera> = Vec::new();
-    for Maximum { camera, .. } in coarse {
+    for camera in starts {
         let is_known = tried.iter().any(|other| {
             let (radius, level) = distance(&camera, other);
             radius < 0.01 && level < 0.02
@@ -81,17 +97,41 @@ pub(super) fn maxima(
             continue;
         }
         tried.push(camera.clone());
-        let found = climb(camera, curves, &weights, prior, 1.5, 4)
-            .and_then(|(camera, _)| climb(camera, curves, &weights, prior, 1.0, 12));
-        fine.extend(found.map(|(camera, evaluation)| Maximum::of(camera, evaluation)));
+        fine.extend(followed(camera, curves, &weights, prior));
     }
     best_first(&mut fine);
+    if let Some(best) = fine.first() {
+        let sides = [-ASIDE, ASIDE].map(|deviations| aside(best, deviations));
+        for start in sides.into_iter().flatten() {
+            let found = climb(start, curves, &weights, prior, 1.0, FINE_STEPS);
+            fine.extend(found.map(|(camera, evaluation)| Maximum::of(camera, evaluation)));
+        }
+        best_first(&mut fine);
+    }
     add_stretched(&mut fine, curves, &weights, prior);
     for maximum in &mut fine {
         (maximum.camera, maximum.is_upright) =
             upright(&maximum.camera, curves, &maximum.evaluation, prior.radius);
     }
     fine
+}
+
+/// The maximum that is reached from a camera.
+fn followed(
+    camera: RoomCamera,
+    curves: &[EdgeCurve],
+    weights: &[f64],
+    prior: &Prior,
+) -> Option<Maximum> {
+    let (camera, _) = climb(camera, curves, weights, prior, 1.5, 4)?;
+    let (camera, evaluation) = climb(camera, curves, weights, prior, 1.0, FINE_STEPS)?;
+    Some(Maximum::of(camera, evaluation))
+}
+
+/// The camera that the edges like best among those with another radius.
+fn aside(maximum: &Maximum, deviations: f64) -> Option<RoomCamera> {
+    let step = radius_step(&maximum.camera, &maximum.evaluation)?;
+    Some(stepped(&maximum.camera, &(step * deviations)))
 }
 
 /// Adds the maxima that are reached from stretched cameras, where the edges hardly determine the
@@ -107,9 +147,7 @@ fn add_stretched(fine: &mut Vec<Maximum>, curves: &[EdgeCurve], weights: &[f64],
             .iter()
             .filter_map(|share| camera.stretched(*share))
         {
-            let found = climb(start, curves, weights, prior, 1.5, 4)
-                .and_then(|(camera, _)| climb(camera, curves, weights, prior, 1.0, 10));
-            fine.extend(found.map(|(camera, evaluation)| Maximum::of(camera, evaluation)));
+            fine.extend(followed(start, curves, weights, prior));
         }
         best_first(fine);
         if fine[0].evaluation.evidence < evidence + 1.0 {

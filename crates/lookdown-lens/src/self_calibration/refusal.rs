@@ -26,9 +26,10 @@ pub enum FitRefusal {
         "one of the three directions of the room has no edges: give a frame that shows walls with doors or corners"
     )]
     MissingDirection,
-    /// A camera on a wall, or beside one and tilted away from it.
+    /// A camera on a wall that looks horizontally, or down into the room.
     #[error(
-        "two directions of the room may be the vertical: calibrate cameras on walls with a chessboard"
+        "two directions of the room may be the vertical, as for a camera that looks horizontally from a wall: calibrate \
+         cameras on walls with a chessboard"
     )]
     VerticalUnclear,
     /// Two cameras explain the edges equally well.

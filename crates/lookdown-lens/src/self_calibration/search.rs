@@ -1,6 +1,6 @@
 //! Starting points: lenses on a grid, and for each the directions that most edges agree on.
 
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::FRAC_PI_2;
 
 use nalgebra::{Matrix3, Rotation3};
 
@@ -8,6 +8,7 @@ use super::{
     camera::{Angles, RoomCamera, ideal_shape},
     edge_curve::EdgeCurve,
     prior::Prior,
+    triples::Triples,
 };
 use crate::geometry::Ray;
 
@@ -16,12 +17,10 @@ use crate::geometry::Ray;
 const SHAPES: [f64; 5] = [-1.0 / 6.0, -0.094, -1.0 / 24.0, 0.0, 1.0 / 12.0];
 /// Angles at the circle of the tried lenses, degrees.
 const RIMS: [f64; 7] = [72.0, 78.0, 84.0, 90.0, 96.0, 102.0, 108.0];
-/// Largest tilt, degrees.
-const MAX_TILT: f64 = 36.0;
-/// Distance between tried verticals, degrees.
-const TILT_STEP: f64 = 3.0;
 /// Width of the kernel: the sine of an angle.
 const KERNEL: f64 = 0.035;
+/// The same for the directions of `triples`, which are 3 degrees apart.
+const WIDE_KERNEL: f64 = 0.05;
 /// Verticals of one lens whose headings are tried.
 const VERTICALS: usize = 4;
 /// Headings over a quarter turn.
@@ -40,7 +39,7 @@ pub(super) fn starts(
     known_rim: Option<f64>,
     known_k1: Option<f64>,
 ) -> Vec<RoomCamera> {
-    let verticals = cone();
+    let triples = Triples::new();
     let mut starts: Vec<(RoomCamera, f64)> = Vec::new();
     let shapes = known_k1.map_or(SHAPES.to_vec(), |k1| vec![k1]);
     let rims = known_rim.map_or(RIMS.map(f64::to_radians).to_vec(), |rim| vec![rim]);
@@ -62,7 +61,7 @@ pub(super) fn starts(
             };
             let planes = planes(curves, &camera, &angles);
             starts.extend(
-                directions(&planes, &verticals)
+                directions(&planes, &triples)
                     .into_iter()
                     .map(|(room, score)| {
                         (
@@ -78,24 +77,6 @@ pub(super) fn starts(
     }
     starts.sort_by(|a, b| b.1.total_cmp(&a.1));
     starts.into_iter().map(|(camera, _)| camera).collect()
-}
-
-/// Directions around the axis, evenly.
-fn cone() -> Vec<Ray> {
-    let mut rays = vec![Ray::z()];
-    let mut tilt = TILT_STEP;
-    while tilt <= MAX_TILT {
-        let (sin, cos) = tilt.to_radians().sin_cos();
-        let count = (TAU * sin / TILT_STEP.to_radians()).round();
-        let mut index = 0.0;
-        while index < count {
-            let (y, x) = (TAU * index / count).sin_cos();
-            rays.push(Ray::new(sin * x, sin * y, cos));
-            index += 1.0;
-        }
-        tilt += TILT_STEP;
-    }
-    rays
 }
 
 /// The planes of the curves, weighted by length; a curve that is not a straight line has no weight.
@@ -116,22 +97,24 @@ fn planes(curves: &[EdgeCurve], camera: &RoomCamera, angles: &Angles) -> Vec<Pla
     curves.iter().filter_map(plane).collect()
 }
 
-fn kernel(sine: f64) -> f64 {
-    let ratio = sine / KERNEL;
+fn kernel(sine: f64, width: f64) -> f64 {
+    let ratio = sine / width;
     let root = 1.0 / (1.0 + ratio * ratio);
     root * root
 }
 
-fn directions(planes: &[Plane], verticals: &[Ray]) -> Vec<(Rotation3<f64>, f64)> {
+/// The two best rooms with their scores.
+fn directions(planes: &[Plane], triples: &Triples) -> Vec<(Rotation3<f64>, f64)> {
     let total: f64 = planes.iter().map(|plane| plane.weight).sum();
     let along = |direction: &Ray| -> f64 {
         let hits = planes
             .iter()
             .filter(|plane| plane.middle.dot(direction).abs() < 0.97);
-        hits.map(|plane| plane.weight * kernel(plane.normal.dot(direction)))
+        hits.map(|plane| plane.weight * kernel(plane.normal.dot(direction), WIDE_KERNEL))
             .sum()
     };
-    let mut scored: Vec<(Ray, f64)> = verticals.iter().map(|ray| (*ray, along(ray))).collect();
+    let along: Vec<f64> = triples.rays.iter().map(along).collect();
+    let mut scored = triples.scores(&along);
     scored.sort_by(|a, b| b.1.total_cmp(&a.1));
     let mut peaks: Vec<Ray> = Vec::new();
     for (ray, _) in scored {
@@ -164,7 +147,7 @@ fn heading(planes: &[Plane], down: Ray, total: f64) -> (Rotation3<f64>, f64) {
         let mut score = 0.0;
         for plane in planes {
             let nearest = [&x, &y, &down].map(|direction| plane.normal.dot(direction).abs());
-            score += plane.weight * kernel(nearest[0].min(nearest[1]).min(nearest[2]));
+            score += plane.weight * kernel(nearest[0].min(nearest[1]).min(nearest[2]), KERNEL);
         }
         if score > best.1 {
             let axes = Matrix3::from_columns(&[x, y, down]);

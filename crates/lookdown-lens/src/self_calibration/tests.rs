@@ -5,6 +5,11 @@ use nalgebra::{Rotation3, Vector3};
 use super::{
     CircleGuess, EdgeCurve, FitRefusal, KnownLens, RoomFit,
     camera::{Angles, RoomCamera},
+    climb::stepped,
+    evaluation::{PARAMETERS, Parameters},
+    evidence::evaluate,
+    fit::prior,
+    triples::Triples,
 };
 use crate::geometry::Ray;
 
@@ -192,6 +197,16 @@ fn camera_on_a_wall_has_no_clear_vertical() {
 }
 
 #[test]
+fn camera_that_looks_horizontally_is_refused() {
+    // Toward a wall of the room, with the floor at the bottom of the image and no edges above.
+    let room = Rotation3::from_euler_angles(-1.55, 0.0, 0.0);
+    let mut below = vec![edges(&room); 3].concat();
+    below.retain(|curve| curve.points.iter().all(|[_, y]| *y > CENTER[1] + 20.0));
+    let fit = RoomFit::of(&[below], &[circle()], KnownLens::default());
+    assert_eq!(fit, Err(FitRefusal::VerticalUnclear));
+}
+
+#[test]
 fn stretched_lens_keeps_edges_of_a_level_room_straight() {
     let camera = RoomCamera {
         focal: FOCAL,
@@ -239,12 +254,79 @@ fn camera_of_another_circle_is_a_rival() {
         center_sigma: 0.01,
         ..circle()
     };
-    let [left, right] = [guess([cx - 8.6, cy]), guess([cx + 8.6, cy])];
+    let [above, below] = [guess([cx, cy - 9.5]), guess([cx, cy + 9.5])];
     // Both circles are equally wrong: the edges are symmetric about the true center.
     let turned = room * Rotation3::from_euler_angles(0.0, 0.0, std::f64::consts::PI);
     let all = [edges(&room), edges(&turned)].concat();
-    let alone = RoomFit::of(std::slice::from_ref(&all), &[left], known);
-    let both = RoomFit::of(&[all], &[left, right], known);
+    let alone = RoomFit::of(std::slice::from_ref(&all), &[above], known);
+    let both = RoomFit::of(&[all], &[above, below], known);
     assert!(alone.is_ok(), "{alone:?}");
     assert_eq!(both, Err(FitRefusal::Ambiguous));
+}
+
+#[test]
+fn right_side_is_the_slope_of_the_evidence() {
+    let curves = edges(&Rotation3::from_euler_angles(0.14, -0.09, 0.4));
+    let weights = vec![1.0; curves.len()];
+    let prior = prior(&circle(), KnownLens::default());
+    let camera = RoomCamera {
+        focal: FOCAL * 1.01,
+        k1: -0.04,
+        k2_offset: 0.001,
+        center: CENTER,
+        room: Rotation3::from_euler_angles(0.142, -0.088, 0.401),
+    };
+    let at = |camera: &RoomCamera| evaluate(camera, &curves, &weights, &prior, 1.5, true).unwrap();
+    let right = at(&camera).right;
+    for index in 0..PARAMETERS {
+        let mut step = Parameters::zeros();
+        step[index] = if index == 3 || index == 4 { 1e-3 } else { 1e-6 };
+        let [before, after] = [-step, step].map(|step| at(&stepped(&camera, &step)).evidence);
+        let slope = (after - before) / (2.0 * step[index]);
+        let off = (slope / right[index] - 1.0).abs();
+        assert!(
+            off < 0.01,
+            "parameter {index}: {slope}, not {}",
+            right[index]
+        );
+    }
+}
+
+#[test]
+fn halves_of_the_image_with_two_lenses_are_refused() {
+    let room = Rotation3::from_euler_angles(0.14, -0.09, 0.4);
+    let mut both = vec![edges(&room); 2].concat();
+    for curve in &mut both {
+        let factor = if curve.points[0][0] < CENTER[0] {
+            0.97
+        } else {
+            1.03
+        };
+        for [x, y] in &mut curve.points {
+            *x = CENTER[0] + factor * (*x - CENTER[0]);
+            *y = CENTER[1] + factor * (*y - CENTER[1]);
+        }
+    }
+    let fit = RoomFit::of(&[both], &[circle()], KnownLens::default());
+    let is_refused = matches!(
+        fit,
+        Err(FitRefusal::HalvesDisagree { .. } | FitRefusal::Uncertain { .. })
+    );
+    assert!(is_refused, "{fit:?}");
+}
+
+#[test]
+fn vertical_without_edges_is_found_from_the_horizontal_ones() {
+    let room = Rotation3::from_euler_angles(0.3, -0.2, 0.4);
+    let triples = Triples::new();
+    let near = |ray: &Ray, axis: Ray| f64::from(ray.dot(&(room * axis)).abs() > 0.995);
+    let values: Vec<f64> = triples
+        .rays
+        .iter()
+        .map(|ray| near(ray, Ray::x()) + near(ray, Ray::y()))
+        .collect();
+    let scores = triples.scores(&values);
+    let (best, _) = scores.iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+    let off = best.angle(&(room * Ray::z())).to_degrees();
+    assert!(off < 9.0, "{off}°");
 }

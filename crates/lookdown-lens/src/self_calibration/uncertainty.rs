@@ -2,9 +2,13 @@
 
 use super::{
     camera::{RoomCamera, ideal_shape_slope},
-    evaluation::Evaluation,
+    evaluation::{Evaluation, Normal, Parameters},
+    prior::Prior,
 };
 use crate::geometry::Ray;
+
+/// Factor of the difference from an ideal lens that uncertainties allow for.
+const LOOSER: f64 = 2.0;
 
 /// Standard deviations of a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,27 +23,60 @@ pub struct FitUncertainty {
 
 /// Standard deviations from the curvature of the evidence.
 pub(super) fn curvature(camera: &RoomCamera, evaluation: &Evaluation) -> Option<FitUncertainty> {
-    let covariance = evaluation.normal.clone().try_inverse()?;
-    let ideal = ideal_shape_slope(camera.k1);
-    let radius = angles().map(|theta| {
-        let (radius, _) = camera.curve(theta);
-        let (square, cube) = (theta * theta, theta.powi(3));
-        let along = cube * (ideal[0] + square * (ideal[1] + square * ideal[2]));
-        let slopes = [1.0, along / radius, cube * square / radius];
-        let mut variance = 0.0;
-        for (row, slope) in slopes.iter().enumerate() {
-            for (column, other) in slopes.iter().enumerate() {
-                variance += slope * other * covariance[(row, column)];
-            }
-        }
-        variance.max(0.0).sqrt()
-    });
+    deviations(camera, &evaluation.normal)
+}
+
+fn deviations(camera: &RoomCamera, normal: &Normal) -> Option<FitUncertainty> {
+    let covariance = normal.try_inverse()?;
+    let (_, variance) = softest_radius(camera, &covariance);
     let both =
         |first: usize| (covariance[(first, first)] + covariance[(first + 1, first + 1)]).sqrt();
     Some(FitUncertainty {
-        radius: radius.fold(0.0, f64::max),
+        radius: variance.max(0.0).sqrt(),
         center: both(3),
         level_deg: both(5).to_degrees(),
+    })
+}
+
+/// Standard deviations if the lens may differ more from an ideal one than the fit assumes. They are
+/// larger where the edges hardly tell the second coefficient, as for a camera that looks straight
+/// down.
+pub(super) fn loose_curvature(
+    camera: &RoomCamera,
+    evaluation: &Evaluation,
+    prior: &Prior,
+) -> Option<FitUncertainty> {
+    let mut normal = evaluation.normal;
+    let information = 1.0 / (prior.k2_sigma * prior.k2_sigma);
+    normal[(2, 2)] -= information * (1.0 - 1.0 / (LOOSER * LOOSER));
+    deviations(camera, &normal)
+}
+
+/// The step of all parameters that changes the most uncertain radius by its standard deviation and
+/// costs the least evidence.
+pub(super) fn radius_step(camera: &RoomCamera, evaluation: &Evaluation) -> Option<Parameters> {
+    let covariance = evaluation.normal.try_inverse()?;
+    let (slopes, variance) = softest_radius(camera, &covariance);
+    (variance > 0.0).then(|| covariance * slopes / variance.sqrt())
+}
+
+/// The slopes of the relative radius with the parameters at the angle where it is most uncertain,
+/// and its variance.
+fn softest_radius(camera: &RoomCamera, covariance: &Normal) -> (Parameters, f64) {
+    let ideal = ideal_shape_slope(camera.k1);
+    let at = |theta: f64| {
+        let (radius, _) = camera.curve(theta);
+        let (square, cube) = (theta * theta, theta.powi(3));
+        let along = cube * (ideal[0] + square * (ideal[1] + square * ideal[2]));
+        let mut slopes = Parameters::zeros();
+        slopes[0] = 1.0;
+        slopes[1] = along / radius;
+        slopes[2] = cube * square / radius;
+        (slopes, slopes.dot(&(covariance * slopes)))
+    };
+    let all = angles().map(at);
+    all.fold((Parameters::zeros(), 0.0), |most, next| {
+        if next.1 > most.1 { next } else { most }
     })
 }
 
