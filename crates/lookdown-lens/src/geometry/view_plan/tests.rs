@@ -40,7 +40,7 @@ fn the_rings_of_a_plan_reach_the_rim_of_a_180_degree_lens() {
 }
 
 #[test]
-fn a_turned_plan_looks_in_the_directions_that_a_turned_camera_would_see() {
+fn a_turned_plan_looks_where_a_turned_camera_would() {
     let angle = 0.3_f64;
     let views = |plan: ViewPlan| plan.views(&Mount::default(), 301, 301);
     let pixel = Pixel::new(40.0, 250.0);
