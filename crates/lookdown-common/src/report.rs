@@ -15,7 +15,7 @@ use utoipa::ToSchema;
     "captured_at": "2026-11-21T09:30:00Z",
     "calibration": {"id": "lobby", "revision": "9f86d081884c", "assumed": false},
     "image": {"width": 1680, "height": 1680},
-    "model": {"name": "nanodet_g_views_416", "revision": "5bfad71d8a7a"},
+    "model": {"name": "nanodet_g_views_416", "revision": "533d5d09acd0"},
     "crop_model": {"name": "nanodet_g_fisheye_416_int8", "revision": "ee6466ba3497"},
     "profile": "quality",
     "refinement": {

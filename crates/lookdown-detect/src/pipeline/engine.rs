@@ -154,14 +154,6 @@ impl Engine {
         })
     }
 
-    /// Turns the views of all plans about the plan's axis, radians. A person is then seen in other
-    /// views, so that several turns tell how much of a precision is chance.
-    #[must_use]
-    pub fn with_plan_turn(mut self, angle: f64) -> Self {
-        self.plan_turn = angle;
-        self
-    }
-
     /// Returns the default models.
     #[must_use]
     pub fn default_models(&self) -> &DefaultModels {
