@@ -188,12 +188,10 @@ impl Engine {
         searches.with_label_values(&[search.name()]).inc();
         let zones = ZoneCount::of(&observation.camera.rig.geometry().areas.zones, &persons);
         let calibration = observation.camera.used.clone();
+        let camera = parameters.camera.clone();
         let report = DetectionReport {
             request_id: job.request_id.clone(),
-            camera: parameters
-                .camera
-                .clone()
-                .unwrap_or_else(|| calibration.id.clone()),
+            camera: camera.unwrap_or_else(|| calibration.id.clone()),
             received_at: job.received_at,
             captured_at: parameters.captured_at,
             calibration,
