@@ -146,3 +146,21 @@ fn heads_match_the_boxes_that_contain_them() {
     );
     assert_all_were_detected(&row, found.len());
 }
+
+#[test]
+fn turned_views_see_the_same_persons_differently() {
+    let folder = tempfile::tempdir().unwrap();
+    let detections = |turn: &str| {
+        let saved = folder.path().join(turn);
+        let flags = [
+            "--turn-deg",
+            turn,
+            "--save-detections",
+            saved.to_str().unwrap(),
+        ];
+        lookdown(&[&["eval", "samples", "--json"], &flags[..]].concat());
+        let file = saved.read_dir().unwrap().next().unwrap().unwrap();
+        std::fs::read_to_string(file.path()).unwrap()
+    };
+    assert_ne!(detections("0"), detections("36"));
+}

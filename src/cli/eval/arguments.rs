@@ -38,7 +38,7 @@ pub(in crate::cli) struct Arguments {
         long,
         value_name = "FOLDER",
         conflicts_with_all = ["refine", "paper", "iou_threshold", "sigma", "plot",
-                              "save_detections", "from_detections"]
+                              "save_detections", "from_detections", "turn_deg"]
     )]
     pub(super) sweep: Option<PathBuf>,
     /// Model [default: the profile's]
