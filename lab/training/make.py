@@ -1,4 +1,4 @@
-"""The generator's commands: textures, persons, rooms, frames, walks, sheets, statistics. Everything is made below --work and can be resumed.
+"""The generator's commands: textures, persons, rooms, frames, panoramas, walks, sheets, statistics. Everything is made below --work and can be resumed.
 
 nice -n 19 python lab/training/make.py persons --work WORK --first-seed 1000000 --count 200
 """
@@ -13,7 +13,18 @@ FIRST_SEED = 1_000_000
 
 def parse():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    items = ("textures", "portraits", "persons", "rooms", "frames", "empty", "walks", "sheets", "statistics")
+    items = (
+        "textures",
+        "portraits",
+        "persons",
+        "rooms",
+        "frames",
+        "empty",
+        "panoramas",
+        "walks",
+        "sheets",
+        "statistics",
+    )
     parser.add_argument("what", choices=items)
     parser.add_argument("--work", type=Path, default=Path(__file__).parent / "work")
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
@@ -22,6 +33,7 @@ def parse():
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--nice", type=int, default=19, help="priority; 19 is the lowest")
     parser.add_argument("--samples", type=int, help="samples a pixel")
+    parser.add_argument("--angled", action="store_true", help="rooms with slanted walls and the plan of an L")
     parser.add_argument("--resolution", type=int, help="pixels: diameter of a room's panorama to 90 degrees")
     options = parser.parse_args()
     if options.first_seed < FIRST_SEED:
@@ -49,7 +61,9 @@ def main():
     elif options.what == "rooms":
         from generator.rooms import render_rooms
 
-        render_rooms(work, options.first_seed, options.count, options.split, options.threads, **more)
+        render_rooms(
+            work, options.first_seed, options.count, options.split, options.threads, **more, angled=options.angled
+        )
     elif options.what in ("frames", "empty"):
         import cv2
 
@@ -64,6 +78,10 @@ def main():
         from generator.walks import make_walks
 
         make_walks(work)
+    elif options.what == "panoramas":
+        from generator.panoramas import write_panoramas
+
+        write_panoramas(work, options.split)
     elif options.what == "statistics":
         from generator.statistics import print_statistics
 

@@ -15,6 +15,7 @@ from .figures import add_figure
 from .heights import HEIGHT_SHARES, HEIGHTS
 from .indices import COATS, IMAGE_OF_PERSON, MANNEQUIN
 from .light import floor_irradiance
+from .plan import front, is_within, parts
 from .portraits import portrait_name
 from .progress import Progress
 from .wardrobe import random_colours, random_person
@@ -24,12 +25,13 @@ RESOLUTION = 1040
 """Default diameter in pixels of a panorama to 90° from the nadir."""
 MOST_MANNEQUINS = 4
 FLOORS = ("wood", "tile", "carpet", "terrazzo", "concrete", "checker")
+WALL_PIECES = ["window", "window", "poster", "person", "door", "shelf", "coats", "board", "plant", "none", "none"]
 
 
 class Room:
     """One empty room, with the camera at (0, 0, height)."""
 
-    def __init__(self, seed, split, body, work):
+    def __init__(self, seed, split, body, work, angled=False):
         self.rng, self.split, self.body, self.work = np.random.default_rng(seed), split, body, work
         r = self.rng
         self.palette = f.Palette(r, work / "textures", split)
@@ -42,6 +44,9 @@ class Room:
         self.ceiling = self.height + float(r.choice([0.05, 0.05, 0.1, 0.4, 1.0]))
         self.occupied, self.lights, self.mannequins = [], [], 0
         self.grid = bl.Builder(self.cx, self.cy)
+        # Numbers of their own, so that rectangular rooms stay as they are.
+        other = np.random.default_rng([seed, 1])
+        self.parts = parts(other, self.width, self.depth, (-self.cx, -self.cy)) if angled else []
         self._shell()
         self._lights()
         self._zones()
@@ -49,6 +54,11 @@ class Room:
 
     def occupy(self, b, half_width, half_depth):
         self.occupied.append((*b.xy(0, 0), half_width, half_depth, b.degrees()))
+
+    def is_free(self, b, margin=0.5):
+        """True where a builder's place is in none of the parts of the building."""
+        x, y = b.xy(0, 0)
+        return not any(is_within(part, x - self.cx, y - self.cy, margin) for part in self.parts)
 
     def portrait(self):
         names = [
@@ -90,12 +100,21 @@ class Room:
                 rx=math.pi / 2,
             )
             wall.box(long, 0.015, 0.09, 0, 0.008, 0.045, p.white, bevel=0)
+        for part in self.parts:
+            x, y, half_width, half_depth, turned = part
+            block = self.grid.child(x, y, turned)
+            made = p.texture(self._numbered("wall", 12), rough=0.9, scale=3.0)
+            block.box(2 * half_width, 2 * half_depth, self.ceiling, 0, 0, self.ceiling / 2, made, bevel=0)
+            block.box(2 * half_width + 0.03, 2 * half_depth + 0.03, 0.09, 0, 0, 0.045, p.white, bevel=0)
+            self.occupy(block, half_width, half_depth)
+            x, y, long = front(part, self.width, self.depth)
+            self.sides.append((long, x, y, turned))
         top = self.grid.plane(self.width, self.depth, 0, 0, self.ceiling, bl.material(p.colour(0.3, 0.8), 0.95))
         top.visible_diffuse = top.visible_glossy = top.visible_shadow = False
         for _ in range(int(r.integers(0, 5)) if self.width > 12 else 0):
             x, y = float(r.uniform(-0.45, 0.45) * self.width), float(r.uniform(-0.45, 0.45) * self.depth)
-            if math.hypot(x + self.cx, y + self.cy) > 1.5:
-                column = self.grid.child(x, y)
+            column = self.grid.child(x, y)
+            if math.hypot(x + self.cx, y + self.cy) > 1.5 and self.is_free(column):
                 column.box(0.45, 0.45, self.ceiling, 0, 0, self.ceiling / 2, p.white, bevel=0.01)
                 self.occupy(column, 0.25, 0.25)
 
@@ -142,26 +161,9 @@ class Room:
         for long, x, y, turned in self.sides:
             wall, at = self.grid.child(x, y, turned), -long / 2 + 0.8
             while at < long / 2 - 0.8:
-                self._wall_piece(
-                    wall.child(at, 0),
-                    str(
-                        r.choice(
-                            [
-                                "window",
-                                "window",
-                                "poster",
-                                "person",
-                                "door",
-                                "shelf",
-                                "coats",
-                                "board",
-                                "plant",
-                                "none",
-                                "none",
-                            ]
-                        )
-                    ),
-                )
+                kind = str(r.choice(WALL_PIECES))
+                if self.is_free(wall.child(at, 0.5), 0.0):
+                    self._wall_piece(wall.child(at, 0), kind)
                 at += float(r.uniform(1.8, 3.5))
 
     def _wall_piece(self, b, kind):
@@ -263,9 +265,9 @@ class Room:
         self.occupy(b, 0.35, 0.35)
 
 
-def render_room(scene, body, seed, work, split, scratch, samples, resolution):
+def render_room(scene, body, seed, work, split, scratch, samples, resolution, angled):
     bl.clear()
-    room = Room(seed, split, body, work)
+    room = Room(seed, split, body, work, angled)
     all_round = seed % 4 == 1
     focal = resolution / math.pi * (0.8 if all_round else 1.0)
     max_theta = math.radians(150 if all_round else 100)
@@ -285,6 +287,7 @@ def render_room(scene, body, seed, work, split, scratch, samples, resolution):
         exposure=0.16 / max(bright, 1e-3),
         centre=(room.cx, room.cy),
         size=(room.width, room.depth),
+        parts=room.parts,
         ceiling=room.ceiling,
         occupied=room.occupied,
         lights=[(*light[:3], light[3] / white) for light in room.lights],
@@ -298,7 +301,7 @@ def render_room(scene, body, seed, work, split, scratch, samples, resolution):
     )
 
 
-def render_rooms(work, first_seed, count, split="train", threads=1, samples=6, resolution=RESOLUTION):
+def render_rooms(work, first_seed, count, split="train", threads=1, samples=6, resolution=RESOLUTION, angled=False):
     folder = work / "rooms" / split
     folder.mkdir(parents=True, exist_ok=True)
     todo = [s for s in range(first_seed, first_seed + count) if not (folder / f"{s}.npz").exists()]
@@ -307,7 +310,7 @@ def render_rooms(work, first_seed, count, split="train", threads=1, samples=6, r
     scene.render.use_persistent_data = False
     with tempfile.TemporaryDirectory(dir="/dev/shm" if os.path.isdir("/dev/shm") else None) as scratch:
         for seed in todo:
-            arrays = render_room(scene, body, seed, work, split, scratch, samples, resolution)
+            arrays = render_room(scene, body, seed, work, split, scratch, samples, resolution, angled)
             partial = folder / f"{seed}.partial.npz"
             np.savez_compressed(partial, **arrays)
             partial.rename(folder / f"{seed}.npz")

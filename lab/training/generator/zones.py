@@ -23,10 +23,12 @@ def grid(room, b, width, depth, pitch_x, pitch_y, skip=0.2):
     for i in range(columns):
         for j in range(rows):
             if room.rng.random() >= skip:
-                yield b.child(
+                cell = b.child(
                     (i + 0.5) / columns * width - width / 2 + float(room.rng.normal() * 0.06),
                     (j + 0.5) / rows * depth - depth / 2 + float(room.rng.normal() * 0.06),
                 )
+                if room.is_free(cell, min(pitch_x, pitch_y) / 2):
+                    yield cell
 
 
 def office(room, b, width, depth):
@@ -77,6 +79,8 @@ def class_rows(room, b, width, depth):
 
 def meeting(room, b, width, depth):
     long = min(width - 2, float(room.rng.uniform(1.8, 4.5)))
+    if not room.is_free(b, long / 2):
+        return
     table(room, b, long, 1.2)
     for k in range(max(2, int(long / 0.75))):
         x = (k + 0.5) / max(2, int(long / 0.75)) * long - long / 2
