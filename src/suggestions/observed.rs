@@ -194,7 +194,7 @@ mod tests {
     #[test]
     fn refused_frames_are_followed_by_one_each_hour() {
         let mut observed = Observed {
-            fit: Some(Err(FitRefusal::Ambiguous)),
+            fit: Some(Err(FitRefusal::Ambiguous { explained: 0.6 })),
             size: SIZE,
             ..Observed::default()
         };

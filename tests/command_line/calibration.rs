@@ -137,6 +137,34 @@ fn fit_finds_lens_and_level_of_a_drawn_room() {
     assert!(report.contains("world_up: measured"), "{report}");
 }
 
+/// Adds noise of up to some levels, the same in each run.
+fn add_noise(frame: &mut image::RgbImage, levels: u8) {
+    let mut state = 1_u32;
+    for pixel in frame.pixels_mut() {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let noise = u8::try_from((state >> 16) % (2 * u32::from(levels) + 1)).unwrap();
+        for value in &mut pixel.0 {
+            *value = value.saturating_add(noise).saturating_sub(levels);
+        }
+    }
+}
+
+#[test]
+fn enlarged_noisy_frame_is_fitted() {
+    let folder = tempfile::TempDir::new().unwrap();
+    let frame = folder.path().join("room.png");
+    let mut small = drawn_room(260, 220.0 * 260.0 / 700.0, 0.15);
+    add_noise(&mut small, 18);
+    image::imageops::resize(&small, 910, 910, image::imageops::FilterType::CatmullRom)
+        .save(&frame)
+        .unwrap();
+    let fitted = lookdown(&["calibration", "fit", frame.to_str().unwrap()], &[]);
+    assert!(fitted.status.success(), "{fitted:?}");
+    let found: serde_json::Value = serde_json::from_slice(&fitted.stdout).unwrap();
+    let focal = found["lens"]["fx"].as_f64().unwrap();
+    assert!((focal / 286.0 - 1.0).abs() < 0.02, "{found}");
+}
+
 #[test]
 fn frame_without_edges_is_refused_with_a_remedy() {
     let folder = tempfile::TempDir::new().unwrap();

@@ -19,13 +19,21 @@ use plane::Plane;
 
 /// Longer sides are halved, or divided by three, and so on.
 const MAX_SIDE: u32 = 1700;
+/// Rasters in which edges are found: the finest, and those of half of its sides.
+pub(super) const RASTERS: usize = 3;
 /// Share of the radius that is used: the rim itself is an edge, too.
 pub(super) const USED_RADIUS: f64 = 0.975;
 
-/// Returns the smooth edges inside a circle, in pixel centers of the frame.
+/// Returns the smooth edges inside a circle, in pixel centers of the frame: those of the finest
+/// raster first.
 #[must_use]
-pub fn edge_curves(frame: &Frame, circle: &LensCircle) -> Vec<EdgeCurve> {
-    let divisor = frame.width().max(frame.height()).div_ceil(MAX_SIDE);
+pub fn edge_curves(frame: &Frame, circle: &LensCircle) -> [Vec<EdgeCurve>; RASTERS] {
+    let finest = frame.width().max(frame.height()).div_ceil(MAX_SIDE);
+    std::array::from_fn(|raster| curves_of_raster(frame, circle, finest << raster))
+}
+
+/// The edges of a frame whose sides are divided.
+fn curves_of_raster(frame: &Frame, circle: &LensCircle, divisor: u32) -> Vec<EdgeCurve> {
     let luminance = Plane::luminance(frame, divisor);
     let surround = surround::mask(frame, divisor);
     let gradient = Gradient::of(&luminance);
@@ -42,7 +50,7 @@ pub fn edge_curves(frame: &Frame, circle: &LensCircle) -> Vec<EdgeCurve> {
     for chain in chains::linked(&gradient, &is_used) {
         for piece in pieces::smooth(&chain) {
             let points = pieces::supports(piece).into_iter().map(in_frame).collect();
-            curves.push(EdgeCurve { points });
+            curves.push(EdgeCurve { points, scale });
         }
     }
     curves

@@ -3,7 +3,7 @@
 use lookdown_lens::self_calibration::{CircleGuess, EdgeCurve, FitRefusal, KnownLens, RoomFit};
 
 use super::{
-    edge_curves::{USED_RADIUS, edge_curves},
+    edge_curves::{RASTERS, USED_RADIUS, edge_curves},
     frame::Frame,
     lens_circle::{LensCircle, agreed_circle, assumed_circle, find_lens_circle},
 };
@@ -14,6 +14,10 @@ const CENTER_SIGMA: f64 = 0.003;
 const FRAME_CENTER_SIGMA: f64 = 0.012;
 /// Distance by which the points of a curve may lie beyond the used part of the circle, pixels.
 const BEYOND: f64 = 2.0;
+/// If so much of the length of all edges follows three directions, no coarser raster is needed.
+const CLEARLY_EXPLAINED: f64 = 0.5;
+/// Share of the uncertainty of the finer raster below which the fit of a coarser one is preferred.
+const CLEARLY_MORE_CERTAIN: f64 = 0.8;
 /// Most curves of a frame: the longest. A cluttered room of 1680 by 1680 pixels has fewer.
 const MAX_CURVES: usize = 2000;
 
@@ -24,8 +28,8 @@ pub struct RoomFrame {
     height: u32,
     /// The detected circle.
     circle: Option<LensCircle>,
-    /// Edges inside the circle.
-    curves: Vec<EdgeCurve>,
+    /// Edges inside the circle: those of the finest raster first.
+    curves: [Vec<EdgeCurve>; RASTERS],
 }
 
 impl RoomFrame {
@@ -36,9 +40,11 @@ impl RoomFrame {
         let circle = find_lens_circle(frame);
         let used = circle.unwrap_or_else(|| assumed_circle(width, height));
         let mut curves = edge_curves(frame, &used);
-        if curves.len() > MAX_CURVES {
-            curves.sort_by_key(|curve| std::cmp::Reverse(curve.points.len()));
-            curves.truncate(MAX_CURVES);
+        for curves in &mut curves {
+            if curves.len() > MAX_CURVES {
+                curves.sort_by_key(|curve| std::cmp::Reverse(curve.points.len()));
+                curves.truncate(MAX_CURVES);
+            }
         }
         Self {
             width,
@@ -54,12 +60,12 @@ impl RoomFrame {
         (self.width, self.height)
     }
 
-    /// The edges inside a circle.
-    fn within(&self, circle: &LensCircle) -> Vec<EdgeCurve> {
+    /// The edges of a raster inside a circle.
+    fn within(&self, circle: &LensCircle, raster: usize) -> Vec<EdgeCurve> {
         let reach = USED_RADIUS * circle.radius + BEYOND;
         let is_inside = |[x, y]: &[f64; 2]| (x - circle.cx).hypot(y - circle.cy) < reach;
         let inside = |curve: &&EdgeCurve| curve.points.iter().all(is_inside);
-        self.curves.iter().filter(inside).cloned().collect()
+        self.curves[raster].iter().filter(inside).cloned().collect()
     }
 }
 
@@ -76,7 +82,6 @@ pub fn fit_room(frames: &[RoomFrame], known: KnownLens) -> Result<RoomFit, FitRe
     let assumed = assumed_circle(first.width, first.height);
     let side = f64::from(first.width.min(first.height));
     let circle = found.unwrap_or(assumed);
-    let curves: Vec<_> = frames.iter().map(|frame| frame.within(&circle)).collect();
     let detected = found.map(|circle| CircleGuess {
         center: [circle.cx, circle.cy],
         radius: circle.radius,
@@ -91,5 +96,42 @@ pub fn fit_room(frames: &[RoomFrame], known: KnownLens) -> Result<RoomFit, FitRe
         center_sigma: FRAME_CENTER_SIGMA * side,
     };
     let guesses: Vec<_> = detected.into_iter().chain([centered]).collect();
-    RoomFit::of(&curves, &guesses, known)
+    let fit = |raster| {
+        let curves = frames.iter().map(|frame| frame.within(&circle, raster));
+        RoomFit::of(&curves.collect::<Vec<_>>(), &guesses, known)
+    };
+    let mut best = fit(0);
+    for raster in 1..RASTERS {
+        if is_final(&best) {
+            break;
+        }
+        best = better(best, fit(raster));
+    }
+    best
+}
+
+/// Returns true if a coarser raster does not help, because most edges follow the room or there are
+/// too few. In a fine raster, frames that were enlarged or are noisy have many edges that are none.
+fn is_final(fit: &Result<RoomFit, FitRefusal>) -> bool {
+    let explained = match fit {
+        Ok(fit) => Some(fit.explained),
+        Err(refusal) => refusal.explained(),
+    };
+    explained.is_none_or(|explained| explained >= CLEARLY_EXPLAINED)
+}
+
+/// The fit of the finer raster, unless that of the coarser one says more.
+fn better(
+    finer: Result<RoomFit, FitRefusal>,
+    coarser: Result<RoomFit, FitRefusal>,
+) -> Result<RoomFit, FitRefusal> {
+    let is_coarser = match (&finer, &coarser) {
+        (Ok(finer), Ok(coarser)) => {
+            coarser.uncertainty.radius < CLEARLY_MORE_CERTAIN * finer.uncertainty.radius
+        }
+        (Err(_), Ok(_)) => true,
+        (Ok(_), Err(_)) => false,
+        (Err(finer), Err(coarser)) => coarser.explained() > finer.explained(),
+    };
+    if is_coarser { coarser } else { finer }
 }

@@ -5,6 +5,9 @@
 pub struct EdgeCurve {
     /// Points along the curve in pixel centers, at about the same distance from each other.
     pub points: Vec<[f64; 2]>,
+    /// Pixels of the frame per pixel of the raster in which the edge was found. Positions are as
+    /// much less exact.
+    pub scale: f64,
 }
 
 impl EdgeCurve {

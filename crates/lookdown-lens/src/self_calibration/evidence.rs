@@ -68,7 +68,7 @@ pub(super) fn evaluate(
         #[expect(clippy::cast_precision_loss, reason = "a few points")]
         let count = rays.len() as f64;
         let lever = length / 12.0_f64.sqrt();
-        let sigma = blur * SIGMA_PIXELS.hypot(SIGMA_DIRECTION * lever);
+        let sigma = blur * (SIGMA_PIXELS * curve.scale).hypot(SIGMA_DIRECTION * lever);
         // The prior density of an edge's angle is uniform over half a turn.
         let sigma_angle = sigma / (lever * count.sqrt());
         let gain = (PI / (TAU.sqrt() * sigma_angle)).max(1.0);

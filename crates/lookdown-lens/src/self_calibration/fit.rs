@@ -40,6 +40,9 @@ const K2_SIGMA: f64 = 0.0015;
 /// come in groups: by this factor, and for the radius by this share however many edges there are.
 const MISFIT: f64 = 1.2;
 const LENS_FLOOR: f64 = 0.003;
+/// They are larger where things of all shapes stand nearly along the walls: by this factor for each
+/// unit by which less than half of the edges is explained.
+const CLUTTER_MISFIT: f64 = 4.0;
 
 /// A lens circle, detected or assumed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -190,19 +193,21 @@ fn checked(
     if !is_upright {
         return Err(FitRefusal::VerticalUnclear);
     }
+    let ambiguous = FitRefusal::Ambiguous { explained };
     let is_rival = |rival: &Maximum| {
         let (radius, level) = distance(camera, &rival.camera);
         let is_near = evaluation.evidence - rival.evaluation.evidence < RIVAL_EVIDENCE;
         is_near && (radius > RIVAL_DISTANCE.0 || level > RIVAL_DISTANCE.1)
     };
     if maxima[1..].iter().any(is_rival) {
-        return Err(FitRefusal::Ambiguous);
+        return Err(ambiguous);
     }
-    let halves = halves(camera, curves, weight, prior).ok_or(FitRefusal::Ambiguous)?;
-    let edges = loose_curvature(camera, evaluation, prior).ok_or(FitRefusal::Ambiguous)?;
+    let halves = halves(camera, curves, weight, prior).ok_or(ambiguous)?;
+    let edges = loose_curvature(camera, evaluation, prior).ok_or(ambiguous)?;
     let edges = widened(edges, &halves);
     let spread = spread(&halves);
-    let factor = MISFIT * spread;
+    let clutter = 1.0 + CLUTTER_MISFIT * (0.5 - explained).max(0.0);
+    let factor = MISFIT * clutter * spread;
     let uncertainty = FitUncertainty {
         radius: (factor * edges.radius).hypot(LENS_FLOOR),
         center: factor * edges.center,
@@ -212,12 +217,14 @@ fn checked(
         return Err(FitRefusal::HalvesDisagree {
             radius_percent: 100.0 * half.radius,
             level_deg: half.level_deg,
+            explained,
         });
     }
     if uncertainty.radius > MAX_UNCERTAINTY.0 || uncertainty.level_deg > MAX_UNCERTAINTY.1 {
         return Err(FitRefusal::Uncertain {
             radius_percent: 100.0 * uncertainty.radius,
             level_deg: uncertainty.level_deg,
+            explained,
         });
     }
     let [k1, k2, k3] = camera.shape();
@@ -225,7 +232,7 @@ fn checked(
         focal: camera.focal,
         k: [k1, k2, k3, 0.0],
         center: camera.center,
-        max_theta: camera.theta(prior.radius).ok_or(FitRefusal::Ambiguous)?,
+        max_theta: camera.theta(prior.radius).ok_or(ambiguous)?,
         directions: camera.directions(),
         explained,
         edges: curves.len(),

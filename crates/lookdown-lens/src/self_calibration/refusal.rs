@@ -37,7 +37,10 @@ pub enum FitRefusal {
         "two different cameras explain the edges equally well: give the model of the lens (a camera that looks \
          straight down often needs it), or further frames"
     )]
-    Ambiguous,
+    Ambiguous {
+        /// Explained share of the edges.
+        explained: f64,
+    },
     /// The evidence is flat.
     #[error(
         "the edges determine the lens to {radius_percent:.1} % and the level to {level_deg:.1}° only: give the model of \
@@ -48,6 +51,8 @@ pub enum FitRefusal {
         radius_percent: f64,
         /// Standard deviation of the level, degrees.
         level_deg: f64,
+        /// Explained share of the edges.
+        explained: f64,
     },
     /// Half of the edges gives another camera.
     #[error(
@@ -59,10 +64,25 @@ pub enum FitRefusal {
         radius_percent: f64,
         /// Difference of the level, degrees.
         level_deg: f64,
+        /// Explained share of the edges.
+        explained: f64,
     },
 }
 
 impl FitRefusal {
+    /// Returns the share of the edges along three directions, or `None` if another reason came
+    /// first.
+    #[must_use]
+    pub fn explained(&self) -> Option<f64> {
+        match self {
+            Self::NoDirections { explained }
+            | Self::Ambiguous { explained }
+            | Self::Uncertain { explained, .. }
+            | Self::HalvesDisagree { explained, .. } => Some(*explained),
+            Self::TooFewEdges { .. } | Self::MissingDirection | Self::VerticalUnclear => None,
+        }
+    }
+
     /// Returns the name of the reason, for programs.
     #[must_use]
     pub fn reason(&self) -> &'static str {
@@ -71,7 +91,7 @@ impl FitRefusal {
             Self::NoDirections { .. } => "no_directions",
             Self::MissingDirection => "missing_direction",
             Self::VerticalUnclear => "vertical_unclear",
-            Self::Ambiguous => "ambiguous",
+            Self::Ambiguous { .. } => "ambiguous",
             Self::Uncertain { .. } => "uncertain",
             Self::HalvesDisagree { .. } => "halves_disagree",
         }

@@ -27,6 +27,14 @@ fn pixel(ray: &Ray) -> [f64; 2] {
     ]
 }
 
+/// The ray of a pixel in that lens.
+fn ray([x, y]: [f64; 2]) -> Ray {
+    let [x, y] = [x - CENTER[0], y - CENTER[1]];
+    let radius = x.hypot(y);
+    let (sin, cos) = (2.0 * (radius / (2.0 * FOCAL)).asin()).sin_cos();
+    Ray::new(sin * x / radius, sin * y / radius, cos)
+}
+
 /// Edges of a room of 6 by 5 by 2.8 meters seen by a tilted camera below its ceiling.
 fn edges(camera_from_room: &Rotation3<f64>) -> Vec<EdgeCurve> {
     let mut edges = Vec::new();
@@ -39,7 +47,7 @@ fn edges(camera_from_room: &Rotation3<f64>) -> Vec<EdgeCurve> {
             .map(|ray| pixel(&ray))
             .collect();
         if points.len() > 2 {
-            edges.push(EdgeCurve { points });
+            edges.push(EdgeCurve { points, scale: 1.0 });
         }
     };
     for step in 0..12 {
@@ -131,6 +139,7 @@ fn clutter(count: usize) -> Vec<EdgeCurve> {
                 points: points
                     .map(|far| [x + far * turn.cos(), y + far * turn.sin()])
                     .collect(),
+                scale: 1.0,
             }
         })
         .collect()
@@ -158,6 +167,32 @@ fn room_with_more_clutter_than_walls_is_fitted() {
 }
 
 #[test]
+fn clutter_makes_the_lens_less_certain() {
+    let room = Rotation3::from_euler_angles(0.14, -0.09, 0.4);
+    let uncertainty = |edges: Vec<EdgeCurve>| {
+        let fit = RoomFit::of(&[edges], &[circle()], KnownLens::default()).unwrap();
+        fit.uncertainty.radius
+    };
+    let clear = uncertainty(edges(&room));
+    let cluttered = uncertainty([edges(&room), clutter(700)].concat());
+    assert!(cluttered > 1.3 * clear, "{cluttered}, without {clear}");
+}
+
+#[test]
+fn edges_of_a_coarser_raster_are_less_certain() {
+    let room = Rotation3::from_euler_angles(0.14, -0.09, 0.4);
+    let fit = |scale: f64| {
+        let mut edges = edges(&room);
+        for edge in &mut edges {
+            edge.scale = scale;
+        }
+        RoomFit::of(&[edges], &[circle()], KnownLens::default()).unwrap()
+    };
+    let [fine, coarse] = [1.0, 4.0].map(|scale| fit(scale).uncertainty.level_deg);
+    assert!(coarse > 1.5 * fine, "{coarse}°, in the finest {fine}°");
+}
+
+#[test]
 fn many_exact_edges_leave_the_uncertainty_of_the_lens() {
     let room = Rotation3::from_euler_angles(0.14, -0.09, 0.4);
     let many = vec![edges(&room); 15].concat();
@@ -179,15 +214,31 @@ fn camera_tilted_by_53_degrees_is_upright() {
 }
 
 #[test]
+fn vertical_of_a_tilted_camera_needs_many_edges() {
+    let room = Rotation3::from_euler_angles(0.92, 0.0, 0.0);
+    // Few edges are above the horizon of another direction, so that it may be the vertical.
+    let mut above = 0;
+    let mut few = edges(&room);
+    few.retain(|curve| {
+        let middle = ray(curve.points[curve.points.len() / 2]);
+        let is_above = middle.dot(&(room * Ray::y())) < -0.15;
+        above += usize::from(is_above);
+        !is_above || above % 5 == 0
+    });
+    let fit = |copies: usize| {
+        let edges = vec![few.clone(); copies].concat();
+        RoomFit::of(&[edges], &[circle()], KnownLens::default())
+    };
+    assert_eq!(fit(3), Err(FitRefusal::VerticalUnclear));
+    let many = fit(20).unwrap();
+    let level = many.directions[0].angle(&(room * Ray::z())).to_degrees();
+    assert!(level < 0.5, "{level}° off level");
+}
+
+#[test]
 fn camera_on_a_wall_has_no_clear_vertical() {
     let room = Rotation3::from_euler_angles(-0.92, 0.0, 0.0);
     let away = room * -Ray::y();
-    let ray = |[x, y]: [f64; 2]| {
-        let [x, y] = [x - CENTER[0], y - CENTER[1]];
-        let radius = x.hypot(y);
-        let (sin, cos) = (2.0 * (radius / (2.0 * FOCAL)).asin()).sin_cos();
-        Ray::new(sin * x / radius, sin * y / radius, cos)
-    };
     let is_before = |point: &[f64; 2]| ray(*point).dot(&away) > 0.1;
     let mut before = edges(&room);
     before.retain(|curve| curve.points.iter().all(is_before));
@@ -261,7 +312,7 @@ fn camera_of_another_circle_is_a_rival() {
     let alone = RoomFit::of(std::slice::from_ref(&all), &[above], known);
     let both = RoomFit::of(&[all], &[above, below], known);
     assert!(alone.is_ok(), "{alone:?}");
-    assert_eq!(both, Err(FitRefusal::Ambiguous));
+    assert!(matches!(both, Err(FitRefusal::Ambiguous { .. })));
 }
 
 #[test]

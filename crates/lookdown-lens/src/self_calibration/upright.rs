@@ -59,7 +59,8 @@ pub(super) fn upright(
         [] | [_] => return (camera.clone(), !may_be_on_wall),
         [first, second, ..] => (first, second),
     };
-    let is_clear = second.1 - down.1 > CLEARLY_FEWER;
+    let edges: f64 = evaluation.explained.iter().sum();
+    let is_clear = second.1 - down.1 > CLEARLY_FEWER.max(1.0 / edges.max(1.0).sqrt());
     let down = down.0;
     let across = directions
         .into_iter()
