@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Make frames of tilted cameras from the rendered rooms of a data set, with their true calibrations.
 
-    python scripts/tilted_rooms.py DATASET OUT [--variants 4] [--frames 1] [--seed 1] [--first 0] [--step 1] [--wall]
+    python scripts/tilted_rooms.py DATASET OUT [--variants 4] [--frames 1] [--seed 1] [--first 0] [--step 1] [--tilt 25] [--wall]
 
-Each frame of the data set is remapped to another lens: a model of five, a tilt of 0 to 25 degrees, a
+Each frame of the data set is remapped to another lens: a model of five, a tilt of 0 to TILT degrees, a
 center off by up to 2 % of the width, a circle cut at 75 to 100 degrees. Some variants add noise, blur,
 compression or darkness. With several frames of each camera, things of the size of people are in the way in each, and
 the degradations differ. With `--wall`, the cameras look horizontally, upright within 10 degrees, below a plain ceiling.
@@ -157,6 +157,7 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--first", type=int, default=0, help="number of the first room")
     parser.add_argument("--step", type=int, default=1, help="take each STEPth room")
+    parser.add_argument("--tilt", type=float, default=25.0, help="greatest tilt, degrees")
     parser.add_argument("--wall", action="store_true", help="cameras that look horizontally")
     arguments = parser.parse_args()
     generator = np.random.default_rng(arguments.seed)
@@ -173,7 +174,7 @@ def main():
         for variant in range(arguments.variants):
             name = f"{Path(room['file_name']).stem}_{variant}"
             lens = made_lens(generator, width, height)
-            tilt, toward = math.radians(generator.uniform(0, 25)), generator.uniform(0, 2 * math.pi)
+            tilt, toward = math.radians(generator.uniform(0, arguments.tilt)), generator.uniform(0, 2 * math.pi)
             if arguments.wall:
                 tilt, toward = math.radians(generator.uniform(80, 95)), math.radians(generator.uniform(80, 100))
             flat = math.sin(tilt)

@@ -25,6 +25,6 @@ mod upright;
 
 pub use camera_height::{CameraHeight, HeightRefusal};
 pub use edge_curve::EdgeCurve;
-pub use fit::{CircleGuess, KnownLens, RoomFit};
+pub use fit::{CLEARLY_EXPLAINED, CircleGuess, KnownLens, RoomFit};
 pub use refusal::FitRefusal;
 pub use uncertainty::FitUncertainty;

@@ -23,10 +23,10 @@ def write_panorama(path, folder):
     about, name = room.about, path.stem
     max_theta = min(about["max_theta"], LARGEST)
     half = round(about["focal"] * max_theta)
-    first = round(about["nadir"]) - half
-    side = 2 * half + 1
-    frame = display(room.colour[max(0, first) : first + side, max(0, first) : first + side], about["exposure"])
-    nadir = about["nadir"] - max(0, first)
+    first = max(0, round(about["nadir"]) - half)
+    kept = slice(first, first + 2 * half + 1)
+    frame = display(room.colour[kept, kept], about["exposure"])
+    nadir = about["nadir"] - first
     lens = dict(model="equidistant", focal=about["focal"], max_theta=max_theta)
     height, width = frame.shape[:2]
     calibration = Calibration(width, height, lens, nadir, nadir, height_m=about["camera_height"])

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .plan import is_within
+
 LARGEST_SCALE = 1.09
 """A crop serves camera heights up to this factor away: the person is so much taller or shorter."""
 
@@ -50,15 +52,7 @@ def free(room, x, y, margin):
     (cx, cy), (width, depth) = room["centre"], room["size"]
     if abs(x - cx) > width / 2 - margin - 0.1 or abs(y - cy) > depth / 2 - margin - 0.1:
         return False
-    for ox, oy, hx, hy, degrees in room["occupied"]:
-        t = math.radians(-degrees)
-        u, v = (
-            (x - ox) * math.cos(t) - (y - oy) * math.sin(t),
-            (x - ox) * math.sin(t) + (y - oy) * math.cos(t),
-        )
-        if abs(u) < hx + margin and abs(v) < hy + margin:
-            return False
-    return True
+    return not any(is_within(block, x, y, margin) for block in room["occupied"])
 
 
 def place(rng, room, files, wanted, prefer_light=None):

@@ -287,7 +287,6 @@ def render_room(scene, body, seed, work, split, scratch, samples, resolution, an
         exposure=0.16 / max(bright, 1e-3),
         centre=(room.cx, room.cy),
         size=(room.width, room.depth),
-        parts=room.parts,
         ceiling=room.ceiling,
         occupied=room.occupied,
         lights=[(*light[:3], light[3] / white) for light in room.lights],

@@ -19,7 +19,7 @@ use plane::Plane;
 
 /// Longer sides are halved, or divided by three, and so on.
 const MAX_SIDE: u32 = 1700;
-/// Rasters in which edges are found: the finest, and those of half of its sides.
+/// Rasters in which edges are found: the finest, then each of half of the sides before.
 pub(super) const RASTERS: usize = 3;
 /// Share of the radius that is used: the rim itself is an edge, too.
 pub(super) const USED_RADIUS: f64 = 0.975;

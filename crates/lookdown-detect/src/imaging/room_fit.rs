@@ -1,6 +1,8 @@
 //! A camera from its own frames: lens circle and edges, then the fit of [`RoomFit`].
 
-use lookdown_lens::self_calibration::{CircleGuess, EdgeCurve, FitRefusal, KnownLens, RoomFit};
+use lookdown_lens::self_calibration::{
+    CLEARLY_EXPLAINED, CircleGuess, EdgeCurve, FitRefusal, KnownLens, RoomFit,
+};
 
 use super::{
     edge_curves::{RASTERS, USED_RADIUS, edge_curves},
@@ -14,8 +16,6 @@ const CENTER_SIGMA: f64 = 0.003;
 const FRAME_CENTER_SIGMA: f64 = 0.012;
 /// Distance by which the points of a curve may lie beyond the used part of the circle, pixels.
 const BEYOND: f64 = 2.0;
-/// If so much of the length of all edges follows three directions, no coarser raster is needed.
-const CLEARLY_EXPLAINED: f64 = 0.5;
 /// Share of the uncertainty of the finer raster below which the fit of a coarser one is preferred.
 const CLEARLY_MORE_CERTAIN: f64 = 0.8;
 /// Most curves of a frame: the longest. A cluttered room of 1680 by 1680 pixels has fewer.

@@ -40,8 +40,10 @@ const K2_SIGMA: f64 = 0.0015;
 /// come in groups: by this factor, and for the radius by this share however many edges there are.
 const MISFIT: f64 = 1.2;
 const LENS_FLOOR: f64 = 0.003;
-/// They are larger where things of all shapes stand nearly along the walls: by this factor for each
-/// unit by which less than half of the edges is explained.
+/// If so much of the length of all edges follows three directions, few of the others are clutter.
+pub const CLEARLY_EXPLAINED: f64 = 0.5;
+/// Errors are larger where things of all shapes stand nearly along the walls: by this factor for
+/// each unit by which less than [`CLEARLY_EXPLAINED`] is explained.
 const CLUTTER_MISFIT: f64 = 4.0;
 
 /// A lens circle, detected or assumed.
@@ -206,7 +208,7 @@ fn checked(
     let edges = loose_curvature(camera, evaluation, prior).ok_or(ambiguous)?;
     let edges = widened(edges, &halves);
     let spread = spread(&halves);
-    let clutter = 1.0 + CLUTTER_MISFIT * (0.5 - explained).max(0.0);
+    let clutter = 1.0 + CLUTTER_MISFIT * (CLEARLY_EXPLAINED - explained).max(0.0);
     let factor = MISFIT * clutter * spread;
     let uncertainty = FitUncertainty {
         radius: (factor * edges.radius).hypot(LENS_FLOOR),
