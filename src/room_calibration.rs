@@ -1,5 +1,6 @@
 //! The calibration of a camera that was fitted to the edges of a room, with its height from people.
 
+pub(crate) mod known;
 pub(crate) mod preview;
 
 use std::collections::BTreeMap;
@@ -15,14 +16,16 @@ use lookdown_lens::{
         export::Target,
         native::{NativeCalibration, NativeImage, NativeMount, NativeSource, ValueSource},
     },
-    geometry::lens::KannalaBrandt,
-    self_calibration::{CameraHeight, KnownLens, RoomFit},
+    geometry::lens::{KannalaBrandt, LensModel},
+    self_calibration::{CameraHeight, KnownCamera, RoomFit},
 };
+
+pub use known::known_camera;
 
 use crate::rounding::{meters as thousandths, pixels as hundredths};
 
 /// The source of a value of the user.
-pub(crate) const GIVEN: NativeSource = NativeSource {
+const GIVEN: NativeSource = NativeSource {
     source: ValueSource::Given,
     uncertainty: None,
 };
@@ -44,7 +47,7 @@ pub struct RoomCalibration {
 pub fn calibrate(
     id: &CalibrationId,
     frames: &[Frame],
-    known: KnownLens,
+    known: KnownCamera,
     height_m: Option<f64>,
 ) -> anyhow::Result<RoomCalibration> {
     let first = frames.first().context("no frame: give at least one")?;
@@ -65,7 +68,7 @@ pub fn calibrate(
     }
     let edges: Vec<_> = frames.iter().map(RoomFrame::of).collect();
     let fit = fit_room(&edges, known)?;
-    let mut native = room_calibration(id, image, &fit);
+    let mut native = room_calibration(id, image, &fit, known);
     if let Some(height_m) = height_m {
         give_height(&mut native, height_m);
     }
@@ -77,22 +80,29 @@ pub fn calibrate(
     })
 }
 
-/// Returns the calibration of a fit. Lens, center and level are measured, the height is unknown.
+/// Returns the calibration of a fit to what was known. Center and level are measured, and so is the
+/// lens unless model and field of view are known. The height is unknown.
 pub(crate) fn room_calibration(
     id: &CalibrationId,
     image: NativeImage,
     fit: &RoomFit,
+    known: KnownCamera,
 ) -> NativeCalibration {
     let [cx, cy] = fit.center.map(thousandths);
     let focal = thousandths(fit.focal);
-    let lens = KannalaBrandt {
-        fx: focal,
-        fy: focal,
-        cx,
-        cy,
-        skew: 0.0,
-        max_theta: Some(max_theta(fit)),
-        k: fit.k.map(|k| (k * 1e8).round() / 1e8),
+    // Rounded down, so that the lens model is valid there.
+    let max_theta = (fit.max_theta * 1e6).floor() / 1e6;
+    let lens = match known.lens {
+        Some(model) => model.with(focal, cx, cy, max_theta),
+        None => LensModel::from(KannalaBrandt {
+            fx: focal,
+            fy: focal,
+            cx,
+            cy,
+            skew: 0.0,
+            max_theta: Some(max_theta),
+            k: fit.k.map(|k| (k * 1e8).round() / 1e8),
+        }),
     };
     let up = fit.directions[0].map(|value| (-value * 1e8).round() / 1e8);
     NativeCalibration {
@@ -100,8 +110,8 @@ pub(crate) fn room_calibration(
             world_up: up.into(),
             ..NativeMount::default()
         },
-        sources: sources(fit),
-        ..NativeCalibration::new(id.to_string(), image, lens.into())
+        sources: sources(fit, known),
+        ..NativeCalibration::new(id.to_string(), image, lens)
     }
 }
 
@@ -139,24 +149,24 @@ pub(crate) fn give_height(native: &mut NativeCalibration, height_m: f64) {
     native.sources.insert("height_m".to_owned(), GIVEN);
 }
 
-/// Returns the angle at the lens circle, radians. It is rounded down, so that the lens model is
-/// valid there.
-pub(crate) fn max_theta(fit: &RoomFit) -> f64 {
-    (fit.max_theta * 1e6).floor() / 1e6
-}
-
 /// Returns the angle between the camera's axis and straight down, degrees.
 pub(crate) fn tilt_deg(fit: &RoomFit) -> f64 {
     fit.directions[0].z.clamp(-1.0, 1.0).acos().to_degrees()
 }
 
-fn sources(fit: &RoomFit) -> BTreeMap<String, NativeSource> {
+fn sources(fit: &RoomFit, known: KnownCamera) -> BTreeMap<String, NativeSource> {
     let measured = |uncertainty: f64| NativeSource {
         source: ValueSource::Measured,
         uncertainty: Some(thousandths(uncertainty)),
     };
+    let is_lens_given = known.lens.is_some() && known.field_of_view.is_some();
+    let lens = if is_lens_given {
+        GIVEN
+    } else {
+        measured(100.0 * fit.uncertainty.radius)
+    };
     BTreeMap::from([
-        ("lens".to_owned(), measured(100.0 * fit.uncertainty.radius)),
+        ("lens".to_owned(), lens),
         ("center".to_owned(), measured(fit.uncertainty.center)),
         ("world_up".to_owned(), measured(fit.uncertainty.level_deg)),
     ])

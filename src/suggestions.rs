@@ -21,7 +21,10 @@ use std::{
 };
 
 use lookdown_detect::{imaging::decode::DecodeLimits, pipeline::DetectedFrame};
-use lookdown_lens::calibration::CalibrationId;
+use lookdown_lens::{
+    calibration::CalibrationId,
+    self_calibration::{IdealLens, KnownCamera},
+};
 use parking_lot::Mutex;
 
 use crate::calibration_store::Calibrations;
@@ -44,17 +47,22 @@ pub(crate) struct Suggestions {
 }
 
 impl Suggestions {
-    /// Creates the suggestions for cameras without one of these calibrations. With `applies`, a
-    /// calibration from all frames is stored.
+    /// Creates the suggestions for cameras without one of these calibrations, whose lens may be
+    /// known. With `applies`, a calibration from all frames is stored.
     pub(crate) fn new(
         calibrations: Arc<Calibrations>,
         limits: DecodeLimits,
+        lens: Option<IdealLens>,
         applies: bool,
     ) -> Self {
         let shared = Shared {
             cameras: Mutex::default(),
             calibrations,
             limits,
+            known: KnownCamera {
+                lens,
+                ..KnownCamera::default()
+            },
             applies,
         };
         Self {

@@ -204,11 +204,19 @@ async function importFile(file) {
   await preview();
 }
 
+/** The query for what is known of the camera before its lens is found. */
+function known() {
+  const query = new URLSearchParams();
+  if (field("knownLens").value) query.set("lens", field("knownLens").value);
+  if (field("knownPlace").value) query.set("ceiling", true);
+  return query;
+}
+
 /** Finds lens, center and level from the straight edges of the frame. Everything else in a calibration of this name stays. */
 async function findLens() {
   const { frame } = shared;
   const name = id();
-  const found = await withProgress(find("#find-progress"), "Finding the lens", () => askJson(`calibrations/${name}/fit`, { method: "POST", body: frame.blob }));
+  const found = await withProgress(find("#find-progress"), "Finding the lens", () => askJson(`calibrations/${name}/fit?${known()}`, { method: "POST", body: frame.blob }));
   if (shared.frame === frame) await showFit(name, found);
 }
 

@@ -15,6 +15,7 @@ use lookdown_detect::{
     pipeline::{PipelineError, WorkerPool},
 };
 use lookdown_http::header_limits::HeaderLimits;
+use lookdown_lens::self_calibration::IdealLens;
 
 use super::{
     companions::Companions,
@@ -61,6 +62,8 @@ pub struct ApiOptions {
     pub images_of: Arc<ImagesOf>,
     /// The concealment of persons in these images.
     pub conceal_images: Option<Concealment>,
+    /// The lens of cameras without a calibration, if it is known.
+    pub lens: Option<IdealLens>,
     /// `true` if calibrations that are found for cameras without one are stored.
     pub apply_suggested_calibrations: bool,
     /// `true` if the metrics have a port of their own.
@@ -120,6 +123,7 @@ impl ApiOptions {
             camera_metrics: false,
             images_of: Arc::default(),
             conceal_images: None,
+            lens: None,
             apply_suggested_calibrations: false,
             metrics_elsewhere: false,
             request_timeout: Duration::from_secs(20),
@@ -178,6 +182,7 @@ impl ApiState {
         let suggestions = Suggestions::new(
             Arc::clone(&calibrations),
             workers.engine().options().decode_limits,
+            options.lens,
             options.apply_suggested_calibrations,
         );
         Self(Arc::new(Shared {

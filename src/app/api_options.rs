@@ -25,6 +25,7 @@ pub(super) fn api_options(
         camera_metrics: settings.results.camera_metrics,
         images_of: Arc::new(settings.results.images_of.clone()),
         conceal_images: settings.results.conceal_images,
+        lens: settings.calibrations.lens,
         apply_suggested_calibrations: settings.calibrations.apply_suggested,
         metrics_elsewhere: settings.server.metrics_listen.is_some(),
         request_timeout: settings.server.request_timeout,

@@ -3,11 +3,12 @@
 use std::{fmt, num::NonZeroU64, path::PathBuf};
 
 use lookdown_detect::pipeline::EngineOptions;
+use lookdown_lens::self_calibration::IdealLens;
 use url::Url;
 
 use super::{
     declare::settings,
-    form::{Form, MAX_BYTES, Refusal, flag, parsed, poll_seconds, whole},
+    form::{Form, MAX_BYTES, Refusal, flag, optional, parsed, poll_seconds, variant, whole},
     locate::DEFAULT_CALIBRATIONS,
 };
 
@@ -28,6 +29,10 @@ settings! {
         /// `true` if calibrations can be changed over HTTP by clients with the scope `admin`;
         /// `false` for replicas that only read.
         writable: bool = true => flag();
+        /// The projection of the lenses of cameras without a calibration, from their data sheet.
+        /// The server can find the calibration of a camera that looks straight down only with it.
+        /// Most ceiling cameras are equidistant.
+        lens: Option<IdealLens> = None => optional(variant());
         /// `true` if a calibration that the server finds in five frames of a named camera is stored
         /// under the name of the camera, if it has none. `false`: it is only offered
         /// (docs/calibrate.md).

@@ -11,7 +11,7 @@ pub(super) use numbers::{
 };
 pub(super) use texts::{
     address, choice, given_path, list, names, optional, optional_text, parsed, path, secret, text,
-    web_address,
+    variant, web_address,
 };
 pub(super) use written::{Refusal, Written};
 

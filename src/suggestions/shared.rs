@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, sync::Arc};
 use lookdown_detect::imaging::decode::DecodeLimits;
 use lookdown_lens::{
     calibration::{Calibration, CalibrationId, native::NativeCalibration},
-    self_calibration::{CameraHeight, FitRefusal, HeightRefusal, RoomFit},
+    self_calibration::{CameraHeight, FitRefusal, HeightRefusal, KnownCamera, RoomFit},
 };
 use parking_lot::Mutex;
 
@@ -20,6 +20,8 @@ pub(super) struct Shared {
     pub cameras: Mutex<BTreeMap<CalibrationId, Observed>>,
     pub calibrations: Arc<Calibrations>,
     pub limits: DecodeLimits,
+    /// The known values of all cameras without a calibration.
+    pub known: KnownCamera,
     /// True if a calibration from all frames is stored without a request.
     pub applies: bool,
 }
@@ -52,7 +54,7 @@ impl Shared {
         let (base, replaces) = match &subject {
             Subject::Lens => {
                 let found = fit.as_ref().and_then(|fit| fit.as_ref().ok());
-                let native = found.map(|fit| room_calibration(camera, size, fit));
+                let native = found.map(|fit| room_calibration(camera, size, fit, self.known));
                 (native, None)
             }
             Subject::Height(id) => {
@@ -89,7 +91,7 @@ impl Shared {
             }
             Subject::Lens => {
                 let fit = observed.fit.as_ref()?.as_ref().ok()?;
-                let native = room_calibration(camera, observed.size(), fit);
+                let native = room_calibration(camera, observed.size(), fit, self.known);
                 checked(&native).ok().map(Arc::new)
             }
         }

@@ -8,7 +8,7 @@ use lookdown_lens::{
         Lens, OrientedBox, Pixel, Ray,
         pixels::{PixelConvention, cross_half_pixel},
     },
-    self_calibration::{FitUncertainty, RoomFit},
+    self_calibration::{FitUncertainty, KnownCamera, RoomFit},
 };
 use tempfile::TempDir;
 
@@ -32,6 +32,7 @@ fn shared(folder: &TempDir, applies: bool) -> Arc<Shared> {
         cameras: parking_lot::Mutex::default(),
         calibrations: Arc::new(calibrations),
         limits: lookdown_detect::imaging::decode::DecodeLimits::default(),
+        known: KnownCamera::default(),
         applies,
     })
 }

@@ -8,7 +8,7 @@ use lookdown_detect::imaging::{
 };
 use lookdown_lens::{
     calibration::{CalibrationId, export::Target},
-    self_calibration::{CameraHeight, KnownLens},
+    self_calibration::CameraHeight,
 };
 
 use super::{
@@ -68,7 +68,7 @@ impl Worker {
         if frames.is_empty() {
             return;
         }
-        let fit = fit_room(&frames, KnownLens::default());
+        let fit = fit_room(&frames, self.0.known);
         if let Some(observed) = self.0.cameras.lock().get_mut(camera) {
             if let Ok(fit) = &fit {
                 tracing::info!(

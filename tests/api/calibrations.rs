@@ -6,7 +6,7 @@ use axum::{body::Body, http::Request};
 use lookdown_lens::geometry::{FieldOfViewReading, ViewPlan};
 use serde_json::{Value, json};
 
-use crate::service::{Service, frame};
+use crate::service::{Service, form_to, frame};
 
 const PATH: &str = "/calibrations/lobby";
 
@@ -336,10 +336,59 @@ async fn a_frame_without_edges_is_no_fit_and_says_why() {
     assert_eq!(answer.status, 422);
     let detail = answer.json()["detail"].to_string();
     assert!(detail.contains("edges, too few for a fit"), "{detail}");
-    let request = Request::post("/calibrations/hall/fit?profile=fast").body(Body::from(frame()));
-    let answer = service.send(request.unwrap()).await;
-    assert_eq!(answer.status, 422);
-    assert_eq!(answer.json()["parameter"], "profile");
     let request = Request::post("/calibrations/hall/fit").body(Body::from("no image"));
     assert_eq!(service.send(request.unwrap()).await.status, 422);
+}
+
+#[tokio::test]
+async fn camera_that_looks_straight_down_is_fitted_with_its_lens() {
+    let service = Service::start();
+    let office = include_bytes!("../../samples/office.jpg");
+    let fit = async |query: &str| {
+        let request = Request::post(format!("/calibrations/hall/fit{query}"));
+        service
+            .send(request.body(Body::from(&office[..])).unwrap())
+            .await
+    };
+    let answer = fit("").await;
+    assert_eq!(answer.status, 422);
+    let detail = answer.json()["detail"].to_string();
+    assert!(detail.contains("give the model of the lens"), "{detail}");
+    for (query, is_given) in [
+        ("?lens=equidistant", false),
+        ("?lens=equidistant&field_of_view_deg=180&ceiling=true", true),
+    ] {
+        let found = fit(query).await.json();
+        let lens = &found["calibration"]["lens"];
+        assert_eq!(lens["model"], "equidistant", "{found}");
+        let focal = lens["fx"].as_f64().or(lens["focal"].as_f64()).unwrap();
+        assert!((focal / 305.577 - 1.0).abs() < 0.01, "{found}");
+        let source = &found["calibration"]["sources"]["lens"]["source"];
+        assert_eq!(source == "given", is_given, "{found}");
+    }
+    let form = form_to(
+        "/calibrations/hall/fit",
+        &[("img", office), ("lens", b"equidistant")],
+    );
+    assert_eq!(service.send(form).await.status, 200);
+}
+
+#[tokio::test]
+async fn wrong_values_of_a_fit_are_named() {
+    let service = Service::start();
+    for (query, parameter, status) in [
+        ("profile=fast", "profile", 400),
+        ("lens=pinhole", "lens", 422),
+        ("field_of_view_deg=30", "field_of_view_deg", 422),
+        ("ceiling=maybe", "ceiling", 422),
+        ("lens=equidistant&lens=equisolid", "lens", 400),
+        ("img=frame.jpg", "img", 400),
+    ] {
+        let request = Request::post(format!("/calibrations/hall/fit?{query}"));
+        let answer = service
+            .send(request.body(Body::from(frame())).unwrap())
+            .await;
+        assert_eq!(answer.status, status, "{query}");
+        assert_eq!(answer.json()["parameter"], parameter);
+    }
 }

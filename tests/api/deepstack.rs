@@ -12,19 +12,15 @@ use tower::ServiceExt;
 
 use crate::{
     log::Log,
-    service::{Answer, Bounds, FRAME_SIDE, Service, form, frame, incompressible_frame, with_host},
+    service::{
+        Answer, Bounds, FRAME_SIDE, Service, form_to, frame, incompressible_frame, with_host,
+    },
 };
 
 const ANYWHERE: &str = "/v1/vision/detection";
 const LOBBY: &str = "/v1/vision/custom/lobby";
 const LIST: &str = "/v1/vision/custom/list";
 const KEY: &str = "lookdown_home_assistant";
-
-fn form_to(path: &str, parts: &[(&str, &[u8])]) -> Request<Body> {
-    let mut request = form(parts);
-    *request.uri_mut() = path.parse().unwrap();
-    request
-}
 
 async fn post(service: &Service, path: &str, parts: &[(&str, &[u8])]) -> Answer {
     service.send(form_to(path, parts)).await

@@ -369,6 +369,13 @@ pub(crate) fn form(parts: &[(&str, &[u8])]) -> Request<Body> {
         .unwrap()
 }
 
+/// The same form for another path.
+pub(crate) fn form_to(path: &str, parts: &[(&str, &[u8])]) -> Request<Body> {
+    let mut request = form(parts);
+    *request.uri_mut() = path.parse().unwrap();
+    request
+}
+
 /// A gray PNG that fits the calibration `lobby`.
 pub(crate) fn frame() -> Vec<u8> {
     frame_of(FRAME_SIDE, FRAME_SIDE)

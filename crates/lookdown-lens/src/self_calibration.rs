@@ -12,6 +12,7 @@ mod evaluation;
 mod evidence;
 mod fit;
 mod halves;
+mod known_camera;
 mod maxima;
 mod prior;
 mod refusal;
@@ -25,6 +26,7 @@ mod upright;
 
 pub use camera_height::{CameraHeight, HeightRefusal};
 pub use edge_curve::EdgeCurve;
-pub use fit::{CLEARLY_EXPLAINED, CircleGuess, KnownLens, RoomFit};
+pub use fit::{CLEARLY_EXPLAINED, CircleGuess, RoomFit};
+pub use known_camera::{FieldOfView, FieldOfViewError, IdealLens, KnownCamera};
 pub use refusal::FitRefusal;
 pub use uncertainty::FitUncertainty;

@@ -7,7 +7,7 @@ use lookdown_detect::imaging::{
     Frame,
     decode::{DecodeLimits, decode},
 };
-use lookdown_lens::{calibration::CalibrationId, self_calibration::KnownLens};
+use lookdown_lens::calibration::CalibrationId;
 use numpy::PyReadonlyArray3;
 use pyo3::prelude::*;
 
@@ -35,23 +35,24 @@ impl Image<'_> {
 /// Calibrates a camera from frames of one size. Returns the calibration and straightened views as a
 /// JPEG: above with an assumed lens, below with the found one.
 #[pyfunction]
-#[pyo3(signature = (images, id, height_m=None, field_of_view_deg=None))]
+#[pyo3(signature = (images, id, height_m=None, lens=None, field_of_view_deg=None, ceiling=false))]
 pub(crate) fn calibrate(
     py: Python<'_>,
     images: Vec<Image<'_>>,
     id: &str,
     height_m: Option<f64>,
+    lens: Option<&str>,
     field_of_view_deg: Option<f64>,
+    ceiling: bool,
 ) -> PyResult<(PyCalibration, Cow<'static, [u8]>)> {
     let id: CalibrationId = id
         .parse()
         .map_err(|error| python_error(format!("id: {error}")))?;
     let frames = images.iter().map(Image::frame);
     let frames = frames.collect::<PyResult<Vec<_>>>()?;
-    let known = KnownLens {
-        field_of_view: field_of_view_deg.map(f64::to_radians),
-        k1: None,
-    };
+    let field_of_view_deg = field_of_view_deg.map(|degrees| degrees.to_string());
+    let known = room_calibration::known_camera(lens, field_of_view_deg.as_deref(), ceiling);
+    let known = known.map_err(python_error)?;
     let found = py.detach(|| room_calibration::calibrate(&id, &frames, known, height_m));
     let found = found.map_err(python_error)?;
     let calibration = PyCalibration {

@@ -19,9 +19,9 @@ use lookdown_detect::{parameters::DetectParameters, pipeline::DetectJob};
 
 pub(in crate::api) use received_request::ReceivedRequest;
 
-use names::{is_parameter, unknown_parameter};
+use names::{frame_in_query, use_in_detection};
 
-pub(in crate::api) use form::FieldUse;
+pub(in crate::api) use {form::FieldUse, names::use_among};
 
 use crate::{
     access::Scope,
@@ -60,22 +60,34 @@ impl FromRequest<ApiState> for Upload {
     type Rejection = Problem;
 
     async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
+        Self::accept(request, state, use_in_detection).await
+    }
+}
+
+impl Upload {
+    /// Reads the frame and the parameters of a client that may detect. `use_of` classifies the
+    /// names of the form and of the query.
+    pub(in crate::api) async fn accept(
+        request: Request,
+        state: &ApiState,
+        use_of: fn(&str) -> Result<FieldUse, Problem>,
+    ) -> Result<Self, Problem> {
         let context = RequestContext::of(request.extensions())?;
         let access = &state.options.access;
         access.check(request.headers(), &context.identity, Scope::Detect)?;
         let uri = request.uri().clone();
-        let mut upload = Self::receive(request, state, &state.uploads, names::use_of).await?;
+        let mut upload = Self::receive(request, state, &state.uploads, use_of).await?;
         let mut parameters = query_parameters(&uri)?;
-        if let Some((name, _)) = parameters.iter().find(|(name, _)| !is_parameter(name)) {
-            return Err(unknown_parameter(name));
+        for (name, _) in &parameters {
+            if use_of(name)? != FieldUse::Parameter {
+                return Err(frame_in_query(name));
+            }
         }
         parameters.append(&mut upload.parameters);
         upload.parameters = parameters;
         Ok(upload)
     }
-}
 
-impl Upload {
     /// Returns the detection job with the parsed parameters.
     ///
     /// # Errors

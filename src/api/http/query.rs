@@ -28,8 +28,16 @@ pub(in crate::api) fn parameters_named<const COUNT: usize>(
     uri: &Uri,
     names: [&str; COUNT],
 ) -> Result<[Option<String>; COUNT], Problem> {
+    values_named(query_parameters(uri)?, names)
+}
+
+/// Returns the values of the named parameters, each at most once.
+pub(in crate::api) fn values_named<const COUNT: usize>(
+    parameters: Vec<(String, String)>,
+    names: [&str; COUNT],
+) -> Result<[Option<String>; COUNT], Problem> {
     let mut values = [const { None }; COUNT];
-    for (given, value) in query_parameters(uri)? {
+    for (given, value) in parameters {
         let Some(index) = names.iter().position(|name| *name == given) else {
             let known = names.join(", ");
             let problem = format!("there is no such parameter; the parameters are {known}");

@@ -1,8 +1,9 @@
 //! Texts, addresses, paths, choices, lists and secrets.
 
-use std::{net::SocketAddr, path::PathBuf};
+use std::{fmt::Display, net::SocketAddr, path::PathBuf, str::FromStr};
 
 use secrecy::SecretString;
+use strum::VariantNames;
 use toml::Value;
 use url::Url;
 
@@ -145,21 +146,36 @@ pub(in crate::settings) fn choice<T: Copy + PartialEq + 'static>(
     choices: &'static [(&'static str, T)],
 ) -> Form<T> {
     let names: Vec<_> = choices.iter().map(|(name, _)| *name).collect();
-    let remedy = format!("use one of {}", names.join(", "));
-    let kind: Vec<_> = names.iter().map(|name| format!("`{name}`")).collect();
-    parsed(
-        kind.join(" or "),
-        move |text| {
+    one_of(
+        &names,
+        |text| {
             let chosen = choices.iter().find(|(name, _)| *name == text);
-            chosen
-                .map(|(_, choice)| *choice)
-                .ok_or_else(|| Refusal::Shown(remedy.clone()))
+            chosen.map(|(_, choice)| *choice)
         },
         |value| {
             let mut choices = choices.iter();
             let name = choices.find_map(|(name, choice)| (choice == value).then_some(*name));
             name.unwrap_or_default().to_owned()
         },
+    )
+}
+
+/// One of the names of an enum.
+pub(in crate::settings) fn variant<T: FromStr + Display + VariantNames + 'static>() -> Form<T> {
+    one_of(T::VARIANTS, |text| text.parse().ok(), T::to_string)
+}
+
+fn one_of<T: 'static>(
+    names: &[&str],
+    read: impl Fn(&str) -> Option<T> + 'static,
+    write: impl Fn(&T) -> String + 'static,
+) -> Form<T> {
+    let remedy = format!("use one of {}", names.join(", "));
+    let kind: Vec<_> = names.iter().map(|name| format!("`{name}`")).collect();
+    parsed(
+        kind.join(" or "),
+        move |text| read(text).ok_or_else(|| Refusal::Shown(remedy.clone())),
+        write,
     )
 }
 

@@ -51,6 +51,20 @@ pageTest("the detected circle is drawn over the frame, and the views follow it",
   assert.ok(Math.abs(Number(await page.locator("output[for=calibrate-cx]").textContent()) - 480.1) < 1.5);
 });
 
+pageTest("the lens of a camera that looks straight down is found with its model", "#detect", async (page) => {
+  await start(page);
+  const found = page.locator("#find-progress");
+  await page.getByRole("button", { name: "Find the lens" }).click();
+  await found.getByText(/give the model of the lens/).waitFor();
+  await page.getByLabel("Known lens").selectOption("equidistant");
+  await straightenedAfter(page, () => page.getByRole("button", { name: "Find the lens" }).click());
+  await page.locator("#found-values").getByText(/18\d\.\d°, radius ± 0\.\d\d %/).waitFor();
+  await page.getByLabel("Name", { exact: true }).fill("level");
+  await page.getByRole("button", { name: "Save", exact: true }).click();
+  await page.getByText("level is saved and in use.").waitFor();
+  assert.equal((await stored("level")).lens.model, "equidistant");
+});
+
 pageTest("a saved lens with a height is used at once and shows the floor", "#detect", async (page) => {
   await start(page);
   await page.getByLabel("Height, meters").fill("2.9");

@@ -33,6 +33,16 @@ for corners in detections.corners():
     cv2.polylines(frame, [corners.round().astype(np.int32)], isClosed=True, color=(0, 200, 255), thickness=2)
 cv2.imwrite("persons.png", frame)
 
+# %% Calibrate: a camera that looks straight down needs its lens.
+found, preview = lookdown.calibrate(samples / "office.jpg", lens="equidistant", height_m=2.9)
+assert abs(found.lens.project(np.array([[0.0, 1.0, 1.0]]))[0, 1] - 719.5) < 10, found.lens
+assert preview.startswith(b"\xff\xd8")
+for wrong in ({"lens": "pinhole"}, {"field_of_view_deg": 20.0}):
+    try:
+        lookdown.calibrate(samples / "office.jpg", **wrong)
+    except lookdown.LookdownError as error:
+        assert next(iter(wrong)) in str(error)
+
 # %% Other libraries: COCO results, and supervision.
 print(detections.to_coco(image_id=1)[0])
 assert len(detections.to_supervision()) == len(detections)

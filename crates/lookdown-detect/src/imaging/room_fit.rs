@@ -1,7 +1,7 @@
 //! A camera from its own frames: lens circle and edges, then the fit of [`RoomFit`].
 
 use lookdown_lens::self_calibration::{
-    CLEARLY_EXPLAINED, CircleGuess, EdgeCurve, FitRefusal, KnownLens, RoomFit,
+    CLEARLY_EXPLAINED, CircleGuess, EdgeCurve, FitRefusal, KnownCamera, RoomFit,
 };
 
 use super::{
@@ -73,7 +73,7 @@ impl RoomFrame {
 ///
 /// # Errors
 /// [`FitRefusal`] when the edges do not determine the camera.
-pub fn fit_room(frames: &[RoomFrame], known: KnownLens) -> Result<RoomFit, FitRefusal> {
+pub fn fit_room(frames: &[RoomFrame], known: KnownCamera) -> Result<RoomFit, FitRefusal> {
     let Some(first) = frames.first() else {
         return Err(FitRefusal::TooFewEdges { edges: 0 });
     };

@@ -5,6 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 use super::{
     edge_curve::EdgeCurve,
     halves::{halves, spread, widened},
+    known_camera::{IdealLens, KnownCamera},
     maxima::{Maximum, fine_maxima, maxima},
     prior::Prior,
     refusal::FitRefusal,
@@ -26,7 +27,7 @@ const MIN_ALONG: f64 = 10.0;
 const MIN_SHARES: f64 = 0.45;
 /// Least share along any of them in a cluttered room, where most edges follow none: things of all
 /// shapes do not make the edges of the walls less exact.
-const CLUTTERED_SHARES: f64 = 0.25;
+const CLUTTERED_SHARES: f64 = 0.28;
 /// A second maximum with so much less evidence is within reach.
 const RIVAL_EVIDENCE: f64 = 12.0;
 /// Difference of two maxima that matters: share of the radius, and radians of the level.
@@ -55,16 +56,6 @@ pub struct CircleGuess {
     pub radius: f64,
     /// Standard deviation of the optical center from it, pixels.
     pub center_sigma: f64,
-}
-
-/// Values that are kept.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct KnownLens {
-    /// Field of view of the circle, radians.
-    pub field_of_view: Option<f64>,
-    /// First coefficient of an ideal lens: 0 equidistant, -1/24 equisolid, 1/12 stereographic, -1/6
-    /// orthographic.
-    pub k1: Option<f64>,
 }
 
 /// A camera from the edges of a room.
@@ -97,7 +88,7 @@ impl RoomFit {
     pub fn of(
         frames: &[Vec<EdgeCurve>],
         circles: &[CircleGuess],
-        known: KnownLens,
+        known: KnownCamera,
     ) -> Result<Self, FitRefusal> {
         let all = frames.concat();
         let curves = all.as_slice();
@@ -108,7 +99,6 @@ impl RoomFit {
         // Frames of one camera show the same edges, so they are not independent evidence.
         #[expect(clippy::cast_precision_loss, reason = "a few frames")]
         let weight = 1.0 / frames.len() as f64;
-        let rim = known.field_of_view.map(|field| field / 2.0);
         let mut best: Option<(Vec<Maximum>, Prior)> = None;
         let mut others: Vec<Maximum> = Vec::new();
         for circle in circles {
@@ -120,7 +110,7 @@ impl RoomFit {
                     let starts = maxima.iter().map(|maximum| maximum.camera.clone());
                     fine_maxima(starts, curves, weight, &prior)
                 }
-                None => maxima(curves, weight, &prior, rim, known.k1),
+                None => maxima(curves, weight, &prior, known),
             };
             if best.is_some() {
                 for maximum in &mut found {
@@ -156,15 +146,17 @@ fn is_ordered(maxima: &[Maximum]) -> bool {
     })
 }
 
-pub(super) fn prior(circle: &CircleGuess, known: KnownLens) -> Prior {
-    let half = known.field_of_view.map(|field| (field / 2.0, 1e-3));
+pub(super) fn prior(circle: &CircleGuess, known: KnownCamera) -> Prior {
+    let k1 = known.lens.map(IdealLens::k1);
+    let rim = known.field_of_view.map(|field| (field.max_theta(), 1e-3));
     Prior {
         center: circle.center,
         center_sigma: circle.center_sigma,
         radius: circle.radius,
-        k1: known.k1.map_or((-0.03, 0.15), |k1| (k1, 1e-4)),
-        k2_sigma: if known.k1.is_some() { 1e-5 } else { K2_SIGMA },
-        rim: half.unwrap_or((FRAC_PI_2, 0.22)),
+        k1: k1.map_or((-0.03, 0.15), |k1| (k1, 1e-4)),
+        k2_sigma: if k1.is_some() { 1e-5 } else { K2_SIGMA },
+        rim: rim.unwrap_or((FRAC_PI_2, 0.22)),
+        is_on_ceiling: known.is_on_ceiling,
     }
 }
 

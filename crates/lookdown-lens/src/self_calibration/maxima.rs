@@ -5,6 +5,7 @@ use super::{
     climb::{climb, stepped},
     edge_curve::EdgeCurve,
     evaluation::Evaluation,
+    known_camera::KnownCamera,
     prior::Prior,
     search,
     uncertainty::{curvature, distance, radius_step},
@@ -46,21 +47,19 @@ impl Maximum {
     }
 }
 
-/// The best maxima, best first, each different from the others, with the known angle at the circle,
-/// radians, and the known first coefficient of the lens.
+/// The best maxima, best first, each different from the others.
 pub(super) fn maxima(
     curves: &[EdgeCurve],
     weight: f64,
     prior: &Prior,
-    rim: Option<f64>,
-    k1: Option<f64>,
+    known: KnownCamera,
 ) -> Vec<Maximum> {
     let mut longest = curves.to_vec();
     longest.sort_by_key(|segment| std::cmp::Reverse(segment.points.len()));
     longest.truncate(COARSE_CURVES);
     let weights = vec![weight; curves.len()];
     let mut coarse: Vec<Maximum> = Vec::new();
-    for start in search::starts(&longest, prior, rim, k1) {
+    for start in search::starts(&longest, prior, known) {
         let mut found = None;
         let mut camera = start;
         for (blur, steps) in [(6.0, 5), (3.0, 5), (1.5, 6)] {
@@ -111,7 +110,7 @@ pub(super) fn fine_maxima(
     add_stretched(&mut fine, curves, &weights, prior);
     for maximum in &mut fine {
         (maximum.camera, maximum.is_upright) =
-            upright(&maximum.camera, curves, &maximum.evaluation, prior.radius);
+            upright(&maximum.camera, curves, &maximum.evaluation, prior);
     }
     fine
 }

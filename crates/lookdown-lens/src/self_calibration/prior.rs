@@ -20,6 +20,8 @@ pub(super) struct Prior {
     pub k2_sigma: f64,
     /// Angle at the radius and its standard deviation, radians.
     pub rim: (f64, f64),
+    /// True for a camera on a ceiling. If false, it may be on a wall.
+    pub is_on_ceiling: bool,
 }
 
 impl Prior {

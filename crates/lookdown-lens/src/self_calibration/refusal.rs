@@ -28,8 +28,8 @@ pub enum FitRefusal {
     MissingDirection,
     /// A camera on a wall that looks horizontally, or down into the room.
     #[error(
-        "two directions of the room may be the vertical, as for a camera that looks horizontally from a wall: calibrate \
-         cameras on walls with a chessboard"
+        "two directions of the room may be the vertical, as for a camera that looks horizontally from a wall: say that it \
+         is on a ceiling if it is, and calibrate cameras on walls with a chessboard"
     )]
     VerticalUnclear,
     /// Two cameras explain the edges equally well.

@@ -7,6 +7,7 @@ use nalgebra::{Matrix3, Rotation3};
 use super::{
     camera::{Angles, RoomCamera, ideal_shape},
     edge_curve::EdgeCurve,
+    known_camera::KnownCamera,
     prior::Prior,
     triples::Triples,
 };
@@ -33,16 +34,15 @@ struct Plane {
 }
 
 /// Returns starts in the order of their scores, best first, one or two per lens.
-pub(super) fn starts(
-    curves: &[EdgeCurve],
-    prior: &Prior,
-    known_rim: Option<f64>,
-    known_k1: Option<f64>,
-) -> Vec<RoomCamera> {
+pub(super) fn starts(curves: &[EdgeCurve], prior: &Prior, known: KnownCamera) -> Vec<RoomCamera> {
     let triples = Triples::new();
     let mut starts: Vec<(RoomCamera, f64)> = Vec::new();
-    let shapes = known_k1.map_or(SHAPES.to_vec(), |k1| vec![k1]);
-    let rims = known_rim.map_or(RIMS.map(f64::to_radians).to_vec(), |rim| vec![rim]);
+    let shapes = known.lens.map_or(SHAPES.to_vec(), |lens| vec![lens.k1()]);
+    let rims = known
+        .field_of_view
+        .map_or(RIMS.map(f64::to_radians).to_vec(), |field| {
+            vec![field.max_theta()]
+        });
     for k1 in shapes {
         for &rim in &rims {
             let shape = ideal_shape(k1);

@@ -1,9 +1,11 @@
 //! Fits of cameras to drawn edges of a room.
 
+mod vertical;
+
 use nalgebra::{Rotation3, Vector3};
 
 use super::{
-    CircleGuess, EdgeCurve, FitRefusal, KnownLens, RoomFit,
+    CircleGuess, EdgeCurve, FieldOfView, FitRefusal, IdealLens, KnownCamera, RoomFit,
     camera::{Angles, RoomCamera},
     climb::stepped,
     evaluation::{PARAMETERS, Parameters},
@@ -75,10 +77,17 @@ fn circle() -> CircleGuess {
     }
 }
 
+fn equisolid() -> KnownCamera {
+    KnownCamera {
+        lens: Some(IdealLens::Equisolid),
+        ..KnownCamera::default()
+    }
+}
+
 #[test]
 fn tilted_equisolid_camera_is_found() {
     let room = Rotation3::from_euler_angles(0.14, -0.09, 0.4);
-    let fit = RoomFit::of(&[edges(&room)], &[circle()], KnownLens::default()).unwrap();
+    let fit = RoomFit::of(&[edges(&room)], &[circle()], KnownCamera::default()).unwrap();
     let level = fit.directions[0].angle(&(room * Ray::z())).to_degrees();
     assert!(level < 0.2, "{level}° off level");
     let off = (fit.center[0] - CENTER[0]).hypot(fit.center[1] - CENTER[1]);
@@ -95,13 +104,13 @@ fn tilted_equisolid_camera_is_found() {
 #[test]
 fn given_field_of_view_is_kept() {
     let room = Rotation3::from_euler_angles(0.1, 0.05, 0.2);
-    let known = KnownLens {
-        field_of_view: Some(3.1),
-        k1: Some(-1.0 / 24.0),
+    let known = KnownCamera {
+        field_of_view: Some(FieldOfView::of_degrees(177.6).unwrap()),
+        ..equisolid()
     };
     let fit = RoomFit::of(&[edges(&room)], &[circle()], known).unwrap();
     assert!(
-        (2.0 * fit.max_theta - 3.1).abs() < 0.01,
+        (2.0 * fit.max_theta.to_degrees() - 177.6).abs() < 0.6,
         "{}",
         fit.max_theta
     );
@@ -114,7 +123,7 @@ fn few_edges_are_refused() {
     let refusal = RoomFit::of(
         std::slice::from_ref(&few),
         &[circle()],
-        KnownLens::default(),
+        KnownCamera::default(),
     );
     assert_eq!(refusal, Err(FitRefusal::TooFewEdges { edges: few.len() }));
 }
@@ -148,7 +157,7 @@ fn clutter(count: usize) -> Vec<EdgeCurve> {
 #[test]
 fn edges_without_order_are_refused() {
     for count in [200, 1500] {
-        let fit = RoomFit::of(&[clutter(count)], &[circle()], KnownLens::default());
+        let fit = RoomFit::of(&[clutter(count)], &[circle()], KnownCamera::default());
         assert!(
             matches!(fit, Err(FitRefusal::NoDirections { .. })),
             "{count} edges: {fit:?}"
@@ -160,7 +169,7 @@ fn edges_without_order_are_refused() {
 fn room_with_more_clutter_than_walls_is_fitted() {
     let room = Rotation3::from_euler_angles(0.14, -0.09, 0.4);
     let all = [edges(&room), clutter(700)].concat();
-    let fit = RoomFit::of(&[all], &[circle()], KnownLens::default()).unwrap();
+    let fit = RoomFit::of(&[all], &[circle()], KnownCamera::default()).unwrap();
     assert!(fit.explained < 0.45, "{}", fit.explained);
     let level = fit.directions[0].angle(&(room * Ray::z())).to_degrees();
     assert!(level < 0.2, "{level}° off level");
@@ -170,7 +179,7 @@ fn room_with_more_clutter_than_walls_is_fitted() {
 fn clutter_makes_the_lens_less_certain() {
     let room = Rotation3::from_euler_angles(0.14, -0.09, 0.4);
     let uncertainty = |edges: Vec<EdgeCurve>| {
-        let fit = RoomFit::of(&[edges], &[circle()], KnownLens::default()).unwrap();
+        let fit = RoomFit::of(&[edges], &[circle()], KnownCamera::default()).unwrap();
         fit.uncertainty.radius
     };
     let clear = uncertainty(edges(&room));
@@ -186,7 +195,7 @@ fn edges_of_a_coarser_raster_are_less_certain() {
         for edge in &mut edges {
             edge.scale = scale;
         }
-        RoomFit::of(&[edges], &[circle()], KnownLens::default()).unwrap()
+        RoomFit::of(&[edges], &[circle()], KnownCamera::default()).unwrap()
     };
     let [fine, coarse] = [1.0, 4.0].map(|scale| fit(scale).uncertainty.level_deg);
     assert!(coarse > 1.5 * fine, "{coarse}°, in the finest {fine}°");
@@ -196,65 +205,12 @@ fn edges_of_a_coarser_raster_are_less_certain() {
 fn many_exact_edges_leave_the_uncertainty_of_the_lens() {
     let room = Rotation3::from_euler_angles(0.14, -0.09, 0.4);
     let many = vec![edges(&room); 15].concat();
-    let fit = RoomFit::of(&[many], &[circle()], KnownLens::default()).unwrap();
+    let fit = RoomFit::of(&[many], &[circle()], KnownCamera::default()).unwrap();
     assert!(
         (0.003..0.004).contains(&fit.uncertainty.radius),
         "{}",
         fit.uncertainty.radius
     );
-}
-
-#[test]
-fn camera_tilted_by_53_degrees_is_upright() {
-    let room = Rotation3::from_euler_angles(0.92, 0.0, 0.0);
-    let all = vec![edges(&room); 2].concat();
-    let fit = RoomFit::of(&[all], &[circle()], KnownLens::default()).unwrap();
-    let level = fit.directions[0].angle(&(room * Ray::z())).to_degrees();
-    assert!(level < 0.5, "{level}° off level");
-}
-
-#[test]
-fn vertical_of_a_tilted_camera_needs_many_edges() {
-    let room = Rotation3::from_euler_angles(0.92, 0.0, 0.0);
-    // Few edges are above the horizon of another direction, so that it may be the vertical.
-    let mut above = 0;
-    let mut few = edges(&room);
-    few.retain(|curve| {
-        let middle = ray(curve.points[curve.points.len() / 2]);
-        let is_above = middle.dot(&(room * Ray::y())) < -0.15;
-        above += usize::from(is_above);
-        !is_above || above % 5 == 0
-    });
-    let fit = |copies: usize| {
-        let edges = vec![few.clone(); copies].concat();
-        RoomFit::of(&[edges], &[circle()], KnownLens::default())
-    };
-    assert_eq!(fit(3), Err(FitRefusal::VerticalUnclear));
-    let many = fit(20).unwrap();
-    let level = many.directions[0].angle(&(room * Ray::z())).to_degrees();
-    assert!(level < 0.5, "{level}° off level");
-}
-
-#[test]
-fn camera_on_a_wall_has_no_clear_vertical() {
-    let room = Rotation3::from_euler_angles(-0.92, 0.0, 0.0);
-    let away = room * -Ray::y();
-    let is_before = |point: &[f64; 2]| ray(*point).dot(&away) > 0.1;
-    let mut before = edges(&room);
-    before.retain(|curve| curve.points.iter().all(is_before));
-    let all = vec![before; 4].concat();
-    let fit = RoomFit::of(&[all], &[circle()], KnownLens::default());
-    assert_eq!(fit, Err(FitRefusal::VerticalUnclear));
-}
-
-#[test]
-fn camera_that_looks_horizontally_is_refused() {
-    // Toward a wall of the room, with the floor at the bottom of the image and no edges above.
-    let room = Rotation3::from_euler_angles(-1.55, 0.0, 0.0);
-    let mut below = vec![edges(&room); 3].concat();
-    below.retain(|curve| curve.points.iter().all(|[_, y]| *y > CENTER[1] + 20.0));
-    let fit = RoomFit::of(&[below], &[circle()], KnownLens::default());
-    assert_eq!(fit, Err(FitRefusal::VerticalUnclear));
 }
 
 #[test]
@@ -287,7 +243,7 @@ fn few_verticals_among_many_other_edges_are_enough() {
     let vertical: Vec<EdgeCurve> = vertical.into_iter().map(|(_, curve)| curve).collect();
     let other: Vec<EdgeCurve> = other.into_iter().map(|(_, curve)| curve).collect();
     let all = [vertical, vec![other; 60].concat()].concat();
-    let fit = RoomFit::of(&[all], &[circle()], KnownLens::default()).unwrap();
+    let fit = RoomFit::of(&[all], &[circle()], KnownCamera::default()).unwrap();
     let level = fit.directions[0].angle(&(room * Ray::z())).to_degrees();
     assert!(level < 0.3, "{level}° off level");
 }
@@ -295,10 +251,6 @@ fn few_verticals_among_many_other_edges_are_enough() {
 #[test]
 fn camera_of_another_circle_is_a_rival() {
     let room = Rotation3::from_euler_angles(0.0, 0.0, 0.4);
-    let known = KnownLens {
-        field_of_view: None,
-        k1: Some(-1.0 / 24.0),
-    };
     let [cx, cy] = CENTER;
     let guess = |center: [f64; 2]| CircleGuess {
         center,
@@ -309,8 +261,8 @@ fn camera_of_another_circle_is_a_rival() {
     // Both circles are equally wrong: the edges are symmetric about the true center.
     let turned = room * Rotation3::from_euler_angles(0.0, 0.0, std::f64::consts::PI);
     let all = [edges(&room), edges(&turned)].concat();
-    let alone = RoomFit::of(std::slice::from_ref(&all), &[above], known);
-    let both = RoomFit::of(&[all], &[above, below], known);
+    let alone = RoomFit::of(std::slice::from_ref(&all), &[above], equisolid());
+    let both = RoomFit::of(&[all], &[above, below], equisolid());
     assert!(alone.is_ok(), "{alone:?}");
     assert!(matches!(both, Err(FitRefusal::Ambiguous { .. })));
 }
@@ -319,7 +271,7 @@ fn camera_of_another_circle_is_a_rival() {
 fn right_side_is_the_slope_of_the_evidence() {
     let curves = edges(&Rotation3::from_euler_angles(0.14, -0.09, 0.4));
     let weights = vec![1.0; curves.len()];
-    let prior = prior(&circle(), KnownLens::default());
+    let prior = prior(&circle(), KnownCamera::default());
     let camera = RoomCamera {
         focal: FOCAL * 1.01,
         k1: -0.04,
@@ -358,7 +310,7 @@ fn halves_of_the_image_with_two_lenses_are_refused() {
             *y = CENTER[1] + factor * (*y - CENTER[1]);
         }
     }
-    let fit = RoomFit::of(&[both], &[circle()], KnownLens::default());
+    let fit = RoomFit::of(&[both], &[circle()], KnownCamera::default());
     let is_refused = matches!(
         fit,
         Err(FitRefusal::HalvesDisagree { .. } | FitRefusal::Uncertain { .. })

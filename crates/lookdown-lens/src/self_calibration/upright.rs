@@ -6,6 +6,7 @@ use super::{
     camera::{Angles, RoomCamera},
     edge_curve::EdgeCurve,
     evaluation::Evaluation,
+    prior::Prior,
 };
 use crate::geometry::Ray;
 
@@ -31,7 +32,7 @@ pub(super) fn upright(
     camera: &RoomCamera,
     curves: &[EdgeCurve],
     evaluation: &Evaluation,
-    radius: f64,
+    prior: &Prior,
 ) -> (RoomCamera, bool) {
     let directions = camera.directions();
     let signed = directions
@@ -40,19 +41,20 @@ pub(super) fn upright(
     let (candidates, beside): (Vec<Ray>, Vec<Ray>) = signed
         .filter(|direction| direction.z > -MAX_TILT.to_radians().cos())
         .partition(|direction| direction.angle(&Ray::z()) < MAX_TILT.to_radians());
-    let Some(angles) = Angles::of(camera, radius) else {
+    let Some(angles) = Angles::of(camera, prior.radius) else {
         return (camera.clone(), true);
     };
     let above = |direction: &Ray| share_above(direction, camera, &angles, curves, evaluation);
-    let may_be_on_wall = beside.iter().any(|direction| {
-        let is_upright = direction.y.abs() > MIN_UPRIGHT;
-        let most = if is_upright {
-            MAX_PLAIN_UPRIGHT
-        } else {
-            MAX_PLAIN
-        };
-        above(direction) < most
-    });
+    let may_be_on_wall = !prior.is_on_ceiling
+        && beside.iter().any(|direction| {
+            let is_upright = direction.y.abs() > MIN_UPRIGHT;
+            let most = if is_upright {
+                MAX_PLAIN_UPRIGHT
+            } else {
+                MAX_PLAIN
+            };
+            above(direction) < most
+        });
     let mut order: Vec<(Ray, f64)> = candidates.iter().map(|ray| (*ray, above(ray))).collect();
     order.sort_by(|a, b| a.1.total_cmp(&b.1));
     let (down, second) = match order[..] {

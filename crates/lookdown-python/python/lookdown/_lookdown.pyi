@@ -89,7 +89,9 @@ def calibrate(
     images: list[bytes | npt.NDArray[np.uint8]],
     id: str,
     height_m: float | None = None,
+    lens: str | None = None,
     field_of_view_deg: float | None = None,
+    ceiling: bool = False,
 ) -> tuple[Calibration, bytes]:
     """Calibrates a camera from frames of one size. Returns straightened views as a JPEG, too."""
 

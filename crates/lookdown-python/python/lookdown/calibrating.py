@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +11,7 @@ from lookdown import _lookdown
 from lookdown._lookdown import Calibration
 from lookdown.pixels import ChannelOrder, rgb
 
+LensModel = Literal["equidistant", "equisolid", "stereographic", "orthographic"]
 Image = str | os.PathLike[str] | bytes | npt.NDArray[Any]
 
 
@@ -26,18 +27,21 @@ def calibrate(
     *,
     id: str = "camera",
     height_m: float | None = None,
+    lens: LensModel | None = None,
     field_of_view_deg: float | None = None,
+    ceiling: bool = False,
     channel_order: ChannelOrder = "RGB",
 ) -> tuple[Calibration, Preview]:
     """Finds lens, center and tilt of a ceiling camera from the straight edges of the room in its frames.
 
     An image is a file, its content, or pixels of shape (height, width, 3), which are RGB unless `channel_order="BGR"` is
-    given; all have one size. Known values are kept. `Calibration.to_json()` is the file to store, with the standard
+    given; all have one size. Known values are kept. Cameras that look straight down need `lens`. With `ceiling`, a camera
+    is on a ceiling even if one wall fills the image. `Calibration.to_json()` is the file to store, with the standard
     deviations in `sources`. Raises `LookdownError` with the reason if the frames do not determine the camera.
     """
     given = [images] if isinstance(images, str | os.PathLike | bytes | np.ndarray) else images
     contents = [_content(image, channel_order) for image in given]
-    calibration, preview = _lookdown.calibrate(contents, id, height_m, field_of_view_deg)
+    calibration, preview = _lookdown.calibrate(contents, id, height_m, lens, field_of_view_deg, ceiling)
     return calibration, Preview(preview)
 
 

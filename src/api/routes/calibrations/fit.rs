@@ -1,6 +1,10 @@
 //! The fit of a camera to the straight edges of its frame.
 
-use axum::{Json, extract::State, response::IntoResponse};
+use axum::{
+    Json,
+    extract::{FromRequest, Request, State},
+    response::IntoResponse,
+};
 use lookdown_detect::imaging::{
     decode::{DecodeLimits, decode},
     room_fit::{RoomFrame, fit_room},
@@ -10,22 +14,74 @@ use lookdown_lens::{
         CalibrationId,
         native::{NativeCalibration, NativeImage},
     },
-    self_calibration::KnownLens,
+    self_calibration::KnownCamera,
 };
 use serde::Serialize;
-use utoipa::ToSchema;
+use utoipa::{IntoParams, ToSchema};
 
 use super::address::NewCalibrationAddress;
 use crate::{
     api::{
         ApiState,
-        detect::upload::Upload,
-        http::problem::{Problem, ProblemKind},
+        detect::upload::{Upload, use_among},
+        http::{
+            problem::{Problem, ProblemKind},
+            query::values_named,
+        },
         openapi::RawBytes,
         routes::found_lens::FoundLens,
     },
-    room_calibration::room_calibration,
+    room_calibration::{
+        known::{FIELD_OF_VIEW_DEG, LENS, parsed},
+        known_camera, room_calibration,
+    },
 };
+
+const CEILING: &str = "ceiling";
+const NAMES: [&str; 3] = [LENS, FIELD_OF_VIEW_DEG, CEILING];
+
+/// The known values of the camera, from its data sheet.
+#[derive(IntoParams)]
+#[into_params(parameter_in = Query)]
+#[expect(
+    dead_code,
+    reason = "documents the parameters that `known_camera` parses"
+)]
+struct KnownCameraQuery {
+    /// The projection of the lens. Cameras that look straight down need it. Most ceiling cameras
+    /// are `equidistant`.
+    #[param(pattern = "^(equidistant|equisolid|stereographic|orthographic)$")]
+    lens: Option<String>,
+    /// The field of view of the lens circle, degrees.
+    #[param(minimum = 60, maximum = 300)]
+    field_of_view_deg: Option<f64>,
+    /// `true`: the camera is on a ceiling, even if one wall fills the image. Otherwise, a camera
+    /// that may be on a wall is refused.
+    ceiling: Option<bool>,
+}
+
+/// A frame, and what is known of its camera.
+pub(in crate::api) struct FitRequest {
+    upload: Upload,
+    known: KnownCamera,
+}
+
+impl FromRequest<ApiState> for FitRequest {
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
+        let mut upload = Upload::accept(request, state, |name| use_among(&NAMES, name)).await?;
+        let [lens, field_of_view, ceiling] =
+            values_named(std::mem::take(&mut upload.parameters), NAMES)?;
+        let is_on_ceiling = parsed(CEILING, ceiling.as_deref(), "true or false")?;
+        let known = known_camera(
+            lens.as_deref(),
+            field_of_view.as_deref(),
+            is_on_ceiling.unwrap_or_default(),
+        )?;
+        Ok(Self { upload, known })
+    }
+}
 
 /// A fitted camera.
 #[derive(Serialize, ToSchema)]
@@ -41,11 +97,12 @@ pub(in crate::api) struct FittedCamera {
 /// Find the lens
 ///
 /// Fits lens, center and level to the straight edges of a frame of the camera, or says why the
-/// frame does not determine them. Nothing is stored.
+/// frame does not determine them. Known values are kept. Nothing is stored.
 #[utoipa::path(
     post, path = "/calibrations/{id}/fit", tag = "calibrations", operation_id = "fit_calibration",
     params(
         ("id" = String, Path, pattern = "^[a-z0-9][a-z0-9_-]{0,63}$", description = "The ID of the new calibration."),
+        KnownCameraQuery,
     ),
     request_body(
         description = "A frame: JPEG, PNG or WebP, with the lights on.",
@@ -57,20 +114,12 @@ pub(in crate::api) struct FittedCamera {
 pub(in crate::api) async fn fit(
     State(state): State<ApiState>,
     NewCalibrationAddress(id): NewCalibrationAddress,
-    upload: Upload,
+    FitRequest { upload, known }: FitRequest,
 ) -> Result<impl IntoResponse, Problem> {
-    if let Some((name, _)) = upload.parameters.first() {
-        let fault = "it has no effect here: remove it";
-        return Err(Problem::of_parameter(
-            ProblemKind::InvalidParameter,
-            name,
-            fault,
-        ));
-    }
     let (image, deadline) = (upload.image, upload.context.deadline);
     let limits = state.workers.engine().options().decode_limits;
     let fitting = state.workers.run(upload.caller.ticket(), move |_| {
-        fitted(&limits, &id, &image)
+        fitted(&limits, &id, &image, known)
     });
     let remedy = "send fewer requests at a time, use a smaller frame";
     let fitted = deadline.wait("no fit", remedy, fitting).await?;
@@ -82,6 +131,7 @@ fn fitted(
     limits: &DecodeLimits,
     id: &CalibrationId,
     image: &[u8],
+    known: KnownCamera,
 ) -> Result<FittedCamera, Problem> {
     let refused =
         |fault: String| Problem::of_parameter(ProblemKind::InvalidParameter, "image", &fault);
@@ -91,10 +141,10 @@ fn fitted(
         width: frame.width(),
         height: frame.height(),
     };
-    let fit = fit_room(&[RoomFrame::of(&frame)], KnownLens::default());
+    let fit = fit_room(&[RoomFrame::of(&frame)], known);
     let fit = fit.map_err(|error| refused(error.to_string()))?;
     Ok(FittedCamera {
-        calibration: room_calibration(id, size, &fit),
+        calibration: room_calibration(id, size, &fit, known),
         lens: FoundLens::from(&fit),
     })
 }

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 
 use anyhow::Context;
-use clap::ValueEnum;
 use lookdown_detect::imaging::{
     Frame,
     lens_circle::{AgreedCircle, agreed_circle, find_lens_circle},
@@ -11,13 +10,15 @@ use lookdown_detect::imaging::{
 use lookdown_lens::{
     calibration::native::{NativeCalibration, NativeImage, NativeMount, NativeSource, ValueSource},
     geometry::{Lens, Ray},
+    self_calibration::{FieldOfView, IdealLens},
 };
 
-use super::arguments::{Arguments, IdealLens, thousandths};
+use super::arguments::Arguments;
+use crate::rounding::meters as thousandths;
 
-/// The lens and the field of view in degrees of most ceiling cameras.
+/// The lens and the field of view of most ceiling cameras.
 const LENS: IdealLens = IdealLens::Equidistant;
-const FIELD_OF_VIEW: f64 = 180.0;
+const FIELD_OF_VIEW: FieldOfView = FieldOfView::HEMISPHERE;
 
 /// Fits the circle and reports its accuracy.
 pub(super) fn fit(
@@ -77,14 +78,8 @@ fn calibration(
     image: NativeImage,
     agreed: &AgreedCircle,
 ) -> anyhow::Result<NativeCalibration> {
-    let max_theta = (arguments
-        .field_of_view
-        .unwrap_or(FIELD_OF_VIEW)
-        .to_radians()
-        / 2.0
-        * 1e6)
-        .floor()
-        / 1e6;
+    let field_of_view = arguments.field_of_view.unwrap_or(FIELD_OF_VIEW);
+    let max_theta = (field_of_view.max_theta() * 1e6).floor() / 1e6;
     let circle = agreed.circle;
     let (cx, cy) = (thousandths(circle.cx), thousandths(circle.cy));
     let lens = |focal: f64| {
@@ -135,11 +130,7 @@ fn verdict(arguments: &Arguments, agreed: &AgreedCircle) -> String {
         circle.cx + 0.5,
         circle.cy + 0.5,
         circle.radius,
-        arguments
-            .lens
-            .unwrap_or(LENS)
-            .to_possible_value()
-            .map_or_else(String::new, |value| value.get_name().to_owned()),
-        arguments.field_of_view.unwrap_or(FIELD_OF_VIEW),
+        arguments.lens.unwrap_or(LENS),
+        arguments.field_of_view.unwrap_or(FIELD_OF_VIEW).degrees(),
     )
 }

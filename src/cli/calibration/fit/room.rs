@@ -9,13 +9,11 @@ use lookdown_detect::imaging::{
 };
 use lookdown_lens::{
     calibration::native::{NativeCalibration, NativeImage, NativeSource},
-    self_calibration::{KnownLens, RoomFit},
+    self_calibration::{KnownCamera, RoomFit},
 };
 
-use super::arguments::{Arguments, IdealLens, thousandths};
-use crate::room_calibration::{
-    GIVEN, checked, give_height, max_theta, preview, room_calibration, tilt_deg,
-};
+use super::arguments::Arguments;
+use crate::room_calibration::{checked, give_height, preview, room_calibration, tilt_deg};
 
 /// Fits the camera and reports its values.
 pub(super) fn fit(
@@ -23,22 +21,16 @@ pub(super) fn fit(
     image: NativeImage,
     frames: &[Frame],
 ) -> anyhow::Result<NativeCalibration> {
-    let known = KnownLens {
-        field_of_view: arguments.field_of_view.map(f64::to_radians),
-        k1: arguments.lens.map(IdealLens::k1),
+    let known = KnownCamera {
+        lens: arguments.lens,
+        field_of_view: arguments.field_of_view,
+        is_on_ceiling: arguments.ceiling,
     };
     let edges: Vec<_> = frames.iter().map(RoomFrame::of).collect();
     let fit = fit_room(&edges, known).context(
         "the camera cannot be fitted; --circle-only detects the lens circle and assumes the rest",
     )?;
-    let mut calibration = room_calibration(&arguments.id, image, &fit);
-    if let Some(model) = arguments.lens {
-        let [cx, cy] = fit.center.map(thousandths);
-        calibration.lens = model.with(thousandths(fit.focal), cx, cy, max_theta(&fit));
-    }
-    if arguments.lens.is_some() && arguments.field_of_view.is_some() {
-        calibration.sources.insert("lens".to_owned(), GIVEN);
-    }
+    let mut calibration = room_calibration(&arguments.id, image, &fit, known);
     if let Some(height) = arguments.height {
         give_height(&mut calibration, height);
     }

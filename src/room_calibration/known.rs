@@ -1,0 +1,45 @@
+//! The parameters that say what is known of a camera before a fit.
+
+use std::str::FromStr;
+
+use lookdown_detect::parameters::ParameterError;
+use lookdown_lens::self_calibration::{IdealLens, KnownCamera};
+use strum::VariantNames;
+
+/// The parameter of the projection of the lens.
+pub(crate) const LENS: &str = "lens";
+/// The parameter of the field of view of the lens circle.
+pub(crate) const FIELD_OF_VIEW_DEG: &str = "field_of_view_deg";
+
+/// Parses what is known of a camera: the name of an ideal lens and a field of view in degrees.
+///
+/// # Errors
+/// [`ParameterError`] with the accepted values.
+pub fn known_camera(
+    lens: Option<&str>,
+    field_of_view_deg: Option<&str>,
+    is_on_ceiling: bool,
+) -> Result<KnownCamera, ParameterError> {
+    let lenses = format!("one of {}", IdealLens::VARIANTS.join(", "));
+    Ok(KnownCamera {
+        lens: parsed(LENS, lens, &lenses)?,
+        field_of_view: parsed(
+            FIELD_OF_VIEW_DEG,
+            field_of_view_deg,
+            "a number from 60 to 300",
+        )?,
+        is_on_ceiling,
+    })
+}
+
+/// Parses an optional value; `rule` completes "… is not".
+pub(crate) fn parsed<T: FromStr>(
+    name: &str,
+    value: Option<&str>,
+    rule: &str,
+) -> Result<Option<T>, ParameterError> {
+    let refused = |value| ParameterError::is_not(name, value, rule);
+    value
+        .map(|value| value.parse().map_err(|_| refused(value)))
+        .transpose()
+}
