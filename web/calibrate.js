@@ -20,7 +20,10 @@ const MAX_USERS = 60;
 /** The names that a calibration may have. */
 const PLAIN_NAME = /^[a-z0-9][a-z0-9_-]{0,63}$/;
 
-/** An imported file: `{name, content, needsSize}`; null while the circle is edited. */
+/**
+ * An imported file: `{name, content, needsSize}`, or `{name, file, needsSize}` for a calibration of the server or a found
+ * one, which takes the name in the form; null while the circle is edited.
+ */
 let imported = null;
 let circle = null;
 /** The calibration that was opened: `{name, file, tag}`. A saved circle keeps everything in it but the lens. */
@@ -109,7 +112,10 @@ function edited(next) {
   previewSoon();
 }
 
-const content = (base = opened?.file) => imported?.content ?? JSON.stringify(calibrationOf({ id: id(), ...circle }, base), null, 2);
+function content(base = opened?.file) {
+  if (imported?.content) return imported.content;
+  return JSON.stringify(imported ? { ...imported.file, id: id() } : calibrationOf({ id: id(), ...circle }, base), null, 2);
+}
 const id = () => field("id").value || "camera";
 
 /** The query for an imported file: the camera, and the frame size if the format has none. */
@@ -232,7 +238,7 @@ async function showFit(name, found) {
   const base = isServing(name) ? await read(name) : null;
   if (base) opened = base;
   const height = base?.file.mount?.height_m ?? circle.cameraHeight;
-  imported = { name, content: JSON.stringify(withFound(base?.file, found.calibration, height)), needsSize: false, isFound: true };
+  imported = { name, file: withFound(base?.file, found.calibration, height), needsSize: false, isFound: true };
   showFound(found);
   drawn();
   await preview();
@@ -255,7 +261,7 @@ async function open(name) {
   const { file } = opened;
   const known = circleOf(file);
   field("id").value = name;
-  imported = known ? null : { name, content: JSON.stringify(file), needsSize: false };
+  imported = known ? null : { name, file, needsSize: false };
   if (known) setCircle(known);
   drawn();
   await preview();
