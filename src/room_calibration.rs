@@ -22,7 +22,7 @@ use lookdown_lens::{
 
 pub use known::known_camera;
 
-use crate::rounding::{meters as thousandths, pixels as hundredths};
+use crate::rounding::{meters as thousandths, pixels as hundredths, radians_below};
 
 /// The source of a value of the user.
 const GIVEN: NativeSource = NativeSource {
@@ -90,8 +90,7 @@ pub(crate) fn room_calibration(
 ) -> NativeCalibration {
     let [cx, cy] = fit.center.map(thousandths);
     let focal = thousandths(fit.focal);
-    // Rounded down, so that the lens model is valid there.
-    let max_theta = (fit.max_theta * 1e6).floor() / 1e6;
+    let max_theta = radians_below(fit.max_theta);
     let lens = match known.lens {
         Some(model) => model.with(focal, cx, cy, max_theta),
         None => LensModel::from(KannalaBrandt {

@@ -20,6 +20,11 @@ pub(crate) fn meters(value: f64) -> f64 {
     rounded(value, 1_000.0)
 }
 
+/// Rounds radians down to six decimals, so that a lens that is valid up to an angle is valid there.
+pub(crate) fn radians_below(angle: f64) -> f64 {
+    (angle * 1e6).floor() / 1e6
+}
+
 /// Converts radians to degrees with two decimals.
 pub(crate) fn degrees(radians: f64) -> f64 {
     rounded(radians.to_degrees(), 100.0)

@@ -3,7 +3,7 @@
 import { drawCircle } from "./circle_handles.js";
 import { showViews, startDivider } from "./comparison.js";
 import { afterPause, element, find } from "./dom.js";
-import { assumedCircle, calibrationOf, circleOf, withFound } from "./lens.js";
+import { MODELS, assumedCircle, calibrationOf, circleOf, withFound } from "./lens.js";
 import { isServing, loadCalibrations } from "./parameters.js";
 import { shown, showFailure, withProgress } from "./progress.js";
 import { Problem, ask, askJson } from "./server.js";
@@ -274,6 +274,7 @@ export function visible(is) {
 
 export function start() {
   startDivider();
+  for (const name of ["knownLens", "model"]) field(name).append(...MODELS.map((model) => element("option", {}, model)));
   whenChanged(["frame", "report"], begin);
   whenChanged(["calibrations"], () => {
     const choice = find("#open-calibration");

@@ -10,6 +10,9 @@ const CURVES = {
   orthographic: (theta) => Math.sin(theta),
 };
 
+/** The names of these lenses. */
+export const MODELS = Object.keys(CURVES);
+
 const STRAIGHT_DOWN = [0, 0, -1];
 
 /**

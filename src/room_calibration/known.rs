@@ -1,9 +1,9 @@
-//! The parameters that say what is known of a camera before a fit.
+//! The parameters of the known values of a camera.
 
 use std::str::FromStr;
 
 use lookdown_detect::parameters::ParameterError;
-use lookdown_lens::self_calibration::{IdealLens, KnownCamera};
+use lookdown_lens::self_calibration::{FieldOfView, IdealLens, KnownCamera};
 use strum::VariantNames;
 
 /// The parameter of the projection of the lens.
@@ -11,7 +11,7 @@ pub(crate) const LENS: &str = "lens";
 /// The parameter of the field of view of the lens circle.
 pub(crate) const FIELD_OF_VIEW_DEG: &str = "field_of_view_deg";
 
-/// Parses what is known of a camera: the name of an ideal lens and a field of view in degrees.
+/// Parses the known values of a camera: the name of an ideal lens and a field of view in degrees.
 ///
 /// # Errors
 /// [`ParameterError`] with the accepted values.
@@ -21,13 +21,11 @@ pub fn known_camera(
     is_on_ceiling: bool,
 ) -> Result<KnownCamera, ParameterError> {
     let lenses = format!("one of {}", IdealLens::VARIANTS.join(", "));
+    let (min, max) = (FieldOfView::MIN_DEGREES, FieldOfView::MAX_DEGREES);
+    let fields_of_view = format!("a number from {min} to {max}");
     Ok(KnownCamera {
         lens: parsed(LENS, lens, &lenses)?,
-        field_of_view: parsed(
-            FIELD_OF_VIEW_DEG,
-            field_of_view_deg,
-            "a number from 60 to 300",
-        )?,
+        field_of_view: parsed(FIELD_OF_VIEW_DEG, field_of_view_deg, &fields_of_view)?,
         is_on_ceiling,
     })
 }

@@ -1,4 +1,4 @@
-//! What the user knows of a camera before a fit.
+//! The values of a camera that the user knows before a fit.
 
 use std::str::FromStr;
 
@@ -63,19 +63,27 @@ pub struct FieldOfView {
 
 /// A field of view that no lens circle has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("give 60 to 300 degrees")]
+#[error(
+    "give {} to {} degrees",
+    FieldOfView::MIN_DEGREES,
+    FieldOfView::MAX_DEGREES
+)]
 pub struct FieldOfViewError;
 
 impl FieldOfView {
+    /// The smallest field of view of a fisheye.
+    pub const MIN_DEGREES: f64 = 60.0;
+    /// The largest one.
+    pub const MAX_DEGREES: f64 = 300.0;
     /// Half a sphere, as the data sheets of most ceiling cameras say.
     pub const HEMISPHERE: Self = Self { degrees: 180.0 };
 
     /// Checks a field of view in degrees.
     ///
     /// # Errors
-    /// [`FieldOfViewError`] below 60 and above 300 degrees.
+    /// [`FieldOfViewError`] below [`Self::MIN_DEGREES`] and above [`Self::MAX_DEGREES`].
     pub fn of_degrees(degrees: f64) -> Result<Self, FieldOfViewError> {
-        let is_plausible = (60.0..=300.0).contains(&degrees);
+        let is_plausible = (Self::MIN_DEGREES..=Self::MAX_DEGREES).contains(&degrees);
         is_plausible
             .then_some(Self { degrees })
             .ok_or(FieldOfViewError)

@@ -84,12 +84,19 @@ fn equisolid() -> KnownCamera {
     }
 }
 
+/// Asserts that the vertical of a fit is right within so many degrees.
+#[track_caller]
+fn assert_level(fit: &RoomFit, camera_from_room: &Rotation3<f64>, degrees: f64) {
+    let down = camera_from_room * Ray::z();
+    let off = fit.directions[0].angle(&down).to_degrees();
+    assert!(off < degrees, "{off}° off level");
+}
+
 #[test]
 fn tilted_equisolid_camera_is_found() {
     let room = Rotation3::from_euler_angles(0.14, -0.09, 0.4);
     let fit = RoomFit::of(&[edges(&room)], &[circle()], KnownCamera::default()).unwrap();
-    let level = fit.directions[0].angle(&(room * Ray::z())).to_degrees();
-    assert!(level < 0.2, "{level}° off level");
+    assert_level(&fit, &room, 0.2);
     let off = (fit.center[0] - CENTER[0]).hypot(fit.center[1] - CENTER[1]);
     assert!(off < 2.0, "{off} pixels off center");
     for degrees in [20.0_f64, 50.0, 80.0] {
@@ -171,8 +178,7 @@ fn room_with_more_clutter_than_walls_is_fitted() {
     let all = [edges(&room), clutter(700)].concat();
     let fit = RoomFit::of(&[all], &[circle()], KnownCamera::default()).unwrap();
     assert!(fit.explained < 0.45, "{}", fit.explained);
-    let level = fit.directions[0].angle(&(room * Ray::z())).to_degrees();
-    assert!(level < 0.2, "{level}° off level");
+    assert_level(&fit, &room, 0.2);
 }
 
 #[test]
@@ -244,8 +250,7 @@ fn few_verticals_among_many_other_edges_are_enough() {
     let other: Vec<EdgeCurve> = other.into_iter().map(|(_, curve)| curve).collect();
     let all = [vertical, vec![other; 60].concat()].concat();
     let fit = RoomFit::of(&[all], &[circle()], KnownCamera::default()).unwrap();
-    let level = fit.directions[0].angle(&(room * Ray::z())).to_degrees();
-    assert!(level < 0.3, "{level}° off level");
+    assert_level(&fit, &room, 0.3);
 }
 
 #[test]

@@ -60,7 +60,7 @@ struct KnownCameraQuery {
     ceiling: Option<bool>,
 }
 
-/// A frame, and what is known of its camera.
+/// A frame, and the known values of its camera.
 pub(in crate::api) struct FitRequest {
     upload: Upload,
     known: KnownCamera,

@@ -14,7 +14,7 @@ use lookdown_lens::{
 };
 
 use super::arguments::Arguments;
-use crate::rounding::meters as thousandths;
+use crate::rounding::{meters as thousandths, radians_below};
 
 /// The lens and the field of view of most ceiling cameras.
 const LENS: IdealLens = IdealLens::Equidistant;
@@ -79,7 +79,7 @@ fn calibration(
     agreed: &AgreedCircle,
 ) -> anyhow::Result<NativeCalibration> {
     let field_of_view = arguments.field_of_view.unwrap_or(FIELD_OF_VIEW);
-    let max_theta = (field_of_view.max_theta() * 1e6).floor() / 1e6;
+    let max_theta = radians_below(field_of_view.max_theta());
     let circle = agreed.circle;
     let (cx, cy) = (thousandths(circle.cx), thousandths(circle.cy));
     let lens = |focal: f64| {

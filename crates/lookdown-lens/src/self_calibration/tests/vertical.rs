@@ -2,7 +2,7 @@
 
 use nalgebra::Rotation3;
 
-use super::{CENTER, circle, edges, equisolid, ray};
+use super::{CENTER, assert_level, circle, edges, equisolid, ray};
 use crate::{
     geometry::Ray,
     self_calibration::{FitRefusal, KnownCamera, RoomFit},
@@ -13,8 +13,7 @@ fn camera_tilted_by_53_degrees_is_upright() {
     let room = Rotation3::from_euler_angles(0.92, 0.0, 0.0);
     let all = vec![edges(&room); 2].concat();
     let fit = RoomFit::of(&[all], &[circle()], KnownCamera::default()).unwrap();
-    let level = fit.directions[0].angle(&(room * Ray::z())).to_degrees();
-    assert!(level < 0.5, "{level}° off level");
+    assert_level(&fit, &room, 0.5);
 }
 
 #[test]
@@ -35,8 +34,7 @@ fn vertical_of_a_tilted_camera_needs_many_edges() {
     };
     assert_eq!(fit(3), Err(FitRefusal::VerticalUnclear));
     let many = fit(20).unwrap();
-    let level = many.directions[0].angle(&(room * Ray::z())).to_degrees();
-    assert!(level < 0.5, "{level}° off level");
+    assert_level(&many, &room, 0.5);
 }
 
 #[test]
@@ -75,6 +73,5 @@ fn camera_beside_a_plain_wall_is_fitted_if_it_is_on_a_ceiling() {
         is_on_ceiling: true,
         ..equisolid()
     };
-    let level = fit(known).unwrap().directions[0].angle(&(room * Ray::z()));
-    assert!(level.to_degrees() < 0.5, "{level}");
+    assert_level(&fit(known).unwrap(), &room, 0.5);
 }
