@@ -12,7 +12,9 @@ use super::{
     edge_curve::EdgeCurve,
     evaluation::{Evaluation, Normal, PARAMETERS, Parameters},
     prior::Prior,
-    residual::{LensSlopes, Residual, own_slope, squared_pixels_per_unit},
+    residual::{
+        LensSlopes, Residual, least_squared_pixels_per_unit, own_slope, squared_pixels_per_unit,
+    },
 };
 use crate::geometry::Ray;
 
@@ -68,14 +70,16 @@ pub(super) fn evaluate(
         #[expect(clippy::cast_precision_loss, reason = "a few points")]
         let count = rays.len() as f64;
         let lever = length / 12.0_f64.sqrt();
-        let sigma = blur * (SIGMA_PIXELS * curve.scale).hypot(SIGMA_DIRECTION * lever);
+        let (across, turned) = (SIGMA_PIXELS * curve.scale, SIGMA_DIRECTION * lever);
+        let sigma = blur * (across * across + turned * turned).sqrt();
         // The prior density of an edge's angle is uniform over half a turn.
         let sigma_angle = sigma / (lever * count.sqrt());
         let gain = (PI / (TAU.sqrt() * sigma_angle)).max(1.0);
+        let least = least_squared_pixels_per_unit(&rays);
         fits.clear();
         for (index, direction) in directions.iter().enumerate() {
             let farthest = FAR * sigma * sigma;
-            let Some((normal, squares)) = best_plane(&rays, direction, farthest) else {
+            let Some((normal, squares)) = best_plane(&rays, direction, least, farthest) else {
                 continue;
             };
             let likelihood = share * gain * (-0.5 * squares / (sigma * sigma)).exp();
@@ -107,8 +111,9 @@ pub(super) fn evaluate(
 }
 
 /// The plane through a direction that fits rays best, and the sum of its squared residuals, or
-/// `None` if a first, unweighted plane is farther.
-fn best_plane(rays: &[SeenRay], direction: &Ray, farthest: f64) -> Option<(Ray, f64)> {
+/// `None` if a first, unweighted plane is farther. `least` is that of all rays and normals
+/// ([`least_squared_pixels_per_unit`]): most curves are too far from a direction by it alone.
+fn best_plane(rays: &[SeenRay], direction: &Ray, least: f64, farthest: f64) -> Option<(Ray, f64)> {
     let (first, second) = across(direction);
     let mut moments = [0.0; 3];
     for seen in rays {
@@ -118,6 +123,9 @@ fn best_plane(rays: &[SeenRay], direction: &Ray, farthest: f64) -> Option<(Ray, 
             first.dot(&seen.ray),
             second.dot(&seen.ray),
         );
+    }
+    if least * least_moment(moments) > farthest {
+        return None;
     }
     let normal = thinnest(moments, &first, &second);
     let mut moments = [0.0; 3];
@@ -155,6 +163,12 @@ fn add_moments([xx, xy, yy]: &mut [f64; 3], weight: f64, x: f64, y: f64) {
     *xx += weight * x * x;
     *xy += weight * x * y;
     *yy += weight * y * y;
+}
+
+/// The smaller eigenvalue.
+fn least_moment([xx, xy, yy]: [f64; 3]) -> f64 {
+    let (difference, twice) = (xx - yy, 2.0 * xy);
+    0.5 * (xx + yy - (difference * difference + twice * twice).sqrt())
 }
 
 /// The direction of least moment: the eigenvector of the smaller eigenvalue.

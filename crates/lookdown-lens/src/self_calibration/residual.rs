@@ -45,6 +45,16 @@ pub(super) fn squared_pixels_per_unit(seen: &SeenRay, normal: &Ray) -> f64 {
     1.0 / (outward * outward + around * around).max(1e-14)
 }
 
+/// The least of [`squared_pixels_per_unit`] for all rays and normals: `outward` and `around` are
+/// orthogonal.
+pub(super) fn least_squared_pixels_per_unit(rays: &[SeenRay]) -> f64 {
+    let most = rays.iter().map(|seen| {
+        let outward = seen.outward.norm_squared();
+        outward.max(seen.around.norm_squared())
+    });
+    1.0 / most.fold(1e-14, f64::max)
+}
+
 /// The residual, and its change with the angle of the plane: `turned` is the change of the normal.
 pub(super) fn own_slope(seen: &SeenRay, normal: &Ray, turned: &Ray) -> (f64, f64) {
     let square = squared_pixels_per_unit(seen, normal);
