@@ -17,7 +17,7 @@ use std::{
         mpsc::{SyncSender, sync_channel},
     },
     thread,
-    time::Instant,
+    time::{Duration, Instant},
 };
 
 use lookdown_detect::{imaging::decode::DecodeLimits, pipeline::DetectedFrame};
@@ -34,8 +34,10 @@ use worker::{Work, Worker};
 
 pub(crate) use {observed::FRAMES, shared::Suggestion};
 
-/// Most cameras that are observed. The one that has been silent for longest is forgotten first.
+/// Most cameras that are observed. One that is silent makes room for a new one.
 const MAX_CAMERAS: usize = 32;
+/// A camera without a frame for so long is silent.
+const SILENCE: Duration = Duration::from_mins(10);
 /// Work that waits for the thread. Further frames are skipped: later ones will do.
 const MAX_WAITING: usize = 2;
 
@@ -84,8 +86,9 @@ impl Suggestions {
         let size = (report.image_width, report.image_height);
         let boxes = report.persons.iter().map(|person| person.oriented_box);
         let mut cameras = self.shared.cameras.lock();
-        if !cameras.contains_key(&camera) && cameras.len() >= MAX_CAMERAS {
-            forget_one(&mut cameras);
+        let is_full = !cameras.contains_key(&camera) && cameras.len() >= MAX_CAMERAS;
+        if is_full && !forget_silent(&mut cameras, now) {
+            return;
         }
         let observed = cameras.entry(camera.clone()).or_default();
         observed.see(subject, size, now);
@@ -148,12 +151,13 @@ impl Suggestions {
     }
 }
 
-/// Removes the camera that has been silent for longest.
-fn forget_one(cameras: &mut BTreeMap<CalibrationId, Observed>) {
+/// Removes the camera that has been silent for longest. Returns false if none is silent.
+fn forget_silent(cameras: &mut BTreeMap<CalibrationId, Observed>, now: Instant) -> bool {
+    let is_silent = |seen_at: Instant| now.saturating_duration_since(seen_at) >= SILENCE;
     let silent = cameras
         .iter()
+        .filter(|(_, observed)| observed.seen_at().is_none_or(is_silent))
         .min_by_key(|(_, observed)| observed.seen_at());
-    if let Some(silent) = silent.map(|(camera, _)| camera.clone()) {
-        cameras.remove(&silent);
-    }
+    let silent = silent.map(|(camera, _)| camera.clone());
+    silent.is_some_and(|camera| cameras.remove(&camera).is_some())
 }

@@ -22,6 +22,8 @@ const PAUSES: [Duration; 5] = [
 ];
 /// The number of frames of a lens.
 pub(crate) const FRAMES: usize = PAUSES.len();
+/// Least pause between two frames, even if their size changes.
+const LEAST_PAUSE: Duration = Duration::from_mins(2);
 /// Pause before a further frame while the frames are refused: it replaces the oldest.
 const RETRY: Duration = Duration::from_hours(1);
 /// Pause between two frames whose people are taken.
@@ -60,7 +62,10 @@ impl Observed {
     /// calibration needs no frames.
     pub(super) fn see(&mut self, subject: Subject, size: (u32, u32), now: Instant) {
         if self.size != size {
-            *self = Self::default();
+            *self = Self {
+                last_frame: self.last_frame,
+                ..Self::default()
+            };
         }
         if self.subject != subject {
             self.forget_frames();
@@ -72,6 +77,11 @@ impl Observed {
 
     pub(super) fn seen_at(&self) -> Option<Instant> {
         self.seen_at
+    }
+
+    /// Width and height of the frames.
+    pub(super) fn frame_size(&self) -> (u32, u32) {
+        self.size
     }
 
     /// The size of the frames.
@@ -91,7 +101,7 @@ impl Observed {
             None if matches!(self.fit, Some(Err(_))) => RETRY,
             None => return false,
         };
-        let is_over = |last: Instant| now.saturating_duration_since(last) >= pause;
+        let is_over = |last: Instant| now.saturating_duration_since(last) >= pause.max(LEAST_PAUSE);
         self.subject == Subject::Lens && self.last_frame.is_none_or(is_over)
     }
 
@@ -210,7 +220,8 @@ mod tests {
         taken(&mut observed, start, 5);
         observed.add_people([person()].into_iter(), start);
         observed.see(Subject::Lens, (640, 480), start);
-        assert!(observed.is_frame_due(start) && observed.people().is_empty());
+        assert!(!observed.is_frame_due(start) && observed.people().is_empty());
+        assert!(observed.is_frame_due(start + Duration::from_mins(4)));
     }
 
     #[test]

@@ -12,7 +12,7 @@ use parking_lot::Mutex;
 use super::observed::{Observed, Subject};
 use crate::{
     calibration_store::Calibrations,
-    room_calibration::{checked, room_calibration, set_height},
+    room_calibration::{checked, may_set_height, room_calibration, set_height},
 };
 
 /// The parts that the thread uses, too.
@@ -60,7 +60,9 @@ impl Shared {
             Subject::Height(id) => {
                 let entry = self.calibrations.entry(id)?;
                 let revision = entry.calibration.revision().to_owned();
-                let native = matches!(height, Some(Ok(_))).then(|| entry.native.clone());
+                // A height may have been given since the last frame.
+                let is_found = matches!(height, Some(Ok(_))) && may_set_height(&entry.native);
+                let native = is_found.then(|| entry.native.clone());
                 (native, Some(revision))
             }
         };

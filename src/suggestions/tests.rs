@@ -3,7 +3,10 @@
 use std::{sync::Arc, time::Instant};
 
 use lookdown_lens::{
-    calibration::{CalibrationId, native::ValueSource},
+    calibration::{
+        CalibrationId,
+        native::{SourcedValue, ValueSource},
+    },
     geometry::{
         Lens, OrientedBox, Pixel, Ray,
         pixels::{PixelConvention, cross_half_pixel},
@@ -61,6 +64,7 @@ fn fit() -> RoomFit {
         directions: [Ray::z(), Ray::x(), Ray::y()],
         explained: 0.8,
         edges: 400,
+        is_circle_detected: true,
         uncertainty: FitUncertainty {
             radius: 0.004,
             center: 1.0,
@@ -95,7 +99,10 @@ fn the_height_is_offered_in_a_calibration_without_one() {
         (native.mount.height_m.unwrap() - 3.0).abs() < 0.2,
         "{native:?}"
     );
-    assert_eq!(native.sources["height_m"].source, ValueSource::FromPeople);
+    assert_eq!(
+        native.sources[&SourcedValue::HeightM].source,
+        ValueSource::FromPeople
+    );
     let entry = shared.calibrations.entry(&hall()).unwrap();
     assert_eq!(
         found.replaces.as_deref(),
@@ -103,6 +110,20 @@ fn the_height_is_offered_in_a_calibration_without_one() {
     );
     // Only calibrations of cameras without one are stored without a request.
     assert_eq!(entry.native.mount.height_m, None);
+}
+
+#[test]
+fn a_height_that_was_given_meanwhile_is_not_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    let given = HALL.replace("[0, 0, -1]", "[0, 0, -1], \"height_m\": 2.8");
+    std::fs::write(folder.path().join("hall.json"), given).unwrap();
+    let shared = shared(&folder, false);
+    let camera = observed(Subject::Height(hall()));
+    shared.cameras.lock().insert(hall(), camera);
+    Worker(Arc::clone(&shared)).measure_height(&hall());
+    let found = shared.suggestion(&hall()).unwrap();
+    assert!(matches!(found.height, Some(Ok(_))));
+    assert_eq!((found.calibration, found.replaces), (None, None));
 }
 
 #[test]

@@ -1,6 +1,9 @@
 //! The thread that finds lenses and heights.
 
-use std::sync::{Arc, mpsc::Receiver};
+use std::{
+    panic::{AssertUnwindSafe, catch_unwind},
+    sync::{Arc, mpsc::Receiver},
+};
 
 use lookdown_detect::imaging::{
     decode::decode,
@@ -12,7 +15,7 @@ use lookdown_lens::{
 };
 
 use super::{
-    observed::{FRAMES, Observed},
+    observed::{FRAMES, Observed, Subject},
     shared::Shared,
 };
 use crate::calibration_store::{Reading, WriteCondition};
@@ -40,15 +43,23 @@ impl Worker {
             tracing::warn!("calibrations are found without a lower priority: {error}");
         }
         for work in waiting {
-            match work {
-                Work::Frame(camera, image) => {
-                    self.fit(&camera, &image);
-                    self.measure_height(&camera);
-                    self.apply(&camera);
-                }
-                Work::People(camera) => self.measure_height(&camera),
+            // A defect that a frame of one camera shows does not end the thread for all.
+            if catch_unwind(AssertUnwindSafe(|| self.work(work))).is_err() {
+                tracing::error!("the search for a calibration panicked");
             }
         }
+    }
+
+    fn work(&self, work: Work) {
+        let camera = match work {
+            Work::Frame(camera, image) => {
+                self.fit(&camera, &image);
+                camera
+            }
+            Work::People(camera) => camera,
+        };
+        self.measure_height(&camera);
+        self.apply(&camera);
     }
 
     /// Fits the lens to this frame and the frames before.
@@ -69,7 +80,14 @@ impl Worker {
             return;
         }
         let fit = fit_room(&frames, self.0.known);
-        if let Some(observed) = self.0.cameras.lock().get_mut(camera) {
+        let size = frames[0].size();
+        let mut cameras = self.0.cameras.lock();
+        let observed = cameras.get_mut(camera);
+        // Meanwhile, frames of another camera may have this name, or a calibration was stored.
+        let is_same = |observed: &&mut Observed| {
+            observed.frame_size() == size && *observed.subject() == Subject::Lens
+        };
+        if let Some(observed) = observed.filter(is_same) {
             if let Ok(fit) = &fit {
                 tracing::info!(
                     %camera,

@@ -17,6 +17,8 @@ use super::{frame::Frame, lens_circle::LensCircle};
 use gradient::Gradient;
 use plane::Plane;
 
+/// Rasters with a shorter side have no edges of a room.
+const MIN_SIDE: u32 = 32;
 /// Longer sides are halved, or divided by three, and so on.
 const MAX_SIDE: u32 = 1700;
 /// Rasters in which edges are found: the finest, then each of half of the sides before.
@@ -34,6 +36,9 @@ pub fn edge_curves(frame: &Frame, circle: &LensCircle) -> [Vec<EdgeCurve>; RASTE
 
 /// The edges of a frame whose sides are divided.
 fn curves_of_raster(frame: &Frame, circle: &LensCircle, divisor: u32) -> Vec<EdgeCurve> {
+    if frame.width().min(frame.height()) / divisor < MIN_SIDE {
+        return Vec::new();
+    }
     let luminance = Plane::luminance(frame, divisor);
     let surround = surround::mask(frame, divisor);
     let gradient = Gradient::of(&luminance);

@@ -70,6 +70,9 @@ fn find_at_contrast(frame: &Frame, min_contrast: f64) -> Option<LensCircle> {
 /// surround.
 #[must_use]
 pub fn surround_threshold(frame: &Frame) -> Option<f64> {
+    if short_side(frame) < MIN_SIDE {
+        return None;
+    }
     let surround = Surround::of(frame, MIN_CONTRASTS[1])?;
     Some(surround.threshold)
 }
