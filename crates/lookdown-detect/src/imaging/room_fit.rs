@@ -18,6 +18,8 @@ const FRAME_CENTER_SIGMA: f64 = 0.012;
 const BEYOND: f64 = 2.0;
 /// Share of the uncertainty of the finer raster below which the fit of a coarser one is preferred.
 const CLEARLY_MORE_CERTAIN: f64 = 0.8;
+/// Ratio of the sides from which a circle that is not seen is taken to be cut by the longer ones.
+const CUT_ASPECT: f64 = 1.2;
 /// Most curves of a frame: the longest. A cluttered room of 1680 by 1680 pixels has fewer.
 const MAX_CURVES: usize = 2000;
 
@@ -87,12 +89,15 @@ pub fn fit_room(frames: &[RoomFrame], known: KnownCamera) -> Result<RoomFit, Fit
         radius: circle.radius,
         center_sigma: CENTER_SIGMA * side,
     });
+    // A circle that is as large as a square frame just touches its sides.
+    let is_cut = f64::from(first.width.max(first.height)) > CUT_ASPECT * side;
     // A dark part of the room may look like the surround, so the frame's own center is tried, too.
+    let most = if is_cut { f64::INFINITY } else { 1.1 };
     let centered = CircleGuess {
         center: [assumed.cx, assumed.cy],
         radius: circle
             .radius
-            .clamp(0.9 * assumed.radius, 1.1 * assumed.radius),
+            .clamp(0.9 * assumed.radius, most * assumed.radius),
         center_sigma: FRAME_CENTER_SIGMA * side,
     };
     let guesses: Vec<_> = detected.into_iter().chain([centered]).collect();
@@ -107,7 +112,15 @@ pub fn fit_room(frames: &[RoomFrame], known: KnownCamera) -> Result<RoomFit, Fit
         }
         best = better(best, fit(raster));
     }
-    best
+    match (best, found) {
+        (Ok(fit), None) => {
+            let [x, y] = fit.center;
+            let (width, height) = (f64::from(first.width), f64::from(first.height));
+            let farthest = x.max(width - x).hypot(y.max(height - y));
+            Ok(fit.without_circle(if is_cut { farthest } else { circle.radius }))
+        }
+        (best, _) => best,
+    }
 }
 
 /// Returns true if a coarser raster does not help, because most edges follow the room or there are
@@ -134,4 +147,29 @@ fn better(
         (Err(finer), Err(coarser)) => coarser.explained() > finer.explained(),
     };
     if is_coarser { coarser } else { finer }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_of_any_size_are_fitted_or_refused() {
+        for (width, height) in [
+            (1, 1),
+            (3, 3),
+            (2, 2000),
+            (2000, 11),
+            (39, 1701),
+            (30, 8000),
+            (64, 40),
+        ] {
+            let pixels = [40, 90, 200, 255].repeat(width as usize * height as usize)
+                [..3 * width as usize * height as usize]
+                .to_vec();
+            let frame = Frame::new(width, height, pixels).unwrap();
+            let fit = fit_room(&[RoomFrame::of(&frame)], KnownCamera::default());
+            assert!(fit.is_err(), "{width}×{height}: {fit:?}");
+        }
+    }
 }

@@ -10,7 +10,7 @@ const MAX_THETA: f64 = 2.2;
 const ENTRIES: usize = 1024;
 /// Least slope of the curve `r(theta)` up to the circle, in focal lengths per radian. A curve that
 /// turns back before the circle explains every edge at the rim.
-const MIN_SLOPE: f64 = 0.02;
+pub(super) const MIN_SLOPE: f64 = 0.02;
 
 /// Angles at which a stretched camera keeps the radius, radians.
 const STRETCH_ANGLES: [f64; 2] = [0.6, 1.35];

@@ -3,12 +3,14 @@
 use std::f64::consts::FRAC_PI_2;
 
 use super::{
+    camera::MIN_SLOPE,
     edge_curve::EdgeCurve,
     halves::{halves, spread, widened},
     known_camera::{IdealLens, KnownCamera},
     maxima::{Maximum, fine_maxima, maxima},
     prior::Prior,
     refusal::FitRefusal,
+    search::has_lens,
     uncertainty::{FitUncertainty, distance, loose_curvature},
 };
 use crate::geometry::Ray;
@@ -32,11 +34,17 @@ const CLUTTERED_SHARES: f64 = 0.28;
 const RIVAL_EVIDENCE: f64 = 12.0;
 /// Difference of two maxima that matters: share of the radius, and radians of the level.
 const RIVAL_DISTANCE: (f64, f64) = (0.03, 0.026);
+/// Part of the share of explained edges that a frame of the same camera has at least.
+const STRANGER_SHARE: f64 = 0.6;
+/// Difference of the radius, as a share, between a known lens and one that the edges like better.
+const CONTRADICTION_DISTANCE: f64 = 0.02;
 /// Largest uncertainty of the radius, as a share, and of the level, degrees.
 const MAX_UNCERTAINTY: (f64, f64) = (0.028, 0.8);
 /// Standard deviation of the second coefficient of a lens from that of an ideal lens. A wider one
 /// exchanges curvature at the rim for focal length, and makes the middle too large.
 const K2_SIGMA: f64 = 0.0015;
+/// Standard deviation of the known angle at the circle, radians: detected circles are not exact.
+const KNOWN_RIM: f64 = 5e-3;
 /// Errors are larger than the edges say, because no lens is exactly one of the family and edges
 /// come in groups: by this factor, and for the radius by this share however many edges there are.
 const MISFIT: f64 = 1.2;
@@ -46,6 +54,12 @@ pub const CLEARLY_EXPLAINED: f64 = 0.5;
 /// Errors are larger where things of all shapes stand nearly along the walls: by this factor for
 /// each unit by which less than [`CLEARLY_EXPLAINED`] is explained.
 const CLUTTER_MISFIT: f64 = 4.0;
+
+/// The largest angle from the axis that a lens without a visible circle is taken to see, radians:
+/// few lenses have more than 200°.
+const MAX_UNSEEN_THETA: f64 = 1.745;
+/// Precision of that angle, radians.
+const STEP_BEYOND: f64 = 0.001;
 
 /// A lens circle, detected or assumed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,9 +91,32 @@ pub struct RoomFit {
     pub edges: usize,
     /// Standard deviations.
     pub uncertainty: FitUncertainty,
+    /// False if no frame shows a lens circle, so that the angle at it says nothing about the lens.
+    pub is_circle_detected: bool,
 }
 
 impl RoomFit {
+    /// Returns the camera without a lens circle, whose image reaches to a distance from the center, in
+    /// pixels, at most to [`MAX_UNSEEN_THETA`].
+    #[must_use]
+    pub fn without_circle(self, distance: f64) -> Self {
+        let [k1, k2, k3, _] = self.k;
+        let is_within = |theta: &f64| {
+            let square = theta * theta;
+            let slope = 1.0 + square * (3.0 * k1 + square * (5.0 * k2 + square * 7.0 * k3));
+            let radius = theta * (1.0 + square * (k1 + square * (k2 + square * k3)));
+            slope > MIN_SLOPE && self.focal * radius <= distance
+        };
+        let beyond = (1..)
+            .map(|step| self.max_theta + STEP_BEYOND * f64::from(step))
+            .take_while(|theta| *theta <= MAX_UNSEEN_THETA && is_within(theta));
+        Self {
+            max_theta: beyond.last().unwrap_or(self.max_theta),
+            is_circle_detected: false,
+            ..self
+        }
+    }
+
     /// Fits a camera to the edges of its frames. Circles are tried in turn, a later one must
     /// explain the edges clearly better than those before. The result is deterministic.
     ///
@@ -103,6 +140,9 @@ impl RoomFit {
         let mut others: Vec<Maximum> = Vec::new();
         for circle in circles {
             let prior = prior(circle, known);
+            if !has_lens(&prior, known) {
+                return Err(FitRefusal::NoSuchLens);
+            }
             // Directions that are clear with one circle are those with another one.
             let clear = best.as_ref().filter(|(maxima, _)| is_ordered(maxima));
             let mut found = match clear {
@@ -129,7 +169,17 @@ impl RoomFit {
         let (mut maxima, prior) = best.ok_or(FitRefusal::NoDirections { explained: 0.0 })?;
         // The camera of another circle is a rival, too.
         maxima.extend(others);
-        checked(curves, weight, &maxima, &prior)
+        let fit = checked(curves, weight, &maxima, &prior)?;
+        if let Some(refusal) = stranger(frames, &maxima[0], fit.explained) {
+            return Err(refusal);
+        }
+        match contradiction(curves, weight, &maxima[0], &prior, known) {
+            Some(field_of_view_deg) => Err(FitRefusal::Contradicted {
+                field_of_view_deg,
+                explained: fit.explained,
+            }),
+            None => Ok(fit),
+        }
     }
 }
 
@@ -148,7 +198,9 @@ fn is_ordered(maxima: &[Maximum]) -> bool {
 
 pub(super) fn prior(circle: &CircleGuess, known: KnownCamera) -> Prior {
     let k1 = known.lens.map(IdealLens::k1);
-    let rim = known.field_of_view.map(|field| (field.max_theta(), 1e-3));
+    let rim = known
+        .field_of_view
+        .map(|field| (field.max_theta(), KNOWN_RIM));
     Prior {
         center: circle.center,
         center_sigma: circle.center_sigma,
@@ -158,6 +210,63 @@ pub(super) fn prior(circle: &CircleGuess, known: KnownCamera) -> Prior {
         rim: rim.unwrap_or((FRAC_PI_2, 0.22)),
         is_on_ceiling: known.is_on_ceiling,
     }
+}
+
+/// Returns the refusal of a frame whose edges do not follow the camera of all frames, if there is
+/// one.
+fn stranger(frames: &[Vec<EdgeCurve>], found: &Maximum, explained: f64) -> Option<FitRefusal> {
+    let mut responsibilities = found.evaluation.explained.iter();
+    let shares = frames.iter().map(|curves| {
+        let lengths = curves.iter().map(EdgeCurve::length);
+        let along: f64 = lengths
+            .clone()
+            .zip(responsibilities.by_ref())
+            .map(|(length, share)| length * share)
+            .sum();
+        along / lengths.sum::<f64>().max(1e-9)
+    });
+    let shares: Vec<f64> = shares.collect();
+    let index = shares
+        .iter()
+        .position(|share| *share < STRANGER_SHARE * explained)?;
+    Some(FitRefusal::FrameDisagrees {
+        frame: index + 1,
+        explained: shares[index],
+    })
+}
+
+/// Returns the field of view in degrees of another lens that explains the edges clearly better than
+/// the known values permit, if there is one.
+fn contradiction(
+    curves: &[EdgeCurve],
+    weight: f64,
+    found: &Maximum,
+    within: &Prior,
+    known: KnownCamera,
+) -> Option<f64> {
+    if known.lens.is_none() && known.field_of_view.is_none() {
+        return None;
+    }
+    let circle = CircleGuess {
+        center: within.center,
+        radius: within.radius,
+        center_sigma: within.center_sigma,
+    };
+    let free = KnownCamera {
+        is_on_ceiling: known.is_on_ceiling,
+        ..KnownCamera::default()
+    };
+    let free = prior(&circle, free);
+    let others = fine_maxima([found.camera.clone()].into_iter(), curves, weight, &free);
+    let other = others.first()?;
+    let gain = other.evaluation.evidence - found.evaluation.evidence;
+    let (radius, _) = distance(&found.camera, &other.camera);
+    if gain < RIVAL_EVIDENCE || radius < CONTRADICTION_DISTANCE {
+        return None;
+    }
+    // Edges that do not determine a lens do not contradict one.
+    let other = checked(curves, weight, &others, &free).ok()?;
+    Some(2.0 * other.max_theta.to_degrees())
 }
 
 fn checked(
@@ -231,6 +340,7 @@ fn checked(
         explained,
         edges: curves.len(),
         uncertainty,
+        is_circle_detected: true,
     })
 }
 

@@ -12,6 +12,12 @@ pub enum FitRefusal {
         /// Number of edges.
         edges: usize,
     },
+    /// Known values that no lens of the method has.
+    #[error(
+        "no lens of the known model has such a field of view: orthographic lenses see less than 173°, others less than \
+         252°; correct field_of_view_deg, or leave it out"
+    )]
+    NoSuchLens,
     /// A room without a rectangular order.
     #[error(
         "only {:.0} % of the edges follow three orthogonal directions: give a frame that shows more walls, doors or \
@@ -32,6 +38,28 @@ pub enum FitRefusal {
          is on a ceiling if it is, and calibrate cameras on walls with a chessboard"
     )]
     VerticalUnclear,
+    /// A known model or field of view that the edges contradict.
+    #[error(
+        "the edges contradict the known values of the lens: with other values its circle has {field_of_view_deg:.0}° and \
+         explains them clearly better: check the data sheet, or leave the values out"
+    )]
+    Contradicted {
+        /// Field of view of the better lens, degrees.
+        field_of_view_deg: f64,
+        /// Explained share of the edges.
+        explained: f64,
+    },
+    /// A frame of another camera, or from before the camera was moved.
+    #[error(
+        "frame {frame} is not like the others, only {:.0} % of its edges follow their camera: leave it out if it is of \
+         another camera, or the camera was moved", 100.0 * explained
+    )]
+    FrameDisagrees {
+        /// The number of the frame, from 1.
+        frame: usize,
+        /// Explained share of its edges.
+        explained: f64,
+    },
     /// Two cameras explain the edges equally well.
     #[error(
         "two different cameras explain the edges equally well: give the model of the lens (a camera that looks \
@@ -77,9 +105,14 @@ impl FitRefusal {
         match self {
             Self::NoDirections { explained }
             | Self::Ambiguous { explained }
+            | Self::Contradicted { explained, .. }
             | Self::Uncertain { explained, .. }
             | Self::HalvesDisagree { explained, .. } => Some(*explained),
-            Self::TooFewEdges { .. } | Self::MissingDirection | Self::VerticalUnclear => None,
+            Self::NoSuchLens
+            | Self::FrameDisagrees { .. }
+            | Self::TooFewEdges { .. }
+            | Self::MissingDirection
+            | Self::VerticalUnclear => None,
         }
     }
 
@@ -87,10 +120,13 @@ impl FitRefusal {
     #[must_use]
     pub fn reason(&self) -> &'static str {
         match self {
+            Self::NoSuchLens => "no_such_lens",
             Self::TooFewEdges { .. } => "too_few_edges",
             Self::NoDirections { .. } => "no_directions",
             Self::MissingDirection => "missing_direction",
             Self::VerticalUnclear => "vertical_unclear",
+            Self::Contradicted { .. } => "contradicted",
+            Self::FrameDisagrees { .. } => "frame_disagrees",
             Self::Ambiguous { .. } => "ambiguous",
             Self::Uncertain { .. } => "uncertain",
             Self::HalvesDisagree { .. } => "halves_disagree",

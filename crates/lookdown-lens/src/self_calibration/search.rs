@@ -33,47 +33,56 @@ struct Plane {
     weight: f64,
 }
 
-/// Returns starts in the order of their scores, best first, one or two per lens.
-pub(super) fn starts(curves: &[EdgeCurve], prior: &Prior, known: KnownCamera) -> Vec<RoomCamera> {
-    let triples = Triples::new();
-    let mut starts: Vec<(RoomCamera, f64)> = Vec::new();
+/// Returns the cameras with a lens of the grid, straight down, with their tables of angles.
+fn lenses(prior: &Prior, known: KnownCamera) -> impl Iterator<Item = (RoomCamera, Angles)> {
     let shapes = known.lens.map_or(SHAPES.to_vec(), |lens| vec![lens.k1()]);
     let rims = known
         .field_of_view
         .map_or(RIMS.map(f64::to_radians).to_vec(), |field| {
             vec![field.max_theta()]
         });
-    for k1 in shapes {
-        for &rim in &rims {
-            let shape = ideal_shape(k1);
-            let square = rim * rim;
-            let radius =
-                rim * (1.0 + square * (shape[0] + square * (shape[1] + square * shape[2])));
+    let (center, radius) = (prior.center, prior.radius);
+    let with = move |k1: f64, rim: f64| {
+        let shape = ideal_shape(k1);
+        let square = rim * rim;
+        let curve = rim * (1.0 + square * (shape[0] + square * (shape[1] + square * shape[2])));
+        let camera = RoomCamera {
+            focal: radius / curve,
+            k1,
+            k2_offset: 0.0,
+            center,
+            room: Rotation3::identity(),
+        };
+        let angles = Angles::of(&camera, radius)?;
+        Some((camera, angles))
+    };
+    shapes.into_iter().flat_map(move |k1| {
+        let with = with.clone();
+        rims.clone()
+            .into_iter()
+            .filter_map(move |rim| with(k1, rim))
+    })
+}
+
+/// Returns true if a lens has the known values.
+pub(super) fn has_lens(prior: &Prior, known: KnownCamera) -> bool {
+    lenses(prior, known).next().is_some()
+}
+
+/// Returns starts in the order of their scores, best first, one or two per lens.
+pub(super) fn starts(curves: &[EdgeCurve], prior: &Prior, known: KnownCamera) -> Vec<RoomCamera> {
+    let triples = Triples::new();
+    let mut starts: Vec<(RoomCamera, f64)> = Vec::new();
+    for (camera, angles) in lenses(prior, known) {
+        let planes = planes(curves, &camera, &angles);
+        let rooms = directions(&planes, &triples).into_iter();
+        starts.extend(rooms.map(|(room, score)| {
             let camera = RoomCamera {
-                focal: prior.radius / radius,
-                k1,
-                k2_offset: 0.0,
-                center: prior.center,
-                room: Rotation3::identity(),
+                room,
+                ..camera.clone()
             };
-            let Some(angles) = Angles::of(&camera, prior.radius) else {
-                continue;
-            };
-            let planes = planes(curves, &camera, &angles);
-            starts.extend(
-                directions(&planes, &triples)
-                    .into_iter()
-                    .map(|(room, score)| {
-                        (
-                            RoomCamera {
-                                room,
-                                ..camera.clone()
-                            },
-                            score,
-                        )
-                    }),
-            );
-        }
+            (camera, score)
+        }));
     }
     starts.sort_by(|a, b| b.1.total_cmp(&a.1));
     starts.into_iter().map(|(camera, _)| camera).collect()

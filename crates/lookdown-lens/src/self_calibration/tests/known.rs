@@ -1,0 +1,73 @@
+//! Values that the user knows, frames of several cameras, and lenses without a circle.
+
+use nalgebra::Rotation3;
+
+use super::{circle, edges, equisolid};
+use crate::self_calibration::{FieldOfView, FitRefusal, IdealLens, KnownCamera, RoomFit};
+
+fn tilted() -> Rotation3<f64> {
+    Rotation3::from_euler_angles(0.14, -0.09, 0.4)
+}
+
+fn with_field_of_view(degrees: f64, known: KnownCamera) -> KnownCamera {
+    KnownCamera {
+        field_of_view: Some(FieldOfView::of_degrees(degrees).unwrap()),
+        ..known
+    }
+}
+
+#[test]
+fn lens_that_the_edges_contradict_is_refused() {
+    for lens in [IdealLens::Equidistant, IdealLens::Stereographic] {
+        let known = KnownCamera {
+            lens: Some(lens),
+            ..KnownCamera::default()
+        };
+        // A field of view between the true one and that of the lens leaves the edges explained.
+        let all = [edges(&tilted()), super::clutter(300)].concat();
+        let fit = RoomFit::of(&[all], &[circle()], known);
+        assert!(
+            matches!(
+                fit,
+                Err(FitRefusal::Contradicted { .. } | FitRefusal::NoDirections { .. })
+            ),
+            "{lens}: {fit:?}"
+        );
+    }
+}
+
+#[test]
+fn field_of_view_that_no_lens_has_is_named() {
+    let orthographic = KnownCamera {
+        lens: Some(IdealLens::Orthographic),
+        ..KnownCamera::default()
+    };
+    for known in [
+        with_field_of_view(180.0, orthographic),
+        with_field_of_view(270.0, KnownCamera::default()),
+    ] {
+        let fit = RoomFit::of(&[edges(&tilted())], &[circle()], known);
+        assert_eq!(fit, Err(FitRefusal::NoSuchLens));
+    }
+}
+
+#[test]
+fn frame_of_another_camera_is_named() {
+    let other = edges(&Rotation3::from_euler_angles(-0.3, 0.2, 1.1));
+    let [first, second] = [edges(&tilted()), edges(&tilted())];
+    let fit = RoomFit::of(&[first, second, other], &[circle()], equisolid());
+    assert!(
+        matches!(fit, Err(FitRefusal::FrameDisagrees { frame: 3, .. })),
+        "{fit:?}"
+    );
+}
+
+#[test]
+fn lens_without_a_circle_sees_up_to_the_corner() {
+    let fit = RoomFit::of(&[edges(&tilted())], &[circle()], equisolid()).unwrap();
+    let at_circle = fit.max_theta;
+    let [near, far] = [1.1, 3.0].map(|share| fit.clone().without_circle(share * circle().radius));
+    assert!(near.max_theta > 1.08 * at_circle && near.max_theta < 1.2 * at_circle);
+    assert!(far.max_theta > near.max_theta && far.max_theta <= 1.745);
+    assert!(!far.is_circle_detected && fit.is_circle_detected);
+}
