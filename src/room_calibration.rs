@@ -14,21 +14,18 @@ use lookdown_lens::{
     calibration::{
         Calibration, CalibrationFile, CalibrationId,
         export::Target,
-        native::{NativeCalibration, NativeImage, NativeMount, NativeSource, ValueSource},
+        native::{
+            NativeCalibration, NativeImage, NativeMount, NativeSource, SourcedValue, ValueSource,
+        },
     },
     geometry::lens::{KannalaBrandt, LensModel},
-    self_calibration::{CameraHeight, KnownCamera, RoomFit},
+    self_calibration::{CameraHeight, FieldOfView, KnownCamera, RoomFit},
 };
 
 pub use known::known_camera;
+use known::known_height;
 
 use crate::rounding::{meters as thousandths, pixels as hundredths, radians_below};
-
-/// The source of a value of the user.
-const GIVEN: NativeSource = NativeSource {
-    source: ValueSource::Given,
-    uncertainty: None,
-};
 
 /// A camera that was calibrated from its frames.
 pub struct RoomCalibration {
@@ -51,6 +48,7 @@ pub fn calibrate(
     height_m: Option<f64>,
 ) -> anyhow::Result<RoomCalibration> {
     let first = frames.first().context("no frame: give at least one")?;
+    let height_m = height_m.map(known_height).transpose()?;
     let image = NativeImage {
         width: first.width(),
         height: first.height(),
@@ -90,7 +88,10 @@ pub(crate) fn room_calibration(
 ) -> NativeCalibration {
     let [cx, cy] = fit.center.map(thousandths);
     let focal = thousandths(fit.focal);
-    let max_theta = radians_below(fit.max_theta);
+    let max_theta = known
+        .field_of_view
+        .map_or(fit.max_theta, FieldOfView::max_theta);
+    let max_theta = radians_below(max_theta);
     let lens = match known.lens {
         Some(model) => model.with(focal, cx, cy, max_theta),
         None => LensModel::from(KannalaBrandt {
@@ -128,8 +129,14 @@ pub(crate) fn checked(native: &NativeCalibration) -> anyhow::Result<Calibration>
 /// Returns true if the height of a calibration may be set from people: a height that was measured
 /// or given is kept.
 pub(crate) fn may_set_height(native: &NativeCalibration) -> bool {
-    let source = native.sources.get("height_m").map(|source| source.source);
-    native.mount.height_m.is_none() || source == Some(ValueSource::FromPeople)
+    let source = native.sources.get(&SourcedValue::HeightM);
+    let is_open = |source: &NativeSource| {
+        matches!(
+            source.source,
+            ValueSource::FromPeople | ValueSource::Assumed
+        )
+    };
+    native.mount.height_m.is_none() || source.is_some_and(is_open)
 }
 
 /// Sets the height of a calibration, which people gave.
@@ -139,13 +146,15 @@ pub(crate) fn set_height(native: &mut NativeCalibration, height: &CameraHeight) 
         source: ValueSource::FromPeople,
         uncertainty: Some(hundredths(height.sd_m)),
     };
-    native.sources.insert("height_m".to_owned(), source);
+    native.sources.insert(SourcedValue::HeightM, source);
 }
 
 /// Sets the height of a calibration, which the user gave.
 pub(crate) fn give_height(native: &mut NativeCalibration, height_m: f64) {
     native.mount.height_m = Some((height_m * 1e6).round() / 1e6);
-    native.sources.insert("height_m".to_owned(), GIVEN);
+    native
+        .sources
+        .insert(SourcedValue::HeightM, NativeSource::GIVEN);
 }
 
 /// Returns the angle between the camera's axis and straight down, degrees.
@@ -153,20 +162,28 @@ pub(crate) fn tilt_deg(fit: &RoomFit) -> f64 {
     fit.directions[0].z.clamp(-1.0, 1.0).acos().to_degrees()
 }
 
-fn sources(fit: &RoomFit, known: KnownCamera) -> BTreeMap<String, NativeSource> {
-    let measured = |uncertainty: f64| NativeSource {
-        source: ValueSource::Measured,
-        uncertainty: Some(thousandths(uncertainty)),
+fn sources(fit: &RoomFit, known: KnownCamera) -> BTreeMap<SourcedValue, NativeSource> {
+    let measured = |deviation: f64| NativeSource::measured(Some(thousandths(deviation)));
+    let mut sources = given_lens(known);
+    sources
+        .entry(SourcedValue::Lens)
+        .or_insert_with(|| measured(100.0 * fit.uncertainty.radius));
+    sources.insert(SourcedValue::Center, measured(fit.uncertainty.center));
+    sources.insert(SourcedValue::WorldUp, measured(fit.uncertainty.level_deg));
+    sources
+}
+
+/// Returns the sources of what the user knows of the lens. Without model or field of view, the lens
+/// has another source.
+pub(crate) fn given_lens(known: KnownCamera) -> BTreeMap<SourcedValue, NativeSource> {
+    let given: &[SourcedValue] = match (known.lens, known.field_of_view) {
+        (Some(_), Some(_)) => &[SourcedValue::Lens],
+        (Some(_), None) => &[SourcedValue::LensModel],
+        (None, Some(_)) => &[SourcedValue::FieldOfView],
+        (None, None) => &[],
     };
-    let is_lens_given = known.lens.is_some() && known.field_of_view.is_some();
-    let lens = if is_lens_given {
-        GIVEN
-    } else {
-        measured(100.0 * fit.uncertainty.radius)
-    };
-    BTreeMap::from([
-        ("lens".to_owned(), lens),
-        ("center".to_owned(), measured(fit.uncertainty.center)),
-        ("world_up".to_owned(), measured(fit.uncertainty.level_deg)),
-    ])
+    given
+        .iter()
+        .map(|value| (*value, NativeSource::GIVEN))
+        .collect()
 }

@@ -1,6 +1,8 @@
 //! The parameters of the known values of a camera.
 
-use std::str::FromStr;
+use std::{ops::RangeInclusive, str::FromStr};
+
+use anyhow::ensure;
 
 use lookdown_detect::parameters::ParameterError;
 use lookdown_lens::self_calibration::{FieldOfView, IdealLens, KnownCamera};
@@ -10,6 +12,22 @@ use strum::VariantNames;
 pub(crate) const LENS: &str = "lens";
 /// The parameter of the field of view of the lens circle.
 pub(crate) const FIELD_OF_VIEW_DEG: &str = "field_of_view_deg";
+
+/// The heights of cameras above the floor that can be given, meters.
+const HEIGHTS_M: RangeInclusive<f64> = 0.01..=100.0;
+
+/// Returns a height of a camera above the floor that was given, meters.
+///
+/// # Errors
+/// A height that no camera has.
+pub(crate) fn known_height(meters: f64) -> anyhow::Result<f64> {
+    let (min, max) = (HEIGHTS_M.start(), HEIGHTS_M.end());
+    ensure!(
+        HEIGHTS_M.contains(&meters),
+        "the height is {meters} m: give {min} to {max} meters"
+    );
+    Ok(meters)
+}
 
 /// Parses the known values of a camera: the name of an ideal lens and a field of view in degrees.
 ///

@@ -5,6 +5,7 @@ mod calibration;
 mod evaluate;
 mod evaluation;
 mod examples;
+mod fit_output;
 mod health;
 mod keys;
 mod models;

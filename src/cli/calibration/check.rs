@@ -14,7 +14,10 @@ use lookdown_detect::imaging::{
     annotate::{encode_jpeg, sketch_areas, sketch_foot_filter, sketch_lens, sketch_lines},
 };
 use lookdown_lens::{
-    calibration::{Areas, Calibration, CameraGeometry, native::NativeSource},
+    calibration::{
+        Areas, Calibration, CameraGeometry,
+        native::{NativeSource, SourcedValue},
+    },
     geometry::{Lens, Pixel, Ray, ViewPlan, VirtualView, ZoneArea, view_plan::Coverage},
 };
 
@@ -129,12 +132,12 @@ fn report(camera: &NamedCamera, calibration: &Calibration) -> Vec<(&'static str,
 }
 
 /// Describes the source of a value.
-fn sourced((name, source): (&String, &NativeSource)) -> (&'static str, String) {
+fn sourced((value, source): (&SourcedValue, &NativeSource)) -> (&'static str, String) {
     let kind = source.source;
-    let deviation = source
-        .uncertainty
-        .map_or_else(String::new, |value| format!(" ± {value}"));
-    ("  source", format!("{name}: {kind}{deviation}"))
+    let deviation = source.uncertainty.map_or_else(String::new, |deviation| {
+        format!(" ± {deviation}{}", value.unit())
+    });
+    ("  source", format!("{value}: {kind}{deviation}"))
 }
 
 /// Describes the rim of the lens image, and its position in the frame.

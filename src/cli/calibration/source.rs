@@ -45,6 +45,15 @@ pub(super) struct NamedCamera {
 }
 
 impl Source {
+    /// The only camera of a file.
+    pub(super) fn of(file: PathBuf) -> Self {
+        Self {
+            file,
+            camera: None,
+            size: None,
+        }
+    }
+
     /// Reads the file: the requested camera, or all.
     pub(super) fn read(&self) -> anyhow::Result<Cameras> {
         let path = self.file.display();

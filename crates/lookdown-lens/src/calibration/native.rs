@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 pub use areas::{NativeLine, NativeMask, NativePlace, NativeZone};
 pub use detect::NativeValue;
-pub use source::{NativeSource, ValueSource};
+pub use source::{NativeSource, SourcedValue, ValueSource};
 
 use crate::geometry::lens::LensModel;
 
@@ -51,9 +51,9 @@ pub struct NativeCalibration {
     /// Defaults of detection parameters for the frames of this camera, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub detect: BTreeMap<String, NativeValue>,
-    /// The sources of values: `lens`, `center`, `world_up`, `height_m`.
+    /// The sources of values.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub sources: BTreeMap<String, NativeSource>,
+    pub sources: BTreeMap<SourcedValue, NativeSource>,
 }
 
 impl NativeCalibration {

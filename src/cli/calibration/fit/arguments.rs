@@ -2,13 +2,17 @@
 
 use std::path::PathBuf;
 
+use anyhow::Context;
 use clap::Args;
 use lookdown_lens::{
     calibration::CalibrationId,
-    self_calibration::{FieldOfView, IdealLens},
+    self_calibration::{FieldOfView, IdealLens, KnownCamera},
 };
 
-use crate::cli::{parameters::one_of, settings_file::SettingsFile};
+use crate::{
+    cli::{parameters::one_of, settings_file::SettingsFile},
+    room_calibration::known::known_height,
+};
 
 /// Arguments of `lookdown calibration fit`.
 #[derive(Debug, Args)]
@@ -39,9 +43,14 @@ pub(in crate::cli) struct Arguments {
     /// Find the height of the camera from the people in the frames
     #[arg(long, conflicts_with = "height")]
     pub(super) people: bool,
-    /// Output file [default: standard output]
+    /// Output file. Zones, masks, defaults and the height of a calibration there are kept [default:
+    /// standard output]
     #[arg(long, value_name = "FILE")]
     pub(super) out: Option<PathBuf>,
+    /// Replace the lens and level of the calibration in the output file, though they were measured
+    /// or given
+    #[arg(long, requires = "out")]
+    pub(super) replace: bool,
     /// Output file of straightened views before and after the fit, JPEG
     #[arg(long, value_name = "OUT.jpg", conflicts_with = "circle_only")]
     pub(super) preview: Option<PathBuf>,
@@ -49,9 +58,17 @@ pub(in crate::cli) struct Arguments {
     pub(super) settings_file: SettingsFile,
 }
 
-fn height(text: &str) -> Result<f64, &'static str> {
-    let meters = text.parse().ok();
-    meters
-        .filter(|meters| *meters > 0.0 && *meters <= 100.0)
-        .ok_or("give meters above 0, at most 100")
+impl Arguments {
+    /// Returns what the user knows of the camera.
+    pub(super) fn known(&self) -> KnownCamera {
+        KnownCamera {
+            lens: self.lens,
+            field_of_view: self.field_of_view,
+            is_on_ceiling: self.ceiling,
+        }
+    }
+}
+
+fn height(text: &str) -> anyhow::Result<f64> {
+    known_height(text.parse().context("give meters, such as 2.8")?)
 }

@@ -8,13 +8,16 @@ use lookdown_detect::imaging::{
     lens_circle::{AgreedCircle, agreed_circle, find_lens_circle},
 };
 use lookdown_lens::{
-    calibration::native::{NativeCalibration, NativeImage, NativeMount, NativeSource, ValueSource},
+    calibration::native::{NativeCalibration, NativeImage, NativeSource, SourcedValue},
     geometry::{Lens, Ray},
     self_calibration::{FieldOfView, IdealLens},
 };
 
 use super::arguments::Arguments;
-use crate::rounding::{meters as thousandths, radians_below};
+use crate::{
+    room_calibration::given_lens,
+    rounding::{meters as thousandths, radians_below},
+};
 
 /// The lens and the field of view of most ceiling cameras.
 const LENS: IdealLens = IdealLens::Equidistant;
@@ -41,36 +44,15 @@ pub(super) fn fit(
     Ok(calibration)
 }
 
-fn sources(arguments: &Arguments, agreed: &AgreedCircle) -> BTreeMap<String, NativeSource> {
-    let is_given = arguments.lens.is_some() && arguments.field_of_view.is_some();
-    let lens = if is_given {
-        ValueSource::Given
-    } else {
-        ValueSource::Assumed
-    };
+fn sources(arguments: &Arguments, agreed: &AgreedCircle) -> BTreeMap<SourcedValue, NativeSource> {
     let spread = (agreed.agreeing > 1).then_some(thousandths(agreed.spread));
-    let mut sources = vec![
-        ("lens", lens, None),
-        ("center", ValueSource::Measured, spread),
-        ("world_up", ValueSource::Assumed, None),
-    ];
-    sources.extend(
-        arguments
-            .height
-            .map(|_| ("height_m", ValueSource::Given, None)),
-    );
+    let mut sources = given_lens(arguments.known());
     sources
-        .into_iter()
-        .map(|(name, source, uncertainty)| {
-            (
-                name.to_owned(),
-                NativeSource {
-                    source,
-                    uncertainty,
-                },
-            )
-        })
-        .collect()
+        .entry(SourcedValue::Lens)
+        .or_insert(NativeSource::ASSUMED);
+    sources.insert(SourcedValue::Center, NativeSource::measured(spread));
+    sources.insert(SourcedValue::WorldUp, NativeSource::ASSUMED);
+    sources
 }
 
 fn calibration(
@@ -97,10 +79,6 @@ fn calibration(
     let radius_in_focal_lengths = rim.x - of_one_pixel.principal_point().x;
     let lens = lens(thousandths(circle.radius / radius_in_focal_lengths));
     Ok(NativeCalibration {
-        mount: NativeMount {
-            height_m: arguments.height,
-            ..NativeMount::default()
-        },
         sources: sources(arguments, agreed),
         ..NativeCalibration::new(arguments.id.to_string(), image, lens)
     })

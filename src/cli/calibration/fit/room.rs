@@ -8,12 +8,12 @@ use lookdown_detect::imaging::{
     room_fit::{RoomFrame, fit_room},
 };
 use lookdown_lens::{
-    calibration::native::{NativeCalibration, NativeImage, NativeSource},
-    self_calibration::{KnownCamera, RoomFit},
+    calibration::native::{NativeCalibration, NativeImage, NativeSource, SourcedValue},
+    self_calibration::RoomFit,
 };
 
 use super::arguments::Arguments;
-use crate::room_calibration::{checked, give_height, preview, room_calibration, tilt_deg};
+use crate::room_calibration::{checked, preview, room_calibration, tilt_deg};
 
 /// Fits the camera and reports its values.
 pub(super) fn fit(
@@ -21,19 +21,12 @@ pub(super) fn fit(
     image: NativeImage,
     frames: &[Frame],
 ) -> anyhow::Result<NativeCalibration> {
-    let known = KnownCamera {
-        lens: arguments.lens,
-        field_of_view: arguments.field_of_view,
-        is_on_ceiling: arguments.ceiling,
-    };
+    let known = arguments.known();
     let edges: Vec<_> = frames.iter().map(RoomFrame::of).collect();
     let fit = fit_room(&edges, known).context(
         "the camera cannot be fitted; --circle-only detects the lens circle and assumes the rest",
     )?;
-    let mut calibration = room_calibration(&arguments.id, image, &fit, known);
-    if let Some(height) = arguments.height {
-        give_height(&mut calibration, height);
-    }
+    let calibration = room_calibration(&arguments.id, image, &fit, known);
     report(arguments, &fit, &calibration.sources);
     if let (Some(out), Some(frame)) = (&arguments.preview, frames.first()) {
         let drawn = preview::draw(&checked(&calibration)?, &fit, frame)?;
@@ -44,42 +37,51 @@ pub(super) fn fit(
 }
 
 /// Prints the values with their uncertainty and source.
-fn report(arguments: &Arguments, fit: &RoomFit, sources: &BTreeMap<String, NativeSource>) {
+fn report(arguments: &Arguments, fit: &RoomFit, sources: &BTreeMap<SourcedValue, NativeSource>) {
     let tilt = tilt_deg(fit);
     let [cx, cy] = fit.center;
-    let mut rows = vec![
-        (
-            "lens",
-            format!(
-                "focal length {:.1} pixels, circle {:.1}°",
-                fit.focal,
-                2.0 * fit.max_theta.to_degrees()
-            ),
-            "% of the radius",
-        ),
-        (
-            "center",
-            format!("{:.1}, {:.1}", cx + 0.5, cy + 0.5),
-            " pixels",
-        ),
-        ("world_up", format!("tilted by {tilt:.1}°"), "°"),
-    ];
-    rows.extend(
-        arguments
-            .height
-            .map(|height| ("height_m", format!("{height} m"), " m")),
-    );
     eprintln!(
-        "{:<10} {:<42} {:<24} source",
+        "{:<14} {:<42} {:<24} source",
         "value", "found", "standard deviation"
     );
-    for (name, found, unit) in rows {
-        let Some(value) = sources.get(name) else {
-            continue;
-        };
-        let deviation = value.uncertainty.map(|value| format!("{value:.2}{unit}"));
+    let line = |value: SourcedValue, found: String, source: &NativeSource| {
+        let deviation = source.uncertainty;
+        let deviation = deviation.map(|deviation| format!("{deviation:.2}{}", value.unit()));
         let deviation = deviation.unwrap_or_else(|| "-".to_owned());
-        eprintln!("{name:<10} {found:<42} {deviation:<24} {}", value.source);
+        let name = value.to_string();
+        eprintln!("{name:<14} {found:<42} {deviation:<24} {}", source.source);
+    };
+    let field_of_view = 2.0 * fit.max_theta.to_degrees();
+    for (value, source) in sources {
+        let found = match value {
+            SourcedValue::Lens => format!(
+                "focal length {:.1} pixels, circle {field_of_view:.1}°",
+                fit.focal
+            ),
+            SourcedValue::LensModel => arguments
+                .lens
+                .map(|lens| lens.to_string())
+                .unwrap_or_default(),
+            SourcedValue::FieldOfView => format!("{field_of_view:.1}°"),
+            SourcedValue::Center => format!("{:.1}, {:.1}", cx + 0.5, cy + 0.5),
+            SourcedValue::WorldUp => format!("tilted by {tilt:.1}°"),
+            // The fit says nothing about it.
+            SourcedValue::HeightM => continue,
+        };
+        line(*value, found, source);
+    }
+    if let Some(height) = arguments.height {
+        line(
+            SourcedValue::HeightM,
+            format!("{height} m"),
+            &NativeSource::GIVEN,
+        );
+    }
+    if !fit.is_circle_detected {
+        eprintln!(
+            "lookdown: the frames show no lens circle, so the field of view is a guess: give bright frames with black \
+             around the lens image, or --field-of-view"
+        );
     }
     eprintln!(
         "lookdown: {:.0} % of {} edges follow three orthogonal directions; check the calibration \

@@ -8,7 +8,7 @@ use super::{Format, FormatError, fields::Fields};
 use crate::{
     calibration::native::{
         NativeCalibration, NativeImage, NativeLine, NativeMask, NativeMount, NativePlace,
-        NativeSource, NativeValue, NativeZone,
+        NativeSource, NativeValue, NativeZone, SourcedValue,
     },
     geometry::lens::LensModel,
     warning::Warning,
@@ -54,7 +54,7 @@ pub struct Camera {
     /// Its defaults of detection parameters; only native files have some.
     pub detect: BTreeMap<String, NativeValue>,
     /// The sources of its values; only native files have some.
-    pub sources: BTreeMap<String, NativeSource>,
+    pub sources: BTreeMap<SourcedValue, NativeSource>,
     /// The assumptions of the reader.
     pub notes: Vec<Warning>,
 }

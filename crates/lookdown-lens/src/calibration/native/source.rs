@@ -1,6 +1,51 @@
 //! The source of a value of a calibration.
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, de::Error};
+
+/// The values of a calibration that have a source.
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Serialize,
+    Deserialize,
+    strum::Display,
+    strum::EnumString,
+)]
+#[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
+pub enum SourcedValue {
+    /// The radius at all angles.
+    Lens,
+    /// The projection of the lens, if it has another source.
+    LensModel,
+    /// The angle at the circle, if it has another source.
+    FieldOfView,
+    /// The optical center.
+    Center,
+    /// The direction of up.
+    WorldUp,
+    /// The height above the floor.
+    HeightM,
+}
+
+impl SourcedValue {
+    /// Returns the unit of the standard deviation, to follow its number.
+    #[must_use]
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Lens => " % of the radius",
+            Self::LensModel => "",
+            Self::FieldOfView | Self::WorldUp => "°",
+            Self::Center => " pixels",
+            Self::HeightM => " m",
+        }
+    }
+}
 
 /// Kind of source.
 #[derive(
@@ -25,8 +70,44 @@ pub enum ValueSource {
 pub struct NativeSource {
     /// Kind of source.
     pub source: ValueSource,
-    /// Standard deviation: of `lens` in percent of the radius, of `center` in pixels, of `world_up`
-    /// in degrees, of `height_m` in meters.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Standard deviation in the unit of [`SourcedValue::unit`]: finite and not negative.
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "deviation"
+    )]
     pub uncertainty: Option<f64>,
+}
+
+impl NativeSource {
+    /// A value of the user.
+    pub const GIVEN: Self = Self::without_deviation(ValueSource::Given);
+    /// A value that nobody measured.
+    pub const ASSUMED: Self = Self::without_deviation(ValueSource::Assumed);
+
+    const fn without_deviation(source: ValueSource) -> Self {
+        Self {
+            source,
+            uncertainty: None,
+        }
+    }
+
+    /// A measured value with its standard deviation, if that is known.
+    #[must_use]
+    pub fn measured(uncertainty: Option<f64>) -> Self {
+        Self {
+            source: ValueSource::Measured,
+            uncertainty,
+        }
+    }
+}
+
+fn deviation<'de, D: Deserializer<'de>>(input: D) -> Result<Option<f64>, D::Error> {
+    let value = Option::<f64>::deserialize(input)?;
+    match value {
+        Some(value) if !(value.is_finite() && value >= 0.0) => Err(D::Error::custom(format!(
+            "uncertainty is {value}: give a standard deviation of 0 or more"
+        ))),
+        _ => Ok(value),
+    }
 }
