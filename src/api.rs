@@ -3,6 +3,7 @@
 
 mod companions;
 mod detect;
+mod fit_turns;
 mod http;
 mod in_process;
 mod openapi;

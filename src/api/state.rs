@@ -19,6 +19,7 @@ use lookdown_lens::self_calibration::IdealLens;
 
 use super::{
     companions::Companions,
+    fit_turns::FitTurns,
     http::{
         access::Access,
         context::RequestContext,
@@ -160,6 +161,8 @@ pub struct Shared {
     pub(super) responses: SharedBudget,
     /// The calibrations that are found for cameras without one.
     pub(super) suggestions: Suggestions,
+    /// The turns of fits that were asked for.
+    pub(super) fits: FitTurns,
     pub(super) options: ApiOptions,
 }
 
@@ -204,6 +207,7 @@ impl ApiState {
             ),
             responses: SharedBudget::new(options.max_upload_bytes),
             suggestions,
+            fits: FitTurns::default(),
             options,
         }))
     }

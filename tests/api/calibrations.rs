@@ -374,6 +374,34 @@ async fn camera_that_looks_straight_down_is_fitted_with_its_lens() {
 }
 
 #[tokio::test]
+async fn several_frames_of_a_camera_are_fitted_together() {
+    let service = Service::start();
+    let office = &include_bytes!("../../samples/office.jpg")[..];
+    let lens: (&str, &[u8]) = ("lens", b"equidistant");
+    let fit = async |frames: &[&[u8]]| {
+        let frames = frames.iter().map(|frame| ("img", *frame));
+        let parts: Vec<_> = frames.chain([lens]).collect();
+        service
+            .send(form_to("/calibrations/hall/fit", &parts))
+            .await
+    };
+    let [one, two] = [fit(&[office]).await, fit(&[office; 2]).await].map(|answer| answer.json());
+    assert_eq!(
+        two["edges"].as_u64().unwrap(),
+        2 * one["edges"].as_u64().unwrap()
+    );
+    for (frames, fault) in [
+        (vec![office, &frame()[..]], "differ in size"),
+        (vec![office; 6], "more than 5 frames"),
+    ] {
+        let answer = fit(&frames).await;
+        assert_eq!(answer.status, 422);
+        let detail = answer.json()["detail"].to_string();
+        assert!(detail.contains(fault), "{detail}");
+    }
+}
+
+#[tokio::test]
 async fn wrong_values_of_a_fit_are_named() {
     let service = Service::start();
     for (query, parameter, status) in [

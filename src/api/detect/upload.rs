@@ -21,7 +21,7 @@ pub(in crate::api) use received_request::ReceivedRequest;
 
 use names::{frame_in_query, use_in_detection};
 
-pub(in crate::api) use {form::FieldUse, names::use_among};
+pub(in crate::api) use {form::FieldUse, names::frames_among};
 
 use crate::{
     access::Scope,
@@ -38,6 +38,8 @@ use crate::{
 pub(in crate::api) struct Upload {
     /// The encoded frame.
     pub(in crate::api) image: Bytes,
+    /// Further frames of a form, where `use_of` permits them.
+    pub(in crate::api) further_images: Vec<Bytes>,
     /// The form field of the frame; `None` if the frame is the body.
     pub(in crate::api) field: Option<String>,
     /// The name of its file, if it was sent.
@@ -120,15 +122,24 @@ impl Upload {
             arrived,
         } = ReceivedRequest::receive(request, state, budget).await?;
         let headers = parts.headers.clone();
-        let (image, field, file_name, parameters) = if is_multipart(&headers) {
-            let form = form::parse(parts, held.bytes(), use_of).await?;
-            let image = held.with_bytes(form.image);
-            (image, Some(form.field), form.file_name, form.parameters)
+        let form = if is_multipart(&headers) {
+            Some(form::parse(parts, held.bytes(), use_of).await?)
         } else {
-            (held, None, None, Vec::new())
+            None
+        };
+        let (image, field, file_name, further_images, parameters) = match form {
+            Some(form) => (
+                held.with_bytes(form.image),
+                Some(form.field),
+                form.file_name,
+                form.further_images,
+                form.parameters,
+            ),
+            None => (held, None, None, Vec::new(), Vec::new()),
         };
         Ok(Self {
             image: image.into_bytes(),
+            further_images,
             field,
             file_name,
             headers,

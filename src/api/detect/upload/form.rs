@@ -27,6 +27,8 @@ const MAX_FILE_NAME_CHARS: usize = 255;
 pub(in crate::api) enum FieldUse {
     /// The frame.
     Frame,
+    /// The frame, or a further one of the same camera.
+    Frames,
     /// A parameter.
     Parameter,
     /// Not used and ignored.
@@ -36,6 +38,8 @@ pub(in crate::api) enum FieldUse {
 /// The content of a form.
 pub(super) struct Form {
     pub(super) image: Bytes,
+    /// Further frames, where the request may have some.
+    pub(super) further_images: Vec<Bytes>,
     /// The field of the frame.
     pub(super) field: String,
     /// The name of the frame's file, without its folders.
@@ -56,6 +60,7 @@ pub(super) async fn parse(
         .await
         .map_err(|_| malformed("the Content-Type must be multipart/form-data with a boundary"))?;
     let mut image = None;
+    let mut further_images = Vec::new();
     let mut file_name = None;
     let mut parameters = Vec::new();
     let mut fields = 0;
@@ -67,16 +72,19 @@ pub(super) async fn parse(
         }
         let name = field.name().unwrap_or_default().to_owned();
         match use_of(&name)? {
-            FieldUse::Frame => {
+            field_use @ (FieldUse::Frame | FieldUse::Frames) => {
                 file_name = field.file_name().and_then(name_of_file);
                 let bytes = field.bytes().await.map_err(broken)?;
                 if file_name.is_none() && is_file_name(&bytes) {
                     return Err(name_instead_of_file(&name));
                 }
-                if image.is_some() {
+                if image.is_none() {
+                    image = Some((bytes, name));
+                } else if field_use == FieldUse::Frames {
+                    further_images.push(bytes);
+                } else {
                     return Err(second_image(&name));
                 }
-                image = Some((bytes, name));
             }
             FieldUse::Parameter => {
                 let value = value_of(&name, field).await?;
@@ -88,6 +96,7 @@ pub(super) async fn parse(
     let (image, field) = image.ok_or_else(missing_image)?;
     Ok(Form {
         image,
+        further_images,
         field,
         file_name,
         parameters,

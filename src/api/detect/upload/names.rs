@@ -15,7 +15,7 @@ pub(super) fn use_in_detection(name: &str) -> Result<FieldUse, Problem> {
 }
 
 /// Returns the use of a field of a form with a frame and these parameters; others are refused.
-pub(in crate::api) fn use_among(parameters: &[&str], name: &str) -> Result<FieldUse, Problem> {
+fn use_among(parameters: &[&str], name: &str) -> Result<FieldUse, Problem> {
     if FRAME_NAMES.contains(&name) {
         Ok(FieldUse::Frame)
     } else if parameters.contains(&name) {
@@ -27,6 +27,16 @@ pub(in crate::api) fn use_among(parameters: &[&str], name: &str) -> Result<Field
         );
         Err(ParameterError::unknown(name, problem).into())
     }
+}
+
+/// Returns the use of a field of a form with one or more frames and these parameters; others are
+/// refused.
+pub(in crate::api) fn frames_among(parameters: &[&str], name: &str) -> Result<FieldUse, Problem> {
+    let field_use = use_among(parameters, name)?;
+    Ok(match field_use {
+        FieldUse::Frame => FieldUse::Frames,
+        other => other,
+    })
 }
 
 /// Returns the problem of a frame in the query.

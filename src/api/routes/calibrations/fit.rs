@@ -5,6 +5,7 @@ use axum::{
     extract::{FromRequest, Request, State},
     response::IntoResponse,
 };
+use bytes::Bytes;
 use lookdown_detect::imaging::{
     decode::{DecodeLimits, decode},
     room_fit::{RoomFrame, fit_room},
@@ -17,13 +18,14 @@ use lookdown_lens::{
     self_calibration::KnownCamera,
 };
 use serde::Serialize;
+use tokio_util::sync::CancellationToken;
 use utoipa::{IntoParams, ToSchema};
 
 use super::address::NewCalibrationAddress;
 use crate::{
     api::{
         ApiState,
-        detect::upload::{Upload, use_among},
+        detect::upload::{Upload, frames_among},
         http::{
             problem::{Problem, ProblemKind},
             query::values_named,
@@ -35,6 +37,7 @@ use crate::{
         known::{FIELD_OF_VIEW_DEG, LENS, parsed},
         known_camera, room_calibration,
     },
+    suggestions::FRAMES,
 };
 
 const CEILING: &str = "ceiling";
@@ -60,7 +63,7 @@ struct KnownCameraQuery {
     ceiling: Option<bool>,
 }
 
-/// A frame, and the known values of its camera.
+/// Frames of one camera, and its known values.
 pub(in crate::api) struct FitRequest {
     upload: Upload,
     known: KnownCamera,
@@ -70,7 +73,7 @@ impl FromRequest<ApiState> for FitRequest {
     type Rejection = Problem;
 
     async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
-        let mut upload = Upload::accept(request, state, |name| use_among(&NAMES, name)).await?;
+        let mut upload = Upload::accept(request, state, |name| frames_among(&NAMES, name)).await?;
         let [lens, field_of_view, ceiling] =
             values_named(std::mem::take(&mut upload.parameters), NAMES)?;
         let is_on_ceiling = parsed(CEILING, ceiling.as_deref(), "true or false")?;
@@ -97,7 +100,9 @@ pub(in crate::api) struct FittedCamera {
 /// Find the lens
 ///
 /// Fits lens, center and level to the straight edges of a frame of the camera, or says why the
-/// frame does not determine them. Known values are kept. Nothing is stored.
+/// frame does not determine them. A form may have up to five frames of different times. Known
+/// values are kept. Nothing is stored, and the answer has nothing of a stored calibration of this
+/// ID.
 #[utoipa::path(
     post, path = "/calibrations/{id}/fit", tag = "calibrations", operation_id = "fit_calibration",
     params(
@@ -117,34 +122,57 @@ pub(in crate::api) async fn fit(
     FitRequest { upload, known }: FitRequest,
 ) -> Result<impl IntoResponse, Problem> {
     let (image, deadline) = (upload.image, upload.context.deadline);
+    let images: Vec<_> = [image].into_iter().chain(upload.further_images).collect();
+    if images.len() > FRAMES {
+        let fault = format!("the form has more than {FRAMES} frames: send fewer");
+        return Err(refused(&fault));
+    }
     let limits = state.workers.engine().options().decode_limits;
-    let fitting = state.workers.run(upload.caller.ticket(), move |_| {
-        fitted(&limits, &id, &image, known)
-    });
+    let ticket = upload.caller.ticket();
+    let fitting = async {
+        let turn = match state.fits.next().await {
+            Ok(turn) => turn,
+            Err(problem) => return Ok(Err(problem)),
+        };
+        let work = move |_: &CancellationToken| {
+            let _turn = turn;
+            fitted(&limits, &id, &images, known)
+        };
+        state.workers.run(ticket, work).await
+    };
     let remedy = "send fewer requests at a time, use a smaller frame";
     let fitted = deadline.wait("no fit", remedy, fitting).await?;
     Ok(Json(fitted?))
 }
 
-/// Decodes the frame and fits the camera.
+/// Decodes the frames, one after the other, and fits the camera.
 fn fitted(
     limits: &DecodeLimits,
     id: &CalibrationId,
-    image: &[u8],
+    images: &[Bytes],
     known: KnownCamera,
 ) -> Result<FittedCamera, Problem> {
-    let refused =
-        |fault: String| Problem::of_parameter(ProblemKind::InvalidParameter, "image", &fault);
-    let decoded = decode(image, limits).map_err(|error| refused(error.to_string()))?;
-    let frame = decoded.frame;
-    let size = NativeImage {
-        width: frame.width(),
-        height: frame.height(),
-    };
-    let fit = fit_room(&[RoomFrame::of(&frame)], known);
-    let fit = fit.map_err(|error| refused(error.to_string()))?;
+    let mut frames: Vec<RoomFrame> = Vec::with_capacity(images.len());
+    for image in images {
+        let decoded = decode(image, limits).map_err(|error| refused(&error.to_string()))?;
+        let frame = RoomFrame::of(&decoded.frame);
+        if let Some(first) = frames.first()
+            && first.size() != frame.size()
+        {
+            return Err(refused(
+                "the frames differ in size: send frames of one camera",
+            ));
+        }
+        frames.push(frame);
+    }
+    let fit = fit_room(&frames, known).map_err(|error| refused(&error.to_string()))?;
+    let (width, height) = frames[0].size();
     Ok(FittedCamera {
-        calibration: room_calibration(id, size, &fit, known),
+        calibration: room_calibration(id, NativeImage { width, height }, &fit, known),
         lens: FoundLens::from(&fit),
     })
+}
+
+fn refused(fault: &str) -> Problem {
+    Problem::of_parameter(ProblemKind::InvalidParameter, "image", fault)
 }
