@@ -13,6 +13,8 @@ const STEP_S: f64 = 0.5;
 const MAX_GAP_S: f64 = 2.0;
 /// Common steps of two walks that may be the same person.
 const LEAST_STEPS: usize = 6;
+/// Common time of two walks that is compared, seconds.
+const MAX_COMMON_S: f64 = 600.0;
 /// Standard deviation of the places of a walk that tells a direction, meters: a person who stands
 /// fits any rotation.
 const LEAST_SPREAD_M: f64 = 0.5;
@@ -239,6 +241,7 @@ impl Pair {
     fn of(first: &Walk, second: &Walk) -> Option<Self> {
         let begin = first.first()?.0.max(second.first()?.0);
         let end = first.last()?.0.min(second.last()?.0);
+        let end = end.min(begin + MAX_COMMON_S);
         let mut pair = Self {
             first: Vec::new(),
             second: Vec::new(),

@@ -24,6 +24,8 @@ const TIMEOUT: Duration = Duration::from_secs(10);
 const INTERVAL: Duration = Duration::from_millis(500);
 /// Interval of the lines that report the progress.
 const PROGRESS: Duration = Duration::from_secs(30);
+/// Most people of a camera. Those of four hours in a busy hall are fewer.
+const MAX_WALKS: usize = 10_000;
 /// Largest answer that is read, bytes.
 const MAX_BYTES: usize = 16 << 20;
 
@@ -147,6 +149,9 @@ impl Walks {
             let Some(place) = floor_m else {
                 bail!("{camera} has no places on the floor: set mount.height_m of its calibration");
             };
+            if self.0.len() >= MAX_WALKS && !self.0.contains_key(&id) {
+                bail!("{camera} has more than {MAX_WALKS} people: give fewer --minutes");
+            }
             let at_s = last_seen.as_duration().as_secs_f64();
             let walk = self.0.entry(id).or_default();
             if walk.last().is_none_or(|(last, _)| *last < at_s) {
