@@ -61,6 +61,7 @@ fn fit() -> RoomFit {
         directions: [Ray::z(), Ray::x(), Ray::y()],
         explained: 0.8,
         edges: 400,
+        edge_scale: 1.0,
         uncertainty: FitUncertainty {
             radius: 0.004,
             center: 1.0,
