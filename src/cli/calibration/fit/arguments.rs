@@ -42,7 +42,8 @@ pub(in crate::cli) struct Arguments {
     /// Output file [default: standard output]
     #[arg(long, value_name = "FILE")]
     pub(super) out: Option<PathBuf>,
-    /// Output file of straightened views before and after the fit, JPEG
+    /// Output file of the preview, JPEG: straightened views before and after the fit, and the edges
+    /// of the room
     #[arg(long, value_name = "OUT.jpg", conflicts_with = "circle_only")]
     pub(super) preview: Option<PathBuf>,
     #[command(flatten)]

@@ -35,8 +35,9 @@ pub(super) fn fit(
         give_height(&mut calibration, height);
     }
     report(arguments, &fit, &calibration.sources);
-    if let (Some(out), Some(frame)) = (&arguments.preview, frames.first()) {
-        let drawn = preview::draw(&checked(&calibration)?, &fit, frame)?;
+    let first = frames.first().zip(edges.first());
+    if let (Some(out), Some((frame, edges))) = (&arguments.preview, first) {
+        let drawn = preview::draw(&checked(&calibration)?, &fit, frame, edges)?;
         fs::write(out, drawn)
             .with_context(|| format!("--preview: {} cannot be written", out.display()))?;
     }
