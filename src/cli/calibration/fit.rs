@@ -6,7 +6,11 @@ mod room;
 
 use std::process::ExitCode;
 
-use super::{native_output::write_native, people::set_height, read_frames};
+use super::{
+    native_output::write_native,
+    people::{PeopleSource, set_height},
+    read_frames,
+};
 
 pub(in crate::cli) use arguments::Arguments;
 
@@ -19,7 +23,12 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         room::fit(arguments, image, &frames)?
     };
     if arguments.people {
-        set_height(&mut calibration, &frames, &arguments.settings_file)?;
+        let people = PeopleSource {
+            frames: &frames,
+            reports: &[],
+            settings: &arguments.settings_file,
+        };
+        set_height(&mut calibration, &people)?;
     }
     write_native(&calibration, arguments.out.as_deref())?;
     Ok(ExitCode::SUCCESS)
