@@ -33,7 +33,8 @@ pub struct RoomCalibration {
     pub calibration: Calibration,
     /// Its native file, JSON.
     pub file: String,
-    /// Views of the first frame, JPEG: above with an assumed lens, below with the found one.
+    /// The preview of the fit with the first frame, JPEG: straightened views before and after, and
+    /// the edges that follow the room.
     pub preview: Vec<u8>,
 }
 
@@ -72,7 +73,7 @@ pub fn calibrate(
     }
     let calibration = checked(&native)?;
     Ok(RoomCalibration {
-        preview: preview::draw(&calibration, &fit, first)?,
+        preview: preview::draw(&calibration, &fit, first, &edges[0])?,
         file: Target::Native.write(&native)?.content,
         calibration,
     })

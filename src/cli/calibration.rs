@@ -8,6 +8,7 @@ mod height;
 mod native_output;
 mod people;
 mod place;
+mod report_file;
 mod source;
 mod suggest_area;
 
@@ -26,7 +27,7 @@ pub(super) enum Command {
     Convert(convert::Arguments),
     /// Fit a calibration to frames of the room: lens, center and level from its straight edges
     Fit(fit::Arguments),
-    /// Find the height of a camera from the people in its frames
+    /// Find the height of a camera from the people in its frames or reports
     Height(height::Arguments),
     /// Find the place of a camera on the floor of another, from people who walk through both views
     Place(place::Arguments),

@@ -2,6 +2,7 @@
 
 use std::{collections::BTreeSet, ops::RangeInclusive};
 
+use lookdown_common::report::MAX_REPORT_BYTES;
 use lookdown_detect::imaging::annotate::Concealment;
 use secrecy::{ExposeSecret, SecretString};
 
@@ -12,8 +13,8 @@ use super::{
 };
 use crate::results::{ImagesOf, RedisAddress, RedisAddressError, RedisOptions, ResultLimits};
 
-/// 8 MiB: enough for any single report.
-const MIN_BYTES: u64 = 8 << 20;
+/// Enough for any single report.
+const MIN_BYTES: u64 = MAX_REPORT_BYTES;
 /// From a minute to a year.
 const AGES: RangeInclusive<u64> = 60..=366 * 86_400;
 

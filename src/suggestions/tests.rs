@@ -64,6 +64,7 @@ fn fit() -> RoomFit {
         directions: [Ray::z(), Ray::x(), Ray::y()],
         explained: 0.8,
         edges: 400,
+        edge_scale: 1.0,
         is_circle_detected: true,
         uncertainty: FitUncertainty {
             radius: 0.004,

@@ -2,6 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a panic fails the test")]
 
 mod calibration;
+mod camera_height;
 mod evaluate;
 mod evaluation;
 mod examples;

@@ -6,6 +6,9 @@ use std::borrow::Cow;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+/// Most bytes of a report as JSON: more than any report has.
+pub const MAX_REPORT_BYTES: u64 = 8 << 20;
+
 /// The persons in one frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[schema(example = json!({

@@ -5,9 +5,11 @@ use lookdown_common::{
     report::{Report, ReportCalibration, ReportImage, ReportOrientedBox, ReportPerson},
     text::is_camera_name,
 };
-use lookdown_lens::{calibration::CalibrationId, geometry::Pixel};
+use lookdown_lens::{
+    calibration::CalibrationId,
+    geometry::{OrientedBox, Pixel},
+};
 use lookdown_tracking::Observation;
-use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
 use crate::{definition::CameraDefinition, definition_key::DefinitionKey};
@@ -155,15 +157,9 @@ fn observation(
     } = person.oriented_box;
     let center = Pixel::new(cx, cy);
     // The angle does not tell the head from the foot.
-    let vertical = definition.up_at(center);
-    let (sin, cos) = angle_deg.to_radians().sin_cos();
-    let axis = Vector2::new(sin, -cos);
-    let up = if axis.dot(&vertical) < 0.0 {
-        -axis
-    } else {
-        axis
-    };
-    let foot = center - up * (height / 2.0);
+    let foot = OrientedBox::turned(center, width, height, angle_deg.to_radians())
+        .with_head_toward(&definition.up_at(center))
+        .foot();
     Some(Observation {
         floor_m: person.floor.map(|floor| [floor.x_m, floor.y_m]),
         azimuth_deg: bearing.azimuth_deg,

@@ -11,6 +11,7 @@ mod edge_curve;
 mod evaluation;
 mod evidence;
 mod fit;
+mod followed_edges;
 mod halves;
 mod known_camera;
 mod maxima;

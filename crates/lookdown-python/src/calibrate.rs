@@ -32,8 +32,8 @@ impl Image<'_> {
     }
 }
 
-/// Calibrates a camera from frames of one size. Returns the calibration and straightened views as a
-/// JPEG: above with an assumed lens, below with the found one.
+/// Calibrates a camera from frames of one size. Returns the calibration and the preview of the fit
+/// as a JPEG.
 #[pyfunction]
 #[pyo3(signature = (images, id, height_m=None, lens=None, field_of_view_deg=None, ceiling=false))]
 pub(crate) fn calibrate(

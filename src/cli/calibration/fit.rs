@@ -7,7 +7,11 @@ mod room;
 
 use std::process::ExitCode;
 
-use super::{native_output::write_native, people::set_height, read_frames};
+use super::{
+    native_output::write_native,
+    people::{PeopleSource, set_height},
+    read_frames,
+};
 use crate::room_calibration::give_height;
 
 pub(in crate::cli) use arguments::Arguments;
@@ -28,7 +32,12 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         give_height(&mut calibration, height);
     }
     if arguments.people {
-        set_height(&mut calibration, &frames, &arguments.settings_file)?;
+        let people = PeopleSource {
+            frames: &frames,
+            reports: &[],
+            settings: &arguments.settings_file,
+        };
+        set_height(&mut calibration, &people)?;
     }
     write_native(&calibration, arguments.out.as_deref())?;
     Ok(ExitCode::SUCCESS)

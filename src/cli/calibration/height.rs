@@ -6,7 +6,10 @@ use anyhow::Context;
 use clap::Args;
 
 use super::{
-    frame_file::read_frames, native_output::write_native, people::set_height, source::Source,
+    frame_file::read_frames,
+    native_output::write_native,
+    people::{PeopleSource, set_height},
+    source::Source,
 };
 use crate::cli::settings_file::SettingsFile;
 
@@ -15,9 +18,13 @@ use crate::cli::settings_file::SettingsFile;
 pub(in super::super) struct Arguments {
     #[command(flatten)]
     source: Source,
-    /// Frames of the camera with people who stand: JPEG, PNG or WebP, all of one size
-    #[arg(required = true, value_name = "FRAME")]
+    /// Frames of the camera with people who stand: JPEG, PNG or WebP, all of one size.
+    /// They may be left out with --reports
+    #[arg(required_unless_present = "reports", value_name = "FRAME")]
     frames: Vec<PathBuf>,
+    /// A file of reports of `lookdown detect` with this calibration, one per line. May be repeated
+    #[arg(long, value_name = "FILE.jsonl")]
+    reports: Vec<PathBuf>,
     /// Output file [default: standard output]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -29,8 +36,16 @@ pub(in super::super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let path = arguments.source.file.display();
     let (mut native, _) = arguments.source.read_native(None)?;
-    let (_, frames) = read_frames(&arguments.frames)?;
-    set_height(&mut native, &frames, &arguments.settings_file).with_context(|| path.to_string())?;
+    let frames = match arguments.frames.as_slice() {
+        [] => Vec::new(),
+        paths => read_frames(paths)?.1,
+    };
+    let people = PeopleSource {
+        frames: &frames,
+        reports: &arguments.reports,
+        settings: &arguments.settings_file,
+    };
+    set_height(&mut native, &people).with_context(|| path.to_string())?;
     write_native(&native, arguments.out.as_deref())?;
     Ok(ExitCode::SUCCESS)
 }

@@ -1,6 +1,6 @@
-//! The height of a camera from the people in its frames.
+//! The height of a camera from the people in its frames and reports.
 
-use std::sync::Arc;
+use std::{path::PathBuf, sync::Arc};
 
 use anyhow::Context;
 use lookdown_detect::{
@@ -9,22 +9,33 @@ use lookdown_detect::{
     pipeline::{DetectJob, JobImage},
 };
 use lookdown_lens::{
-    calibration::{CalibrationId, native::NativeCalibration},
+    calibration::{Calibration, native::NativeCalibration},
+    geometry::OrientedBox,
     self_calibration::CameraHeight,
 };
 
+use super::report_file::people_in_reports;
 use crate::{
     app::engine_for,
     cli::settings_file::SettingsFile,
     room_calibration::{self, checked, may_set_height},
 };
 
-/// Sets the height of the calibration from the people in the frames, and reports it. A height that
-/// was measured or given is kept.
+/// The origin of the people.
+pub(super) struct PeopleSource<'a> {
+    /// Frames in which people are detected.
+    pub(super) frames: &'a [Frame],
+    /// Files of reports.
+    pub(super) reports: &'a [PathBuf],
+    /// The settings of the detection.
+    pub(super) settings: &'a SettingsFile,
+}
+
+/// Sets the height of the calibration from people, and reports it. A height that was measured or
+/// given is kept.
 pub(super) fn set_height(
     calibration: &mut NativeCalibration,
-    frames: &[Frame],
-    settings: &SettingsFile,
+    source: &PeopleSource<'_>,
 ) -> anyhow::Result<()> {
     if let Some(known) = calibration.mount.height_m
         && !may_set_height(calibration)
@@ -33,7 +44,7 @@ pub(super) fn set_height(
             "mount.height_m is {known} m: remove it from the file to find it from people"
         );
     }
-    let height = height_of(calibration, frames, settings)?;
+    let height = height_of(calibration, source)?;
     room_calibration::set_height(calibration, &height);
     eprintln!(
         "lookdown: the camera is {:.2} m above the floor (standard deviation {:.2} m), by {} people \
@@ -43,26 +54,50 @@ pub(super) fn set_height(
     Ok(())
 }
 
-/// Detects the people with the calibration.
+/// Finds the height from all people. Their boxes are in pixels of the calibration.
 fn height_of(
     calibration: &NativeCalibration,
-    frames: &[Frame],
-    settings: &SettingsFile,
+    source: &PeopleSource<'_>,
 ) -> anyhow::Result<CameraHeight> {
     let camera = Arc::new(checked(calibration)?);
-    let id: &CalibrationId = camera.id();
-    let parameters = DetectParameters::parse([("calibration", id.as_str())])?;
-    let settings = settings.load()?;
-    let engine = engine_for(&settings, std::slice::from_ref(&parameters))?;
+    let parameters = DetectParameters::parse([("calibration", camera.id().as_str())])?;
     let mut people = Vec::new();
-    for frame in frames {
-        let image = JobImage::Decoded(Arc::new(frame.clone()));
-        let calibration = Some(Arc::clone(&camera));
-        let job = DetectJob::local(id.to_string(), image, parameters.clone(), calibration);
-        let detected = engine.detect(&job)?;
-        let persons = detected.report.persons;
-        people.extend(persons.into_iter().map(|person| person.oriented_box));
+    for path in source.reports {
+        people.extend(people_in_reports(path, &camera, &parameters)?);
+    }
+    if !source.frames.is_empty() {
+        people.extend(people_in_frames(source, &camera, &parameters)?);
     }
     CameraHeight::from_people(&people, camera.lens(), camera.mount())
         .context("the height of the camera cannot be found")
+}
+
+/// Detects the people in the frames.
+fn people_in_frames(
+    source: &PeopleSource<'_>,
+    camera: &Arc<Calibration>,
+    parameters: &DetectParameters,
+) -> anyhow::Result<Vec<OrientedBox>> {
+    let settings = source.settings.load()?;
+    let engine = engine_for(&settings, std::slice::from_ref(parameters))?;
+    let (width, _) = camera.image_size();
+    let mut people = Vec::new();
+    for frame in source.frames {
+        let image = JobImage::Decoded(Arc::new(frame.clone()));
+        let calibration = Some(Arc::clone(camera));
+        let job = DetectJob::local(
+            camera.id().to_string(),
+            image,
+            parameters.clone(),
+            calibration,
+        );
+        let persons = engine.detect(&job)?.report.persons;
+        let scale = f64::from(width) / f64::from(frame.width());
+        people.extend(
+            persons
+                .iter()
+                .map(|person| person.oriented_box.scaled(scale)),
+        );
+    }
+    Ok(people)
 }

@@ -11,18 +11,21 @@ mod encode;
 mod label;
 mod lens_sketch;
 mod mark;
+mod room_sketch;
 mod style;
 pub(super) mod text;
 
 use super::frame::Frame;
 pub use area_sketch::{ZoneOutline, sketch_areas, sketch_foot_filter, sketch_lines};
 use canvas::{Outline, Rgb, Stroke};
+pub use caption::Caption;
 pub use conceal::{Concealment, conceal};
 pub use effort::Cancelled;
 use effort::Effort;
 pub use encode::{EncodeError, encode_jpeg, encode_png};
 pub use lens_sketch::sketch_lens;
 pub use mark::{Head, Mark, OrientedMark};
+pub use room_sketch::{ROOM_LEGEND, sketch_room};
 use style::{INK, is_drawable, line_width, text_height};
 
 /// Shapes and texts to draw into a frame.

@@ -62,6 +62,16 @@ impl RoomFrame {
         (self.width, self.height)
     }
 
+    /// Returns the edges that follow each direction of a fit to this frame and others, in the
+    /// raster that the fit used. Positions are pixel centers.
+    #[must_use]
+    pub fn edges_along(&self, fit: &RoomFit) -> [Vec<&EdgeCurve>; 3] {
+        let is_used = |curve: &EdgeCurve| (curve.scale - fit.edge_scale).abs() < 0.5;
+        let mut rasters = self.curves.iter();
+        let used = rasters.find(|curves| curves.first().is_some_and(is_used));
+        fit.edges_along(used.map_or(&[], Vec::as_slice))
+    }
+
     /// The edges of a raster inside a circle.
     fn within(&self, circle: &LensCircle, raster: usize) -> Vec<EdgeCurve> {
         let reach = USED_RADIUS * circle.radius + BEYOND;

@@ -39,6 +39,26 @@ impl OrientedBox {
         }
     }
 
+    /// Returns the box with its head at the end of its axis that is nearer to `vertical`, a
+    /// direction in the frame.
+    #[must_use]
+    pub fn with_head_toward(&self, vertical: &Vector2<f64>) -> Self {
+        let is_turned = self.up.dot(vertical) < 0.0;
+        let up = if is_turned { -self.up } else { self.up };
+        Self { up, ..*self }
+    }
+
+    /// Returns the box in the same frame `factor` times as large.
+    #[must_use]
+    pub fn scaled(&self, factor: f64) -> Self {
+        Self {
+            center: self.center * factor,
+            width: self.width * factor,
+            height: self.height * factor,
+            ..*self
+        }
+    }
+
     /// Returns the corners, clockwise from the upper left one at no rotation, corner-origin frame
     /// pixels.
     #[must_use]

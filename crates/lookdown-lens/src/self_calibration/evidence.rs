@@ -24,6 +24,8 @@ const SIGMA_PIXELS: f64 = 0.2;
 const SIGMA_DIRECTION: f64 = 0.004;
 /// Share of curves along none of the directions, before they are seen.
 const OUTLIER_SHARE: f64 = 0.4;
+/// Share of curves along each of the three directions.
+const SHARE: f64 = (1.0 - OUTLIER_SHARE) / 3.0;
 /// Squared distances from a first plane, in variances, from which a curve has no likelihood along a
 /// direction. It would be below 1e-40.
 const FAR: f64 = 200.0;
@@ -56,8 +58,6 @@ pub(super) fn evaluate(
     };
     let mut rays: Vec<SeenRay> = Vec::new();
     let mut total = 0.0;
-    #[expect(clippy::cast_precision_loss, reason = "a few directions")]
-    let share = (1.0 - OUTLIER_SHARE) / directions.len() as f64;
     let mut fits = Vec::with_capacity(directions.len());
     for (curve, weight) in curves.iter().zip(weights) {
         if *weight <= 0.0 {
@@ -67,31 +67,10 @@ pub(super) fn evaluate(
         rays.clear();
         rays.extend(curve.points.iter().map(|point| angles.ray(camera, *point)));
         let length = curve.length();
-        #[expect(clippy::cast_precision_loss, reason = "a few points")]
-        let count = rays.len() as f64;
-        let lever = length / 12.0_f64.sqrt();
-        let (across, turned) = (SIGMA_PIXELS * curve.scale, SIGMA_DIRECTION * lever);
-        let sigma = blur * (across * across + turned * turned).sqrt();
-        // The prior density of an edge's angle is uniform over half a turn.
-        let sigma_angle = sigma / (lever * count.sqrt());
-        let gain = (PI / (TAU.sqrt() * sigma_angle)).max(1.0);
-        let least = least_squared_pixels_per_unit(&rays);
-        fits.clear();
-        for (index, direction) in directions.iter().enumerate() {
-            let farthest = FAR * sigma * sigma;
-            let Some((normal, squares)) = best_plane(&rays, direction, least, farthest) else {
-                continue;
-            };
-            let likelihood = share * gain * (-0.5 * squares / (sigma * sigma)).exp();
-            fits.push(Fitted {
-                normal,
-                likelihood,
-                direction: index,
-            });
-        }
+        let sigma = fit_directions(curve, &rays, &directions, blur, &mut fits);
         let inlier: f64 = fits.iter().map(|fit| fit.likelihood).sum();
         let sum = OUTLIER_SHARE + inlier;
-        result.evidence += weight * (sum / (OUTLIER_SHARE + share)).ln();
+        result.evidence += weight * (sum / (OUTLIER_SHARE + SHARE)).ln();
         total += weight * length;
         result.explained.push(inlier / sum);
         for fit in &fits {
@@ -108,6 +87,54 @@ pub(super) fn evaluate(
     }
     prior.add_to(&mut result, camera, &angles);
     Some(result)
+}
+
+/// Returns the direction, an index, that a curve follows more likely than the others or none.
+pub(super) fn followed_direction(
+    curve: &EdgeCurve,
+    camera: &RoomCamera,
+    angles: &Angles,
+) -> Option<usize> {
+    let points = curve.points.iter();
+    let rays: Vec<SeenRay> = points.map(|point| angles.ray(camera, *point)).collect();
+    let mut fits = Vec::new();
+    fit_directions(curve, &rays, &camera.directions(), 1.0, &mut fits);
+    let all = OUTLIER_SHARE + fits.iter().map(|fit| fit.likelihood).sum::<f64>();
+    let followed = fits.iter().find(|fit| fit.likelihood > 0.5 * all);
+    followed.map(|fit| fit.direction)
+}
+
+/// Finds the planes through the directions that fit a curve, without those that are far from it.
+/// Returns the standard deviation of the distances of its points, in pixels.
+fn fit_directions(
+    curve: &EdgeCurve,
+    rays: &[SeenRay],
+    directions: &[Ray; 3],
+    blur: f64,
+    fits: &mut Vec<Fitted>,
+) -> f64 {
+    #[expect(clippy::cast_precision_loss, reason = "a few points")]
+    let count = rays.len() as f64;
+    let lever = curve.length() / 12.0_f64.sqrt();
+    let (across, turned) = (SIGMA_PIXELS * curve.scale, SIGMA_DIRECTION * lever);
+    let sigma = blur * (across * across + turned * turned).sqrt();
+    // The prior density of an edge's angle is uniform over half a turn.
+    let sigma_angle = sigma / (lever * count.sqrt());
+    let gain = (PI / (TAU.sqrt() * sigma_angle)).max(1.0);
+    let least = least_squared_pixels_per_unit(rays);
+    let farthest = FAR * sigma * sigma;
+    fits.clear();
+    for (index, direction) in directions.iter().enumerate() {
+        let Some((normal, squares)) = best_plane(rays, direction, least, farthest) else {
+            continue;
+        };
+        fits.push(Fitted {
+            normal,
+            likelihood: SHARE * gain * (-0.5 * squares / (sigma * sigma)).exp(),
+            direction: index,
+        });
+    }
+    sigma
 }
 
 /// The plane through a direction that fits rays best, and the sum of its squared residuals, or

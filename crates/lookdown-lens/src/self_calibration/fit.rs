@@ -89,6 +89,8 @@ pub struct RoomFit {
     pub explained: f64,
     /// Number of edges.
     pub edges: usize,
+    /// Pixels of the frame per pixel of the raster in which the edges were found.
+    pub edge_scale: f64,
     /// Standard deviations.
     pub uncertainty: FitUncertainty,
     /// False if no frame shows a lens circle, so that the angle at it says nothing about the lens.
@@ -339,6 +341,7 @@ fn checked(
         directions: camera.directions(),
         explained,
         edges: curves.len(),
+        edge_scale: curves.first().map_or(1.0, |curve| curve.scale),
         uncertainty,
         is_circle_detected: true,
     })

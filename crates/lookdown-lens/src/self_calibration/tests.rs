@@ -1,5 +1,6 @@
 //! Fits of cameras to drawn edges of a room.
 
+mod followed_edges;
 mod known;
 mod vertical;
 

@@ -93,7 +93,7 @@ def calibrate(
     field_of_view_deg: float | None = None,
     ceiling: bool = False,
 ) -> tuple[Calibration, bytes]:
-    """Calibrates a camera from frames of one size. Returns straightened views as a JPEG, too."""
+    """Calibrates a camera from frames of one size. Returns a preview of the fit as a JPEG, too."""
 
 def read_image(path: str | os.PathLike[str]) -> bytes:
     """Returns the content of an image file: a regular file, with a limit of its size."""

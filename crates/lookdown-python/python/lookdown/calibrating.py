@@ -16,7 +16,10 @@ Image = str | os.PathLike[str] | bytes | npt.NDArray[Any]
 
 
 class Preview(bytes):
-    """Straightened views as a JPEG: above with an assumed lens, below with the found one. A notebook shows it."""
+    """A JPEG: straightened views with an assumed lens and with the found one, and the edges that follow the room.
+
+    A notebook shows it.
+    """
 
     def _repr_jpeg_(self) -> bytes:
         return bytes(self)

@@ -51,7 +51,8 @@ pub(in crate::cli) struct Arguments {
     /// or given
     #[arg(long, requires = "out")]
     pub(super) replace: bool,
-    /// Output file of straightened views before and after the fit, JPEG
+    /// Output file of the preview, JPEG: straightened views before and after the fit, and the edges
+    /// of the room
     #[arg(long, value_name = "OUT.jpg", conflicts_with = "circle_only")]
     pub(super) preview: Option<PathBuf>,
     #[command(flatten)]

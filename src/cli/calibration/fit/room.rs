@@ -28,8 +28,9 @@ pub(super) fn fit(
     )?;
     let calibration = room_calibration(&arguments.id, image, &fit, known);
     report(arguments, &fit, &calibration.sources);
-    if let (Some(out), Some(frame)) = (&arguments.preview, frames.first()) {
-        let drawn = preview::draw(&checked(&calibration)?, &fit, frame)?;
+    let first = frames.first().zip(edges.first());
+    if let (Some(out), Some((frame, edges))) = (&arguments.preview, first) {
+        let drawn = preview::draw(&checked(&calibration)?, &fit, frame, edges)?;
         fs::write(out, drawn)
             .with_context(|| format!("--preview: {} cannot be written", out.display()))?;
     }

@@ -23,7 +23,7 @@ const RING_STEP: f64 = TAU / 24.0;
 /// Radial lines in a full turn.
 const RADIAL_LINES: u32 = 12;
 /// Points on a circle and along each side of a view.
-const CIRCLE_POINTS: u32 = 180;
+pub(super) const CIRCLE_POINTS: u32 = 180;
 const SIDE_POINTS: u32 = 32;
 
 /// Draws thin outlines of `views`, a ring every 15° off the axis, a line every 30° around the axis,
@@ -81,7 +81,12 @@ fn circle(theta: f64) -> impl Iterator<Item = Ray> {
 
 /// Draws a line through points (pixel centers), interrupted where a point is outside the lens
 /// image.
-fn draw(frame: &mut Frame, points: impl Iterator<Item = Option<Pixel>>, color: Rgb, width: f64) {
+pub(super) fn draw(
+    frame: &mut Frame,
+    points: impl Iterator<Item = Option<Pixel>>,
+    color: Rgb,
+    width: f64,
+) {
     let mut previous = None;
     for point in points {
         let point = point.map(|point| {
