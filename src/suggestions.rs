@@ -123,12 +123,6 @@ impl Suggestions {
         self.shared.suggestion(&camera.parse().ok()?)
     }
 
-    /// Returns true if there is a calibration to store for a camera.
-    pub(crate) fn has(&self, camera: &str) -> bool {
-        self.of(camera)
-            .is_some_and(|found| found.calibration.is_some())
-    }
-
     /// Passes work to the thread. Returns false if it has enough.
     fn send(&self, work: Work) -> bool {
         let worker = self.worker.get_or_init(|| {

@@ -1,8 +1,11 @@
 /** The section Calibrate: edits a circle over the frame or imports a file, previews its views, and saves it. */
 
+import { heightOf, replacedIn, withHeight } from "./calibration_sources.js";
+import { showValues } from "./calibration_values.js";
 import { drawCircle } from "./circle_handles.js";
 import { showViews, startDivider } from "./comparison.js";
 import { afterPause, element, find } from "./dom.js";
+import { startFinding } from "./find_lens.js";
 import { MODELS, assumedCircle, calibrationOf, circleOf, withFound } from "./lens.js";
 import { isServing, loadCalibrations } from "./parameters.js";
 import { shown, showFailure, withProgress } from "./progress.js";
@@ -21,11 +24,15 @@ const MAX_USERS = 60;
 const PLAIN_NAME = /^[a-z0-9][a-z0-9_-]{0,63}$/;
 
 /**
- * An imported file: `{name, content, needsSize}`, or `{name, file, needsSize}` for a calibration of the server or a found
- * one, which takes the name in the form; null while the circle is edited.
+ * An imported file: `{name, content, needsSize}`, or `{name, file, ownHeight, needsSize}` for a calibration of the server
+ * or a found one, which takes the name and the height in the form; null while the circle is edited. `ownHeight` is the
+ * height to which the form returns. A found one has `found`, `replaces` and `before`, too.
  */
 let imported = null;
+/** The circle over the frame; its `cameraHeight` is the height in the form. */
 let circle = null;
+/** The circle that was drawn before the frame had a report; a change makes another one. */
+let guessed = null;
 /** The calibration that was opened: `{name, file, tag}`. A saved circle keeps everything in it but the lens. */
 let opened = null;
 let isVisible = false;
@@ -49,7 +56,10 @@ function begin() {
     Object.assign(image, { src: frame.url, width, height });
     [circle, opened, imported] = [null, null, null];
   }
-  if (!circle) setCircle(assumedCircle(report ?? { image: { width, height } }));
+  if (!circle || (report && circle === guessed)) {
+    setCircle(assumedCircle(report ?? { image: { width, height } }));
+    guessed = report ? null : circle;
+  }
   if (isNew && frame.camera) shown(ofCamera)(frame);
   if (isVisible) previewShown();
 }
@@ -83,7 +93,22 @@ function setCircle(next) {
     field(name).value = circle[name].toFixed(1);
   }
   field("model").value = circle.model;
-  field("cameraHeight").value = circle.cameraHeight ?? "";
+  setHeight(circle.cameraHeight);
+  drawn();
+}
+
+function setHeight(height) {
+  circle = { ...circle, cameraHeight: height };
+  field("cameraHeight").value = height ? Number(height.toFixed(2)) : "";
+}
+
+/** The height that the user typed, or that of the circle: not the one that a shown file brought. */
+const typedHeight = () => (imported?.file && circle.cameraHeight === heightOf(imported.file) ? imported.ownHeight : circle.cameraHeight);
+
+/** Shows a file instead of the circle, with its height in the form. */
+function showFile(file, ownHeight, rest) {
+  imported = { ...rest, file, ownHeight, needsSize: false };
+  setHeight(heightOf(file));
   drawn();
 }
 
@@ -93,18 +118,26 @@ function drawn() {
   if (imported) drawing.replaceChildren();
   else drawCircle(drawing, circle, (moved) => edited({ ...circle, ...moved }));
   for (const name of FIELDS) find(`output[for=calibrate-${name}]`).textContent = Number(field(name).value).toFixed(1);
-  const id = field("id").value;
-  const loss = isServing(id) && imported?.name !== id ? ` The zones, lines and masks of ${id} are not kept.` : "";
-  find("#import-name").textContent = imported?.isFound ? "Found in this frame: walls and doors must be straight and upright in the views." : imported ? `${imported.name} is saved unchanged.${loss}` : "";
-  find("#found-values").hidden = !imported?.isFound;
-  find("label[for=import-camera]").hidden = Boolean(imported?.isFound);
-  find("#circle-fields").disabled = Boolean(imported);
+  const name = field("id").value;
+  const isOwn = imported?.name === id();
+  const loss = isServing(name) && !isOwn ? ` Everything in ${name} is replaced, also its zones, lines and masks.` : "";
+  find("#import-name").textContent = imported ? `${importNote()}${loss}` : "";
+  showValues(imported?.file || (opened && !imported) ? currentFile() : null, { found: imported?.found, replaces: isOwn ? imported.replaces : [] });
+  find("label[for=import-camera]").hidden = !imported?.content;
+  Object.assign(find("#circle-fields"), { disabled: Boolean(imported), hidden: Boolean(imported) });
+  field("cameraHeight").disabled = Boolean(imported?.content);
   find("#import-fields").hidden = !imported;
-  find("#save").textContent = isServing(id) ? `Replace ${id}` : "Save";
-  if (id !== usersOf) {
-    usersOf = id;
+  find("#save").textContent = isServing(name) ? `Replace ${name}` : "Save";
+  if (name !== usersOf) {
+    usersOf = name;
     usersSoon();
   }
+}
+
+function importNote() {
+  if (imported.found) return "Found in this frame: walls and doors must be straight and upright in the views.";
+  if (imported.file) return `${imported.name} keeps its lens. Its height can be changed.`;
+  return `${imported.name} is saved unchanged.`;
 }
 
 function edited(next) {
@@ -112,16 +145,18 @@ function edited(next) {
   previewSoon();
 }
 
-function content(base = opened?.file) {
-  if (imported?.content) return imported.content;
-  return JSON.stringify(imported ? { ...imported.file, id: id() } : calibrationOf({ id: id(), ...circle }, base), null, 2);
+/** The shown file of the server or a found one, or that of the circle. */
+function currentFile(base = opened?.file) {
+  return imported ? withHeight({ ...imported.file, id: id() }, circle.cameraHeight) : calibrationOf({ id: id(), ...circle }, base);
 }
+
+const content = (base) => imported?.content ?? JSON.stringify(currentFile(base), null, 2);
 const id = () => field("id").value || "camera";
 
 /** The query for an imported file: the camera, and the frame size if the format has none. */
 function reading() {
   const query = new URLSearchParams();
-  if (imported && field("camera").value) query.set("camera", field("camera").value);
+  if (imported?.content && field("camera").value) query.set("camera", field("camera").value);
   if (imported?.needsSize) query.set("size", `${shared.frame.width}x${shared.frame.height}`);
   return query;
 }
@@ -133,7 +168,9 @@ async function preview() {
   trying?.abort();
   trying = new AbortController();
   const { signal } = trying;
-  const both = () => Promise.all([straightened(frame, content(), reading(), signal), imported?.isFound ? straightened(frame, before(), "", signal) : []]);
+  const former = imported?.before;
+  const viewsBefore = () => (former ? straightened(frame, JSON.stringify({ ...former, id: id() }), "", signal) : []);
+  const both = () => Promise.all([straightened(frame, content(), reading(), signal), viewsBefore()]);
   const attempt = () => both().catch(sizeOr(both));
   showViews(...(await withProgress(find("#previews-progress"), "Straightening", attempt)));
 }
@@ -148,7 +185,7 @@ async function straightened(frame, body, query, signal) {
 /** The calibration that a found one is compared with: the opened one, or the circle. */
 function before() {
   const isOpened = opened && !circleOf(opened.file);
-  return JSON.stringify(isOpened ? opened.file : calibrationOf({ id: id(), ...circle }, opened?.file));
+  return isOpened ? opened.file : calibrationOf({ id: id(), ...circle }, opened?.file);
 }
 
 /** Repeats a request that lacks the frame size with the size of the current frame. */
@@ -165,7 +202,8 @@ async function save() {
   const name = id();
   const answer = await withProgress(find("#save-progress"), "Saving", () => put(name));
   const { warnings = [] } = await answer.json();
-  if (!imported) opened = await read(name);
+  if (!imported?.content) opened = await read(name);
+  if (imported?.file) showFile(opened.file, heightOf(opened.file), { ...imported, name, replaces: [] });
   await loadCalibrations();
   find("#saved").textContent = [`${name} is saved and in use.`, ...warnings.map(({ message }) => message)].join(" ");
   find("#calibration").value = name;
@@ -210,22 +248,6 @@ async function importFile(file) {
   await preview();
 }
 
-/** The query for what is known of the camera before its lens is found. */
-function known() {
-  const query = new URLSearchParams();
-  if (field("knownLens").value) query.set("lens", field("knownLens").value);
-  if (field("knownPlace").value) query.set("ceiling", true);
-  return query;
-}
-
-/** Finds lens, center and level from the straight edges of the frame. Everything else in a calibration of this name stays. */
-async function findLens() {
-  const { frame } = shared;
-  const name = id();
-  const found = await withProgress(find("#find-progress"), "Finding the lens", () => askJson(`calibrations/${name}/fit?${known()}`, { method: "POST", body: frame.blob }));
-  if (shared.frame === frame) await showFit(name, found);
-}
-
 /** Shows a calibration that was found in earlier frames of the camera. */
 export async function openFound(found) {
   const { id: name } = found.calibration;
@@ -233,26 +255,14 @@ export async function openFound(found) {
   await showFit(name, found);
 }
 
-/** Shows a calibration that was found with its values; nothing is saved. */
+/** Shows a calibration that was found with its values; nothing is saved. Everything else in a calibration of this name stays. */
 async function showFit(name, found) {
   const base = isServing(name) ? await read(name) : null;
   if (base) opened = base;
-  const height = base?.file.mount?.height_m ?? circle.cameraHeight;
-  imported = { name, file: withFound(base?.file, found.calibration, height), needsSize: false, isFound: true };
-  showFound(found);
-  drawn();
+  const typed = typedHeight();
+  const file = withFound(base?.file, found.calibration, typed);
+  showFile(file, typed, { name, found, replaces: replacedIn(base?.file), before: before() });
   await preview();
-}
-
-function showFound({ calibration: { lens, mount, sources }, field_of_view_deg: fieldOfView, tilt_deg: tilt, edges, explained }) {
-  const rows = [
-    ["Field of view", `${fieldOfView.toFixed(1)}°, radius ± ${sources.lens.uncertainty.toFixed(2)} %`],
-    ["Center", `${(lens.cx + 0.5).toFixed(1)}, ${(lens.cy + 0.5).toFixed(1)} ± ${sources.center.uncertainty.toFixed(1)} pixels`],
-    ["Tilt", `${tilt.toFixed(1)}° ± ${sources.world_up.uncertainty.toFixed(2)}°`],
-    ...(sources.height_m?.source === "from_people" ? [["Height", `${mount.height_m.toFixed(2)} m ± ${sources.height_m.uncertainty.toFixed(2)} m, from people`]] : []),
-    ["Edges", `${Math.round(explained * 100)} % of ${edges} follow the room`],
-  ];
-  find("#found-values").replaceChildren(...rows.map(([title, text]) => element("div", {}, element("dt", {}, title), element("dd", {}, text))));
 }
 
 /** Loads a calibration of the server. */
@@ -261,9 +271,10 @@ async function open(name) {
   const { file } = opened;
   const known = circleOf(file);
   field("id").value = name;
-  imported = known ? null : { name, file, needsSize: false };
-  if (known) setCircle(known);
-  drawn();
+  if (known) {
+    imported = null;
+    setCircle(known);
+  } else showFile(file, heightOf(file), { name });
   await preview();
 }
 
@@ -282,25 +293,26 @@ export function start() {
   });
   form().addEventListener("input", (event) => {
     find("#saved").textContent = "";
-    if (event.target.closest("#circle-fields")) {
-      const values = Object.fromEntries(FIELDS.map((name) => [name, Number(field(name).value)]));
-      circle = { ...circle, ...values, model: field("model").value, cameraHeight: Number(field("cameraHeight").value) || null };
-    }
-    if (event.target.closest("#circle-fields, #import-fields")) previewSoon();
+    const { name, value } = event.target;
+    if (name === "cameraHeight") circle = { ...circle, cameraHeight: Number(value) || null };
+    else if (event.target.closest("#circle-fields")) circle = { ...circle, [name]: name === "model" ? value : Number(value) };
+    if (event.target.closest("#circle-fields, #import-fields, #height-field")) previewSoon();
     if (circle) drawn();
   });
   form().addEventListener("submit", (event) => {
     event.preventDefault();
     shown(save)();
   });
-  find("#find-lens").addEventListener("click", shown(findLens));
+  startFinding(id, showFit);
   find("#import-file").addEventListener("change", (event) => {
     const [file] = event.target.files;
     event.target.value = "";
     if (file) shown(importFile)(file);
   });
   find("#drop-import").addEventListener("click", () => {
+    const height = typedHeight();
     imported = null;
+    setHeight(height);
     showFailure(find("#previews-progress"), "");
     drawn();
     previewShown();

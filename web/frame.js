@@ -8,8 +8,8 @@ import { change, shared } from "./shared.js";
 /** The longer side of the image for straightened views, pixels. */
 const MAX_SIDE = 1600;
 
-/** Reads an image and makes it the frame; `camera` is its camera, if it is known. */
-export async function show(blob, name, camera = "") {
+/** Decodes an image and makes it the frame. That of a camera has the name `camera`, and `read` gives its present frame. */
+export async function show(blob, name, { camera = "", read = null } = {}) {
   let bitmap;
   try {
     bitmap = await createImageBitmap(blob);
@@ -30,6 +30,7 @@ export async function show(blob, name, camera = "") {
     blob,
     name,
     camera,
+    read,
     url: URL.createObjectURL(blob),
     width: bitmap.width,
     height: bitmap.height,

@@ -1,6 +1,7 @@
 /** Ideal lenses: converts a circle and a field of view to a calibration file and back. */
 
 import { scaledTo } from "./areas.js";
+import { heightOf, otherSources, sourcesOfCircle, withHeight } from "./calibration_sources.js";
 
 /** The radius divided by the focal length for an angle from the axis. */
 const CURVES = {
@@ -22,24 +23,32 @@ const STRAIGHT_DOWN = [0, 0, -1];
  */
 export function calibrationOf({ id, width, height, model, cx, cy, radius, fieldOfView, cameraHeight }, base = null) {
   const maxTheta = (fieldOfView / 2) * (Math.PI / 180);
-  const { height_m: _, ...kept } = base?.mount ?? {};
-  const mount = { ...kept, world_up: STRAIGHT_DOWN };
-  if (cameraHeight) mount.height_m = cameraHeight;
-  return {
-    ...(base && scaledTo(base, { width, height })),
-    id,
-    image: { width, height },
-    // Lens functions use pixel centers.
-    lens: { model, focal: radius / CURVES[model](maxTheta), cx: cx - 0.5, cy: cy - 0.5, max_theta: maxTheta },
-    mount,
-  };
+  const image = { width, height };
+  // Lens functions use pixel centers.
+  const lens = { model, focal: radius / CURVES[model](maxTheta), cx: cx - 0.5, cy: cy - 0.5, max_theta: maxTheta };
+  const mount = { ...base?.mount, world_up: STRAIGHT_DOWN };
+  const sources = sourcesOfCircle(base, isCircleOf({ image, lens }, base));
+  return withHeight({ ...(base && scaledTo(base, image)), id, image, lens, mount, sources }, cameraHeight);
 }
 
-/** The file `base` with a found lens and level; a known height stays. */
-export function withFound(base, { id, image, lens, mount, sources }, height) {
-  const { lens: _lens, center: _center, world_up: _level, ...kept } = base?.sources ?? {};
-  const file = { ...(base && scaledTo(base, image)), id, image, lens, mount: { ...base?.mount, ...mount }, sources: { ...kept, ...sources } };
-  if (height) file.mount.height_m = height;
+/** True if a lens that looks straight down is that of a file, apart from rounding. */
+function isCircleOf({ image, lens }, file) {
+  const theirs = file && circleOf(file);
+  if (!theirs) return false;
+  const ofLens = { ...file.lens, focal: file.lens.focal ?? file.lens.fx };
+  const isSameLens = ["focal", "cx", "cy", "max_theta"].every((name) => Math.abs(lens[name] - ofLens[name]) < 1e-6);
+  return isSameLens && lens.model === theirs.model && image.width === theirs.width && image.height === theirs.height;
+}
+
+/** The file `base` with a found lens and level. The height `height` of the form, or that of the file, is kept with its source. */
+export function withFound(base, { id, image, lens, mount, sources = {} }, height = null) {
+  const known = height ?? heightOf(base);
+  const { height_m: foundHeight, ...level } = mount;
+  const { height_m: foundSource, ...found } = sources;
+  const file = { ...(base && scaledTo(base, image)), id, image, lens, mount: { ...base?.mount, ...level }, sources: { ...otherSources(base), ...found } };
+  if (known) return withHeight(file, known);
+  if (foundHeight) Object.assign(file.mount, { height_m: foundHeight });
+  if (foundHeight && foundSource) Object.assign(file.sources, { height_m: foundSource });
   return file;
 }
 

@@ -15,17 +15,18 @@ function count(host, change) {
   else host.removeAttribute("aria-busy");
 }
 
-/** Runs `work`, with a progress bar in `host`; shows failures there, too. */
+/** Runs `work`, with a progress bar in `host`; shows failures there, too. `work` may change the label. */
 export async function withProgress(host, label, work) {
   const began = performance.now();
   const seconds = element("span", { class: "seconds", "aria-hidden": "true" });
-  const bar = element(
-    "div",
-    { class: "progress" },
-    element("progress", { "aria-label": label }),
-    element("span", {}, label, " "),
-    seconds,
-  );
+  const meter = element("progress");
+  const words = element("span");
+  const bar = element("div", { class: "progress" }, meter, words, seconds);
+  const say = (text) => {
+    meter.setAttribute("aria-label", text);
+    words.textContent = `${text} `;
+  };
+  say(label);
   const tick = () => {
     seconds.textContent = `${((performance.now() - began) / 1000).toFixed(1)} s`;
   };
@@ -37,7 +38,7 @@ export async function withProgress(host, label, work) {
   }, PATIENCE_MILLIS);
   count(host, 1);
   try {
-    const done = await work();
+    const done = await work(say);
     showFailure(host, "");
     return done;
   } catch (error) {

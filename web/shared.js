@@ -1,7 +1,7 @@
 /** The shared state of the sections, with change events. */
 
 export const shared = {
-  /** The frame: `{blob, name, camera, url, width, height, pixels}`. */
+  /** The frame: `{blob, name, camera, read, url, width, height, pixels}`. */
   frame: null,
   /** Its report, as returned by the server. */
   report: null,

@@ -1,4 +1,5 @@
-/** The notice of a camera whose calibration was found in its frames: the values, a look at the views, and use at once. */
+/** The notice about the calibration that the server looks for in the frames of a camera: its values, a look at the views
+ * and use at once, or the reason why there is none. */
 
 import { openFound } from "./calibrate.js";
 import { options } from "./camera_states.js";
@@ -11,22 +12,25 @@ import { useFrame } from "./use_frame.js";
 /** The interval between two questions for the same suggestion. */
 const AGE_MILLIS = 20_000;
 
-/** Shows the suggested calibration of a card, or removes the notice. */
+/** Shows the suggested calibration of a card, or the reason why there is none; removes the notice of a camera that needs none. */
 export async function showSuggestion(card) {
   const { camera, info, suggestion } = card;
-  if (!info?.has_suggested_calibration) {
+  if (!["found", "refused"].includes(info?.suggestion)) {
     Object.assign(card, { suggestedAt: 0, suggested: "" });
     suggestion.replaceChildren();
     return;
   }
   if (Date.now() - card.suggestedAt < AGE_MILLIS) return;
   card.suggestedAt = Date.now();
-  const found = await askJson(`cameras/${encodeURIComponent(camera)}/suggested-calibration`).catch(() => null);
-  const text = found?.calibration ? textOf(found) : "";
+  const answer = await askJson(`cameras/${encodeURIComponent(camera)}/suggested-calibration`).catch(() => null);
+  const text = answer?.calibration ? textOf(answer) : refusalOf(answer);
   if (text === card.suggested) return;
   card.suggested = text;
-  suggestion.replaceChildren(...(text ? await notice(card, found, text) : []));
+  suggestion.replaceChildren(...(text ? await notice(card, answer, text) : []));
 }
+
+/** The reason why no lens was found, with what to do; empty while the server looks for one. */
+const refusalOf = (answer) => (answer?.state === "refused" && answer.lens_refusal ? `No calibration was found: ${answer.lens_refusal.detail}.` : "");
 
 function textOf({ lens, height, frames, frames_wanted: wanted }) {
   const above = height ? `${height.height_m.toFixed(2)} m above the floor (± ${height.height_sd_m.toFixed(2)} m, from its people)` : "";
@@ -50,6 +54,7 @@ async function notice(card, found, text) {
   };
   const act = (label, work) => shown(() => withProgress(card.strip, label, work));
   const button = (label, onclick) => element("button", { type: "button", onclick }, label);
+  if (!found.calibration) return [element("p", {}, text), button("Calibrate", act("Reading the frame", () => useFrame(card, "calibrate")))];
   return [
     element("p", {}, text),
     found.lens ? button("Look", act("Reading the frame", look)) : "",

@@ -85,6 +85,21 @@ fn other_files_are_not_overwritten() {
     std::fs::copy("samples/office.jpg", &image).unwrap();
     let fitted = fit_into(image.to_str().unwrap(), &["--replace"]);
     assert_fails_with(&fitted, &["exists", "name another file"]);
+    let frame = image.to_str().unwrap();
+    for fit in [
+        ["fit", frame, "--lens", "equidistant", "--preview", frame],
+        [
+            "check",
+            "samples/calibrations/office.json",
+            "--preview",
+            frame,
+            "--out",
+            frame,
+        ],
+    ] {
+        let refused = lookdown(&[&["calibration"][..], &fit[..]].concat(), &[]);
+        assert_fails_with(&refused, &["is a frame", "name another file"]);
+    }
     assert_eq!(
         std::fs::read(image).unwrap(),
         std::fs::read("samples/office.jpg").unwrap()

@@ -4,6 +4,7 @@
 //! planes through the center of projection and nearly all edges contain one of those directions.
 //! `docs/geometry.md` has the derivation.
 
+mod bootstrap;
 mod camera;
 mod camera_height;
 mod climb;
@@ -14,6 +15,7 @@ mod fit;
 mod followed_edges;
 mod halves;
 mod known_camera;
+mod level_from_people;
 mod maxima;
 mod prior;
 mod refusal;
@@ -29,5 +31,6 @@ pub use camera_height::{CameraHeight, HeightRefusal};
 pub use edge_curve::EdgeCurve;
 pub use fit::{CLEARLY_EXPLAINED, CircleGuess, RoomFit};
 pub use known_camera::{FieldOfView, FieldOfViewError, IdealLens, KnownCamera};
+pub use level_from_people::LevelFromPeople;
 pub use refusal::FitRefusal;
 pub use uncertainty::FitUncertainty;

@@ -15,6 +15,7 @@ use axum::{
 };
 use lookdown_common::{ConfigError, Secret};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use suggestion::SuggestionState;
 use utoipa::ToSchema;
 
 use crate::{
@@ -93,6 +94,8 @@ pub(in crate::api) struct CameraInfo {
     /// `true` if a calibration was found for the camera that it does not have:
     /// `GET /cameras/{camera}/suggested-calibration`.
     has_suggested_calibration: bool,
+    /// The state of that search; `null` for a camera that needs none or had no frame.
+    suggestion: Option<SuggestionState>,
 }
 
 /// A change of a camera.
@@ -376,7 +379,9 @@ async fn rows(state: &ApiState, deadline: Deadline) -> Result<Vec<CameraInfo>, P
         row.name = name;
     }
     for row in &mut rows {
-        row.has_suggested_calibration = state.suggestions.has(&row.name);
+        let found = state.suggestions.of(&row.name);
+        row.suggestion = found.as_ref().map(SuggestionState::of);
+        row.has_suggested_calibration = row.suggestion == Some(SuggestionState::Found);
     }
     rows.sort_unstable_by(|one, other| one.name.cmp(&other.name));
     Ok(rows)

@@ -22,6 +22,7 @@ use lookdown_lens::{
 };
 
 use super::{
+    native_output::refuse_input,
     read_frame,
     source::{NamedCamera, Source},
 };
@@ -47,6 +48,7 @@ pub(in super::super) struct Arguments {
 /// Reports on every camera of the file. A camera that cannot be used results in exit code 1.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     if let (Some(frame), Some(out)) = (&arguments.preview, &arguments.out) {
+        refuse_input("--out", Some(out), std::slice::from_ref(frame))?;
         let (_, camera) = arguments.source.read_one()?;
         let calibration = camera
             .checked

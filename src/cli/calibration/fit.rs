@@ -7,8 +7,10 @@ mod room;
 
 use std::process::ExitCode;
 
+use anyhow::Context;
+
 use super::{
-    native_output::write_native,
+    native_output::{refuse_input, write_native},
     people::{PeopleSource, set_height},
     read_frames,
 };
@@ -18,6 +20,9 @@ pub(in crate::cli) use arguments::Arguments;
 
 /// Fits the camera, writes the calibration, and describes the accuracy on standard error.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    for (option, out) in [("--out", &arguments.out), ("--preview", &arguments.preview)] {
+        refuse_input(option, out.as_deref(), &arguments.frames)?;
+    }
     let existing = existing::existing(arguments)?;
     let (image, frames) = read_frames(&arguments.frames)?;
     let mut calibration = if arguments.circle_only {
@@ -31,14 +36,16 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     if let Some(height) = arguments.height {
         give_height(&mut calibration, height);
     }
+    let mut height = Ok(());
     if arguments.people {
         let people = PeopleSource {
             frames: &frames,
             reports: &[],
             settings: &arguments.settings_file,
         };
-        set_height(&mut calibration, &people)?;
+        height = set_height(&mut calibration, &people);
     }
     write_native(&calibration, arguments.out.as_deref())?;
+    height.context("the calibration is written without a new height")?;
     Ok(ExitCode::SUCCESS)
 }

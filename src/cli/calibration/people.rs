@@ -9,9 +9,12 @@ use lookdown_detect::{
     pipeline::{DetectJob, JobImage},
 };
 use lookdown_lens::{
-    calibration::{Calibration, native::NativeCalibration},
+    calibration::{
+        Calibration,
+        native::{NativeCalibration, SourcedValue},
+    },
     geometry::OrientedBox,
-    self_calibration::CameraHeight,
+    self_calibration::{CameraHeight, LevelFromPeople},
 };
 
 use super::report_file::people_in_reports;
@@ -46,12 +49,35 @@ pub(super) fn set_height(
     }
     let height = height_of(calibration, source)?;
     room_calibration::set_height(calibration, &height);
+    let level = height.level;
     eprintln!(
         "lookdown: the camera is {:.2} m above the floor (standard deviation {:.2} m), by {} people \
          whose mean stature is taken as 1.70 m",
         height.height_m, height.sd_m, height.people
     );
+    if let Some(level) = level {
+        report_level(&level, calibration);
+    }
     Ok(())
+}
+
+/// Compares the level of the people with that of the calibration.
+fn report_level(level: &LevelFromPeople, calibration: &NativeCalibration) {
+    let LevelFromPeople {
+        difference_deg,
+        sd_deg,
+    } = level;
+    let source = calibration.sources.get(&SourcedValue::WorldUp);
+    let known_sd_deg = source.and_then(|source| source.uncertainty).unwrap_or(0.0);
+    let verdict = if level.contradicts(known_sd_deg) {
+        ": mount.world_up may be wrong; check it with --preview"
+    } else {
+        ", as the calibration says"
+    };
+    eprintln!(
+        "lookdown: by the same people, the vertical differs by {difference_deg:.1}° (standard deviation {sd_deg:.1}°)\
+         {verdict}"
+    );
 }
 
 /// Finds the height from all people. Their boxes are in pixels of the calibration.

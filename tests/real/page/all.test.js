@@ -4,6 +4,7 @@ import "./agreement.js";
 import "./detect.js";
 import "./sections.js";
 import "./calibrate.js";
+import "./find_lens.js";
 import "./zones.js";
 import "./looks.js";
 import "./counts.js";

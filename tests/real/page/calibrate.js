@@ -1,29 +1,10 @@
 /** The section Calibrate. */
 
 import assert from "node:assert/strict";
-import { SERVER, assertAccessible, detectSample, pageTest } from "./browser.js";
+import { assertAccessible, pageTest } from "./browser.js";
+import { go, idle, start, stored, straightenedAfter } from "./calibrate_steps.js";
 
 const FIXTURES = process.env.LOOKDOWN_FIXTURES;
-const go = (page, name) => page.getByRole("navigation").getByRole("link", { name }).click();
-const stored = async (id) => (await fetch(`${SERVER}/calibrations/${id}`)).json();
-
-async function start(page, lens = "") {
-  await detectSample(page, "office", lens);
-  await go(page, "Calibrate");
-  await page.locator("#previews canvas").nth(3).waitFor();
-}
-
-const idle = (page) => page.locator("#previews-progress:not([aria-busy])").waitFor({ state: "attached" });
-
-/** Waits until the views are straightened again after `act`. */
-async function straightenedAfter(page, act) {
-  await idle(page);
-  const answered = page.waitForResponse((answer) => answer.url().includes("/views?profile=fast"));
-  await act();
-  const answer = await answered;
-  await idle(page);
-  return answer;
-}
 
 const pixels = (page) => page.locator("#previews canvas").first().evaluate((canvas) => canvas.toDataURL());
 
@@ -50,20 +31,6 @@ pageTest("the detected circle is drawn over the frame, and the views follow it",
   });
   assert.ok(Math.abs(Number(await page.locator("output[for=calibrate-cx]").textContent()) - 480.1) < 1.5);
 });
-
-pageTest("the lens of a camera that looks straight down is found with its model", "#detect", async (page) => {
-  await start(page);
-  const found = page.locator("#find-progress");
-  await page.getByRole("button", { name: "Find the lens" }).click();
-  await found.getByText(/give the model of the lens/).waitFor();
-  await page.getByLabel("Known lens").selectOption("equidistant");
-  await straightenedAfter(page, () => page.getByRole("button", { name: "Find the lens" }).click());
-  await page.locator("#found-values").getByText(/1(79|80)\.\d°, radius ± 0\.\d\d %/).waitFor();
-  await page.getByLabel("Name", { exact: true }).fill("level");
-  await page.getByRole("button", { name: "Save", exact: true }).click();
-  await page.getByText("level is saved and in use.").waitFor();
-  assert.equal((await stored("level")).lens.model, "equidistant");
-}, { expected: /status of 422 .*\/calibrations\/camera\/fit\?$/ });
 
 pageTest("a saved lens with a height is used at once and shows the floor", "#detect", async (page) => {
   await start(page);

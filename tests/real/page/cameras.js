@@ -5,6 +5,11 @@ import { PHONE, WIDE, assertAccessible, assertFits, pageTest, screenshot } from 
 
 /** The addresses of `lookdown run` without cameras, of one with a camera of its settings, and of a camera with the user `viewer`. */
 const { LOOKDOWN_RUN_URL: RUN, LOOKDOWN_SETTINGS_RUN_URL: SETTINGS_RUN, LOOKDOWN_CAMERA_URL: CAMERA, LOOKDOWN_CAMERA_PASSWORD: PASSWORD } = process.env;
+const useFrame = (page, name) => page.getByRole("group", { name: `Use this frame of ${name}` });
+const suggestionOf = (page, name) => page.getByRole("group", { name: `Suggested calibration of ${name}` });
+const add = (name, path) => fetch(`${RUN}/cameras/${name}`, { method: "PUT", body: JSON.stringify({ url: `${CAMERA}${path}`, user: "viewer", password: PASSWORD }) });
+/** Longer than the interval of questions for the states of cameras. */
+const STATES_MILLIS = 4000;
 const camera = async (name) => (await fetch(`${RUN}/cameras/${name}`)).json();
 
 pageTest(
@@ -36,7 +41,7 @@ pageTest(
     await assertFits(page);
     await assertAccessible(page);
     // The frame is read from the camera, because no image of it is kept.
-    await card.getByRole("button", { name: "Calibrate" }).click();
+    await useFrame(page, "hall").getByRole("button", { name: "Calibrate" }).click();
     await page.locator("#previews canvas").first().waitFor();
     assert.equal(await page.locator("#calibrate-id").inputValue(), "hall");
     await page.getByRole("button", { name: "Save", exact: true }).click();
@@ -73,13 +78,12 @@ pageTest(
   "a calibration that was found in a running camera is looked at and applied",
   "",
   async (page) => {
-    const body = JSON.stringify({ url: `${CAMERA}/room.png`, user: "viewer", password: PASSWORD });
-    await fetch(`${RUN}/cameras/yard`, { method: "PUT", body });
-    const suggestion = page.getByRole("group", { name: "Suggested calibration of yard" });
+    await add("yard", "/room.png");
+    const suggestion = suggestionOf(page, "yard");
     await suggestion.getByText(/A calibration was found in \d of 5 frames: 18\d° field of view, tilted by \d\.\d°/).waitFor({ timeout: 180_000 });
     await assertAccessible(page);
     await suggestion.getByRole("button", { name: "Look" }).click();
-    await page.locator("#found-values").getByText(/of \d+ follow the room/).waitFor();
+    await page.locator("#calibration-values").getByText(/of \d+ follow the room/).waitFor();
     const after = page.locator("#previews .after").first();
     await after.waitFor();
     await page.getByRole("slider", { name: /Before/ }).fill("20");
@@ -93,6 +97,42 @@ pageTest(
     await fetch(`${RUN}/cameras/yard`, { method: "DELETE" });
   },
   { server: RUN, expected: /status of 404/ },
+);
+
+pageTest(
+  "a refused suggestion says why, and leads to Calibrate",
+  "",
+  async (page) => {
+    const asked = [];
+    page.on("request", (request) => request.url().includes("/suggested-calibration") && asked.push(request.url()));
+    await add("lab", "/snapshot.jpg?token=1");
+    const suggestion = suggestionOf(page, "lab");
+    await suggestion.getByText(/^No calibration was found: .*give the model of the lens/).waitFor({ timeout: 180_000 });
+    for (const viewport of [{ width: 1280, height: 800 }, PHONE]) {
+      await page.setViewportSize(viewport);
+      await assertFits(page);
+      await assertAccessible(page);
+    }
+    await suggestion.getByRole("button", { name: "Calibrate" }).click();
+    await page.locator("#previews canvas").first().waitFor();
+    assert.equal(await page.locator("#calibrate-id").inputValue(), "lab");
+    await page.getByLabel("Known lens").selectOption("equidistant");
+    await page.getByRole("button", { name: "Find the lens" }).click();
+    await page.locator("#calibration-values").getByText(/of \d+ follow the room/).waitFor();
+    await page.locator("#calibrate-height").fill("2.9");
+    await page.getByRole("button", { name: "Save", exact: true }).click();
+    await page.getByText("lab is saved and in use.").waitFor();
+    await page.getByRole("navigation").getByRole("link", { name: "Cameras" }).click();
+    await suggestion.getByText("No calibration").waitFor({ state: "detached" });
+    // A camera with a calibration has no question.
+    await page.reload();
+    await page.getByRole("article", { name: "Camera lab" }).locator(".plot").first().waitFor();
+    const before = asked.length;
+    await page.waitForTimeout(STATES_MILLIS);
+    assert.equal(asked.length, before);
+    for (const address of ["cameras/lab", "calibrations/lab"]) await fetch(`${RUN}/${address}`, { method: "DELETE" });
+  },
+  { server: RUN, expected: /status of 4(04|22)/ },
 );
 
 pageTest(

@@ -3,7 +3,9 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 import { corners, holds, roundStep } from "../../../web/geometry.js";
-import { assumedCircle, calibrationOf, circleOf } from "../../../web/lens.js";
+import { replacedIn } from "../../../web/calibration_sources.js";
+import { valuesOf } from "../../../web/calibration_values.js";
+import { assumedCircle, calibrationOf, circleOf, withFound } from "../../../web/lens.js";
 import { steps } from "../../../web/plot.js";
 import { parseEvent } from "../../../web/server.js";
 import { continued, straighten } from "../../../web/straighten.js";
@@ -61,6 +63,96 @@ test("a changed circle keeps the rest of its calibration", () => {
   assert.deepEqual(file.mount, { site: "ground-floor", world_up: [0, 0, -1] });
   assert.deepEqual(file.zones, [{ name: "a", frame_px: [[2, 2], [10, 2], [10, 10]] }, base.zones[1]].map(({ name, ...corners }) => ({ ...corners, name })));
   assert.deepEqual(file.detect, base.detect);
+});
+
+const CIRCLE = { id: "lobby", width: 10, height: 10, model: "equidistant", cx: 5, cy: 5, radius: 5, fieldOfView: 180, cameraHeight: 2.8 };
+const GIVEN = { source: "given" };
+const measured = (uncertainty) => ({ source: "measured", uncertainty });
+const FROM_PEOPLE = { source: "from_people", uncertainty: 0.1 };
+
+/** The file of the circle with these sources. */
+const circleWith = (sources) => ({ ...calibrationOf(CIRCLE), sources });
+
+/** An answer of the server with a found lens. */
+const FOUND = {
+  id: "lobby",
+  image: { width: 10, height: 10 },
+  lens: { model: "kannala_brandt", fx: 3, fy: 3, cx: 4.5, cy: 4.5, k: [0, 0, 0, 0], max_theta: Math.PI / 2 },
+  mount: { world_up: [0, Math.sin(0.1), -Math.cos(0.1)], height_m: 2.6 },
+  sources: { lens: measured(0.3), center: measured(0.5), world_up: measured(0.15), height_m: FROM_PEOPLE },
+};
+
+test("a drawn circle is given and looks straight down by assumption", () => {
+  const base = circleWith({ lens: measured(0.3), lens_model: GIVEN, field_of_view: GIVEN, center: measured(0.5), world_up: measured(0.1), height_m: FROM_PEOPLE });
+  const drawn = { lens: GIVEN, center: GIVEN, world_up: { source: "assumed" } };
+  assert.deepEqual(calibrationOf({ ...CIRCLE, radius: 4 }, base).sources, { ...drawn, height_m: FROM_PEOPLE });
+  assert.deepEqual(calibrationOf({ ...CIRCLE, cameraHeight: null }).sources, drawn);
+  const tilted = { ...base, mount: FOUND.mount };
+  assert.deepEqual(calibrationOf({ ...CIRCLE, cameraHeight: 2.6 }, tilted).sources, { ...drawn, height_m: FROM_PEOPLE });
+});
+
+test("a typed height is given, and the circle keeps its sources", () => {
+  const base = circleWith({ lens: measured(0.3), center: measured(0.5), height_m: FROM_PEOPLE });
+  const { height_m: _, ...ofLens } = base.sources;
+  assert.deepEqual(calibrationOf(CIRCLE, base).sources, base.sources);
+  const typed = calibrationOf({ ...CIRCLE, cameraHeight: 3.1 }, base);
+  assert.deepEqual([typed.mount.height_m, typed.sources], [3.1, { ...ofLens, height_m: GIVEN }]);
+  const emptied = calibrationOf({ ...CIRCLE, cameraHeight: null }, base);
+  assert.deepEqual([emptied.mount.height_m, emptied.sources], [undefined, ofLens]);
+});
+
+test("a known height stays with its source when a lens is found", () => {
+  const heightIn = ({ mount, sources }) => [mount.height_m, sources.height_m];
+  const base = circleWith({ lens: GIVEN, height_m: GIVEN });
+  assert.deepEqual(heightIn(withFound(base, FOUND)), [2.8, GIVEN]);
+  assert.deepEqual(heightIn(withFound(circleWith({}), FOUND)), [2.8, undefined]);
+  assert.deepEqual(heightIn(withFound(circleWith({ height_m: measured(0.02) }), FOUND, 2.8)), [2.8, measured(0.02)]);
+  assert.deepEqual(heightIn(withFound(base, FOUND, 3.1)), [3.1, GIVEN]);
+  assert.deepEqual(heightIn(withFound(null, FOUND, 3.1)), [3.1, GIVEN]);
+  assert.deepEqual(heightIn(withFound(null, FOUND)), [2.6, FROM_PEOPLE]);
+});
+
+test("a found lens brings its sources instead of those before", () => {
+  const base = circleWith({ lens: GIVEN, lens_model: GIVEN, field_of_view: GIVEN, world_up: GIVEN });
+  const { height_m: _, ...ofLens } = FOUND.sources;
+  assert.deepEqual(withFound(base, FOUND).sources, ofLens);
+});
+
+test("what a found lens replaces is named, unless it was assumed", () => {
+  const base = circleWith({ lens: measured(0.3), lens_model: GIVEN, center: GIVEN, world_up: { source: "assumed" }, height_m: GIVEN });
+  assert.deepEqual(replacedIn(base), ["Replaces the measured lens.", "Replaces the given lens model.", "Replaces the given center."]);
+  assert.deepEqual(replacedIn(circleWith(undefined)), ["Replaces the saved lens."]);
+  assert.deepEqual(replacedIn(undefined), []);
+});
+
+/** The rows of a file: `title | value ± deviation | source`. */
+const rowsOf = (file) => valuesOf(file).map(({ title, value, spread, source }) => [title, [value, spread].filter(Boolean).join(" "), source].filter(Boolean).join(" | "));
+
+test("values are shown with their standard deviation and source", () => {
+  assert.deepEqual(rowsOf(FOUND), [
+    "Lens | kannala_brandt | measured",
+    "Field of view | 180.0° | measured",
+    "Radius | ± 0.30 % | measured",
+    "Center | 5.0, 5.0 ± 0.5 px | measured",
+    "Tilt | 5.7° ± 0.15° | measured",
+    "Height | 2.60 m ± 0.10 m | from people",
+  ]);
+  const known = { lens: measured(0.3), lens_model: GIVEN, field_of_view: GIVEN, world_up: { source: "assumed" } };
+  assert.deepEqual(rowsOf(circleWith(known)), [
+    "Lens | equidistant | given",
+    "Field of view | 180.0° | given",
+    "Radius | ± 0.30 % | measured",
+    "Center | 5.0, 5.0",
+    "Tilt | 0.0° | assumed",
+    "Height | 2.80 m",
+  ]);
+});
+
+test("a file without sources or optional values shows what it has", () => {
+  const { sources: _, mount: __, ...bare } = FOUND;
+  const { max_theta: ___, ...lens } = bare.lens;
+  assert.deepEqual(rowsOf({ ...bare, lens }), ["Lens | kannala_brandt", "Center | 5.0, 5.0"]);
+  assert.deepEqual(rowsOf({ ...bare, lens, sources: { lens: { source: "new" } } }), ["Lens | kannala_brandt", "Center | 5.0, 5.0"]);
 });
 
 test("without a detected circle the largest one that fits is used", () => {

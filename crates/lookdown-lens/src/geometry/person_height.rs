@@ -24,6 +24,8 @@ pub struct PersonHeight {
     pub height_m: f64,
     /// Its standard deviation, meters.
     pub sd_m: f64,
+    /// Angle between the feet and straight down, radians.
+    pub foot_angle: f64,
 }
 
 impl PersonHeight {
@@ -48,7 +50,11 @@ impl PersonHeight {
         let of_head = foot.tan() / head.sin().powi(2);
         let sd_m = ANGLE_SD * camera_m * of_foot.hypot(of_head);
         let height_m = camera_m * (1.0 - foot.tan() / head.tan());
-        (sd_m <= MAX_SD_M).then_some(Self { height_m, sd_m })
+        (sd_m <= MAX_SD_M).then_some(Self {
+            height_m,
+            sd_m,
+            foot_angle: foot,
+        })
     }
 }
 

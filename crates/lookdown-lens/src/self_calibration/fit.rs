@@ -3,9 +3,10 @@
 use std::f64::consts::FRAC_PI_2;
 
 use super::{
+    bootstrap::bootstrap,
     camera::MIN_SLOPE,
     edge_curve::EdgeCurve,
-    halves::{halves, spread, widened},
+    halves::halves,
     known_camera::{IdealLens, KnownCamera},
     maxima::{Maximum, fine_maxima, maxima},
     prior::Prior,
@@ -29,7 +30,7 @@ const MIN_ALONG: f64 = 10.0;
 const MIN_SHARES: f64 = 0.45;
 /// Least share along any of them in a cluttered room, where most edges follow none: things of all
 /// shapes do not make the edges of the walls less exact.
-const CLUTTERED_SHARES: f64 = 0.28;
+const CLUTTERED_SHARES: f64 = 0.30;
 /// A second maximum with so much less evidence is within reach.
 const RIVAL_EVIDENCE: f64 = 12.0;
 /// Difference of two maxima that matters: share of the radius, and radians of the level.
@@ -308,17 +309,17 @@ fn checked(
         return Err(ambiguous);
     }
     let halves = halves(camera, curves, weight, prior).ok_or(ambiguous)?;
-    let edges = loose_curvature(camera, evaluation, prior).ok_or(ambiguous)?;
-    let edges = widened(edges, &halves);
-    let spread = spread(&halves);
+    let uncertainty = loose_curvature(camera, evaluation, prior)
+        .zip(bootstrap(camera, curves, weight, evaluation, prior))
+        .map(|(curvature, bootstrap)| curvature.larger(&bootstrap))
+        .ok_or(ambiguous)?;
     let clutter = 1.0 + CLUTTER_MISFIT * (CLEARLY_EXPLAINED - explained).max(0.0);
-    let factor = MISFIT * clutter * spread;
+    let uncertainty = uncertainty.scaled(MISFIT * clutter);
     let uncertainty = FitUncertainty {
-        radius: (factor * edges.radius).hypot(LENS_FLOOR),
-        center: factor * edges.center,
-        level_deg: factor * edges.level_deg,
+        radius: uncertainty.radius.hypot(LENS_FLOOR),
+        ..uncertainty
     };
-    if let Some(half) = halves.iter().find(|half| half.disagrees(spread)) {
+    if let Some(half) = halves.iter().find(|half| half.disagrees()) {
         return Err(FitRefusal::HalvesDisagree {
             radius_percent: 100.0 * half.radius,
             level_deg: half.level_deg,

@@ -1,7 +1,5 @@
 //! Fits of halves of the edges: whether they like another camera much better.
 
-use std::f64::consts::FRAC_1_SQRT_2;
-
 use super::{
     camera::RoomCamera,
     climb::climb,
@@ -13,9 +11,6 @@ use super::{
 
 /// Most steps of a fit.
 const STEPS: usize = 12;
-/// Mean evidence that a half gains with its own camera if the edges are as exact as assumed. It has
-/// half of the information, so each of eight parameters gains a quarter.
-const EXPECTED_GAIN: f64 = 2.0;
 /// Halves disagree if one of them gains more evidence.
 const MAX_GAIN: f64 = 10.0;
 /// Differences of the radius and of the level, degrees, that are not a disagreement.
@@ -36,11 +31,10 @@ pub(super) struct Half {
 }
 
 impl Half {
-    /// Returns true if the half clearly shows another camera, with the factor of [`spread`].
-    pub(super) fn disagrees(&self, spread: f64) -> bool {
-        let deviations = DEVIATIONS * spread;
-        let is_far = self.radius > NEAR.0.max(deviations * self.own.radius)
-            || self.level_deg > NEAR.1.max(deviations * self.own.level_deg);
+    /// Returns true if the half clearly shows another camera.
+    pub(super) fn disagrees(&self) -> bool {
+        let is_far = self.radius > NEAR.0.max(DEVIATIONS * self.own.radius)
+            || self.level_deg > NEAR.1.max(DEVIATIONS * self.own.level_deg);
         is_far && self.gain > MAX_GAIN
     }
 }
@@ -75,26 +69,4 @@ pub(super) fn halves(
         })
     };
     (0..4).map(fitted).collect()
-}
-
-/// The larger one of the standard deviations of all edges and of those that the halves imply: a
-/// half has half of the information.
-pub(super) fn widened(all: FitUncertainty, halves: &[Half]) -> FitUncertainty {
-    #[expect(clippy::cast_precision_loss, reason = "four halves")]
-    let share = FRAC_1_SQRT_2 / halves.len() as f64;
-    let mean = |value: fn(&FitUncertainty) -> f64| {
-        share * halves.iter().map(|half| value(&half.own)).sum::<f64>()
-    };
-    FitUncertainty {
-        radius: all.radius.max(mean(|own| own.radius)),
-        center: all.center.max(mean(|own| own.center)),
-        level_deg: all.level_deg.max(mean(|own| own.level_deg)),
-    }
-}
-
-/// The factor by which halves differ more than the edges say, at least 1.
-pub(super) fn spread(halves: &[Half]) -> f64 {
-    #[expect(clippy::cast_precision_loss, reason = "four halves")]
-    let mean = halves.iter().map(|half| half.gain).sum::<f64>() / halves.len() as f64;
-    (mean / EXPECTED_GAIN).max(1.0).sqrt()
 }

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Rotation3};
 use super::{
     camera::{Angles, RoomCamera, ideal_shape},
     edge_curve::EdgeCurve,
-    known_camera::KnownCamera,
+    known_camera::{FieldOfView, KnownCamera},
     prior::Prior,
     triples::Triples,
 };
@@ -66,7 +66,12 @@ fn lenses(prior: &Prior, known: KnownCamera) -> impl Iterator<Item = (RoomCamera
 
 /// Returns true if a lens has the known values.
 pub(super) fn has_lens(prior: &Prior, known: KnownCamera) -> bool {
-    lenses(prior, known).next().is_some()
+    lenses(prior, known).any(|(camera, angles)| {
+        let rim = angles.theta(prior.radius / camera.focal);
+        // A curve that turns back has the radius at a smaller angle, too.
+        let is_at = |field: FieldOfView| (rim - field.max_theta()).abs() < 0.01;
+        known.field_of_view.is_none_or(is_at)
+    })
 }
 
 /// Returns starts in the order of their scores, best first, one or two per lens.

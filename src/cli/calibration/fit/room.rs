@@ -24,7 +24,8 @@ pub(super) fn fit(
     let known = arguments.known();
     let edges: Vec<_> = frames.iter().map(RoomFrame::of).collect();
     let fit = fit_room(&edges, known).context(
-        "the camera cannot be fitted; --circle-only detects the lens circle and assumes the rest",
+        "the camera cannot be fitted; --lens, --field-of-view and --ceiling take what is known of it, and --circle-only \
+         detects the lens circle and assumes the rest",
     )?;
     let calibration = room_calibration(&arguments.id, image, &fit, known);
     report(arguments, &fit, &calibration.sources);
@@ -64,7 +65,7 @@ fn report(arguments: &Arguments, fit: &RoomFit, sources: &BTreeMap<SourcedValue,
                 .map(|lens| lens.to_string())
                 .unwrap_or_default(),
             SourcedValue::FieldOfView => format!("{field_of_view:.1}°"),
-            SourcedValue::Center => format!("{:.1}, {:.1}", cx + 0.5, cy + 0.5),
+            SourcedValue::Center => format!("{cx:.1}, {cy:.1}"),
             SourcedValue::WorldUp => format!("tilted by {tilt:.1}°"),
             // The fit says nothing about it.
             SourcedValue::HeightM => continue,
