@@ -1,5 +1,5 @@
-//! The turns of fits, which take much longer than detections: one runs at a time, so that frames find
-//! free workers.
+//! The turns of fits, which take much longer than detections: one runs at a time, so that frames
+//! find free workers.
 
 use std::sync::Arc;
 

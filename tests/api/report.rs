@@ -43,6 +43,7 @@ fn person() -> Person {
         height: Some(PersonHeight {
             height_m: 1.740_9,
             sd_m: 0.21,
+            foot_angle: 1.0,
         }),
         views: 3,
         zones: Some(vec!["entrance".to_owned()]),

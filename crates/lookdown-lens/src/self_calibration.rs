@@ -26,6 +26,7 @@ mod tests;
 mod triples;
 mod uncertainty;
 mod upright;
+mod visible_people;
 
 pub use camera_height::{CameraHeight, HeightRefusal};
 pub use edge_curve::EdgeCurve;

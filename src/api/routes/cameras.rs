@@ -15,7 +15,6 @@ use axum::{
 };
 use lookdown_common::{ConfigError, Secret};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
-use suggestion::SuggestionState;
 use utoipa::ToSchema;
 
 use crate::{
@@ -91,11 +90,8 @@ pub(in crate::api) struct CameraInfo {
     warning: Option<String>,
     /// The reason why the source gives no frames.
     problem: Option<String>,
-    /// `true` if a calibration was found for the camera that it does not have:
-    /// `GET /cameras/{camera}/suggested-calibration`.
-    has_suggested_calibration: bool,
-    /// The state of that search; `null` for a camera that needs none or had no frame.
-    suggestion: Option<SuggestionState>,
+    /// `GET /cameras/{camera}/suggested-calibration`; `null` if it needs none or had no frame.
+    suggestion: Option<suggestion::SuggestionState>,
 }
 
 /// A change of a camera.
@@ -379,9 +375,7 @@ async fn rows(state: &ApiState, deadline: Deadline) -> Result<Vec<CameraInfo>, P
         row.name = name;
     }
     for row in &mut rows {
-        let found = state.suggestions.of(&row.name);
-        row.suggestion = found.as_ref().map(SuggestionState::of);
-        row.has_suggested_calibration = row.suggestion == Some(SuggestionState::Found);
+        row.suggestion = suggestion::state_of(state, &row.name);
     }
     rows.sort_unstable_by(|one, other| one.name.cmp(&other.name));
     Ok(rows)

@@ -72,7 +72,7 @@ fn report_level(level: &LevelFromPeople, calibration: &NativeCalibration) {
     let verdict = if level.contradicts(known_sd_deg) {
         ": mount.world_up may be wrong; check it with --preview"
     } else {
-        ", as the calibration says"
+        ", which does not contradict the calibration"
     };
     eprintln!(
         "lookdown: by the same people, the vertical differs by {difference_deg:.1}° (standard deviation {sd_deg:.1}°)\

@@ -1,8 +1,8 @@
 //! Standard deviations from a bootstrap over the edges.
 //!
 //! A fit to edges that are drawn again, with replacement, moves by one step of Newton,
-//! `H^-1 (sum of m_i g_i)`: `H` is the curvature of the evidence, `g_i` the slope of the evidence of
-//! group `i`, and `m_i` how often it was drawn. The covariance of these steps is
+//! `H^-1 (sum of m_i g_i)`: `H` is the curvature of the evidence, `g_i` the slope of the evidence
+//! of group `i`, and `m_i` how often it was drawn. The covariance of these steps is
 //! `H^-1 S H^-1` with the scatter `S` of the slopes (B. Efron, "Bootstrap methods: another look at
 //! the jackknife", Annals of Statistics 7 (1), 1979), so nothing has to be drawn.
 

@@ -9,7 +9,10 @@ use std::f64::consts::TAU;
 
 use nalgebra::Unit;
 
-use super::level_from_people::LevelFromPeople;
+use super::{
+    level_from_people::LevelFromPeople,
+    visible_people::{MAX_INDEPENDENT, has_visible_feet},
+};
 use crate::geometry::{Lens, Mount, OrientedBox, PersonHeight};
 
 /// A kind of person, by the upper end of the box.
@@ -44,14 +47,13 @@ const PRIOR: (f64, f64) = (2.9, 0.25);
 /// The heights that are tried, meters.
 const HEIGHTS_M: (f64, f64) = (1.8, 12.0);
 const STEPS: u32 = 400;
-/// Reports repeat the same people: more boxes are no more evidence than these.
-pub(super) const MAX_INDEPENDENT: f64 = 30.0;
 /// Deviation of the mean stature of the people of one place from that of all, and of the boxes of
 /// one camera, as a share.
 const STATURE_BIAS: f64 = 0.03;
-/// Least angle between the feet of a person and straight down, radians. Nearer people hide their
-/// feet, so that they seem taller than they are: by 7 % at 30° to 45°, and by 18 % below.
-const LEAST_FOOT_ANGLE: f64 = 0.698;
+/// With fewer people who show their feet, the nearer ones count as well.
+const ENOUGH_PEOPLE: usize = 8;
+/// Deviation of the height then, as a share.
+const NEAR_BIAS: f64 = 0.08;
 /// Fewer people do not determine the height.
 const MIN_PEOPLE: usize = 3;
 /// A larger deviation is refused, as a share of the height.
@@ -120,16 +122,24 @@ impl CameraHeight {
         let heights = people
             .iter()
             .filter_map(|person| PersonHeight::of(person, lens, &mount));
+        let (mut heights, near): (Vec<_>, Vec<_>) = heights.partition(has_visible_feet);
+        let mut bias = STATURE_BIAS;
+        if heights.len() < ENOUGH_PEOPLE && !near.is_empty() {
+            heights.extend(near);
+            bias = NEAR_BIAS;
+        }
+        let people_count = heights.len();
+        if people_count < MIN_PEOPLE {
+            return Err(HeightRefusal::TooFewPeople {
+                people: people_count,
+            });
+        }
         let ratios: Vec<_> = heights
-            .filter(has_visible_feet)
+            .iter()
             .map(|height| (height.height_m / NOMINAL_M, height.sd_m / NOMINAL_M))
             .collect();
-        if ratios.len() < MIN_PEOPLE {
-            let people = ratios.len();
-            return Err(HeightRefusal::TooFewPeople { people });
-        }
         let (height_m, sd_m) = posterior(&ratios);
-        let sd_m = sd_m.hypot(STATURE_BIAS * height_m);
+        let sd_m = sd_m.hypot(bias * height_m);
         if sd_m > MAX_SD * height_m {
             let sd_percent = 100.0 * sd_m / height_m;
             return Err(HeightRefusal::Uncertain { sd_percent });
@@ -137,15 +147,10 @@ impl CameraHeight {
         Ok(Self {
             height_m,
             sd_m,
-            people: ratios.len(),
+            people: people_count,
             level: LevelFromPeople::of(people, lens, &mount),
         })
     }
-}
-
-/// Returns true for people far enough away to show their feet.
-pub(super) fn has_visible_feet(person: &PersonHeight) -> bool {
-    person.foot_angle >= LEAST_FOOT_ANGLE
 }
 
 /// Returns the mean and the standard deviation of the height, meters.

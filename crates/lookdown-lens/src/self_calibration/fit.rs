@@ -40,7 +40,7 @@ const STRANGER_SHARE: f64 = 0.6;
 /// Difference of the radius, as a share, between a known lens and one that the edges like better.
 const CONTRADICTION_DISTANCE: f64 = 0.02;
 /// Largest uncertainty of the radius, as a share, and of the level, degrees.
-const MAX_UNCERTAINTY: (f64, f64) = (0.028, 0.8);
+const MAX_UNCERTAINTY: (f64, f64) = (0.026, 0.8);
 /// Standard deviation of the second coefficient of a lens from that of an ideal lens. A wider one
 /// exchanges curvature at the rim for focal length, and makes the middle too large.
 const K2_SIGMA: f64 = 0.0015;
@@ -99,8 +99,8 @@ pub struct RoomFit {
 }
 
 impl RoomFit {
-    /// Returns the camera without a lens circle, whose image reaches to a distance from the center, in
-    /// pixels, at most to [`MAX_UNSEEN_THETA`].
+    /// Returns the camera without a lens circle, whose image reaches to a distance from the center,
+    /// in pixels, and to 100° from the axis at most.
     #[must_use]
     pub fn without_circle(self, distance: f64) -> Self {
         let [k1, k2, k3, _] = self.k;

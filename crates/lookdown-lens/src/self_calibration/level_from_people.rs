@@ -8,7 +8,7 @@
 
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 
-use super::camera_height::{MAX_INDEPENDENT, has_visible_feet};
+use super::visible_people::{MAX_INDEPENDENT, has_visible_feet};
 use crate::geometry::{Lens, Mount, OrientedBox, PersonHeight};
 
 /// Fewer people say nothing.

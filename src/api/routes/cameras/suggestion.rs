@@ -37,7 +37,7 @@ pub(super) enum SuggestionState {
 }
 
 impl SuggestionState {
-    pub(super) fn of(found: &Suggestion) -> Self {
+    fn of(found: &Suggestion) -> Self {
         let is_refused = match &found.fit {
             Some(fit) => fit.is_err(),
             None => matches!(found.height, Some(Err(_))),
@@ -48,6 +48,12 @@ impl SuggestionState {
             None => Self::Waiting,
         }
     }
+}
+
+/// The state of the suggestion of a camera, if the server looks for one.
+pub(super) fn state_of(state: &ApiState, camera: &str) -> Option<SuggestionState> {
+    let found = state.suggestions.of(camera)?;
+    Some(SuggestionState::of(&found))
 }
 
 /// A reason for not having a value.

@@ -20,7 +20,7 @@ const FOUND: [SourcedValue; 3] = [
 /// Reads the calibration in the output file, if there is one.
 ///
 /// # Errors
-/// A file that is no native calibration, and values that the fit would replace without permission.
+/// A file that is not a native calibration, and values that may not be replaced.
 pub(super) fn existing(arguments: &Arguments) -> anyhow::Result<Option<NativeCalibration>> {
     let Some(out) = arguments.out.as_ref().filter(|out| out.is_file()) else {
         return Ok(None);

@@ -82,7 +82,7 @@ pub struct NativeSource {
 impl NativeSource {
     /// A value of the user.
     pub const GIVEN: Self = Self::without_deviation(ValueSource::Given);
-    /// A value that nobody measured.
+    /// A value without a measurement.
     pub const ASSUMED: Self = Self::without_deviation(ValueSource::Assumed);
 
     const fn without_deviation(source: ValueSource) -> Self {
