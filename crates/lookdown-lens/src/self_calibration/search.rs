@@ -57,7 +57,6 @@ fn lenses(prior: &Prior, known: KnownCamera) -> impl Iterator<Item = (RoomCamera
         Some((camera, angles))
     };
     shapes.into_iter().flat_map(move |k1| {
-        let with = with.clone();
         rims.clone()
             .into_iter()
             .filter_map(move |rim| with(k1, rim))

@@ -16,6 +16,7 @@ use crate::{
 
 /// Arguments of `lookdown calibration fit`.
 #[derive(Debug, Args)]
+#[expect(clippy::struct_excessive_bools, reason = "independent flags")]
 pub(in crate::cli) struct Arguments {
     /// Frames of one camera: JPEG, PNG or WebP, all of one size. Bright frames work best
     #[arg(required = true, value_name = "FRAME")]
