@@ -143,10 +143,7 @@ pub(crate) fn may_set_height(native: &NativeCalibration) -> bool {
 /// Sets the height of a calibration, which people gave.
 pub(crate) fn set_height(native: &mut NativeCalibration, height: &CameraHeight) {
     native.mount.height_m = Some(hundredths(height.height_m));
-    let source = NativeSource {
-        source: ValueSource::FromPeople,
-        uncertainty: Some(hundredths(height.sd_m)),
-    };
+    let source = NativeSource::from_people(hundredths(height.sd_m));
     native.sources.insert(SourcedValue::HeightM, source);
 }
 

@@ -2,11 +2,11 @@
 
 import { heightOf, replacedIn, withHeight } from "./calibration_sources.js";
 import { showValues } from "./calibration_values.js";
-import { drawCircle } from "./circle_handles.js";
+import { drawCircle, drawRim } from "./circle_handles.js";
 import { showViews, startDivider } from "./comparison.js";
 import { afterPause, element, find } from "./dom.js";
 import { startFinding } from "./find_lens.js";
-import { MODELS, assumedCircle, calibrationOf, circleOf, withFound } from "./lens.js";
+import { MODELS, assumedCircle, calibrationOf, circleOf, rimOf, withFound } from "./lens.js";
 import { isServing, loadCalibrations } from "./parameters.js";
 import { shown, showFailure, withProgress } from "./progress.js";
 import { Problem, ask, askJson } from "./server.js";
@@ -56,12 +56,13 @@ function begin() {
     Object.assign(image, { src: frame.url, width, height });
     [circle, opened, imported] = [null, null, null];
   }
-  if (!circle || (report && circle === guessed)) {
+  const isGuess = !circle || (report && circle === guessed);
+  if (isGuess) {
     setCircle(assumedCircle(report ?? { image: { width, height } }));
     guessed = report ? null : circle;
   }
   if (isNew && frame.camera) shown(ofCamera)(frame);
-  if (isVisible) previewShown();
+  if (isVisible && (isNew || isGuess)) previewShown();
 }
 
 /** Begins with the calibration of the frame's camera, or with its name for a new one. */
@@ -114,8 +115,9 @@ function showFile(file, ownHeight, rest) {
 
 function drawn() {
   const drawing = find("#circle");
-  drawing.classList.toggle("off", Boolean(imported));
-  if (imported) drawing.replaceChildren();
+  const rim = imported?.file && rimOf(imported.file);
+  if (rim) drawRim(drawing, rim);
+  else if (imported) drawing.replaceChildren();
   else drawCircle(drawing, circle, (moved) => edited({ ...circle, ...moved }));
   for (const name of FIELDS) find(`output[for=calibrate-${name}]`).textContent = Number(field(name).value).toFixed(1);
   const name = field("id").value;
@@ -280,7 +282,9 @@ async function open(name) {
 
 export function visible(is) {
   isVisible = is;
-  if (is) begin();
+  if (!is) return;
+  begin();
+  previewShown();
 }
 
 export function start() {

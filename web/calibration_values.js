@@ -23,10 +23,10 @@ const tiltOf = ([x, y, z] = []) => (Math.atan2(Math.hypot(x, y), -z) * 180) / Ma
  * `source` are empty where they are not known.
  */
 export function valuesOf(file) {
-  return ROWS.flatMap(([title, names, valueOf, unit]) => {
+  return ROWS.flatMap(([title, names, textOf, unit]) => {
     const entry = names.map((name) => file.sources?.[name]).find(Boolean);
     const deviation = unit ? number(entry?.uncertainty, ...unit) : "";
-    const row = { title, value: valueOf(file), spread: deviation && `± ${deviation}`, source: SOURCE_WORDS[entry?.source] ?? "" };
+    const row = { title, value: textOf(file), spread: deviation && `± ${deviation}`, source: SOURCE_WORDS[entry?.source] ?? "" };
     return row.value || row.spread ? [row] : [];
   });
 }

@@ -6,8 +6,8 @@ import { shown, showFailure, withProgress } from "./progress.js";
 import { askJson } from "./server.js";
 import { shared, whenChanged } from "./shared.js";
 
-/** A refusal that another search with a known model may avoid. */
-const WANTS_MODEL = /model of the lens/;
+/** The reasons of refusals that another search with a known model may avoid. */
+const WANT_MODEL = ["ambiguous", "uncertain"];
 
 const LABEL = "Finding the lens";
 
@@ -58,7 +58,7 @@ export function startFinding(nameOf, show) {
       return askJson(`calibrations/${name}/fit?${known()}`, { method: "POST", body: bodyOf(images), signal });
     };
     const found = await withProgress(host(), LABEL, work).catch((problem) => {
-      if (WANTS_MODEL.test(problem.message) && !field("knownLens").value) askForModel(images);
+      if (WANT_MODEL.includes(problem.refusal) && !field("knownLens").value) askForModel(images);
       throw problem;
     });
     if (shared.frame === frame) await show(name, found);

@@ -52,19 +52,27 @@ export function withFound(base, { id, image, lens, mount, sources = {} }, height
   return file;
 }
 
+/** The function of `CURVES`, or that of Kannala and Brandt with the coefficients `k`; undefined for any other lens. */
+const curveOf = ({ model, k }) =>
+  model === "kannala_brandt" ? (theta) => theta * (1 + k.reduceRight((sum, part) => theta ** 2 * (sum + part), 0)) : CURVES[model];
+
+/** The circle that the lens of a file sees, in corner-origin pixels of a frame of `width` × `height`; null if it is none or not known here. */
+export function rimOf({ lens, image }) {
+  const curve = curveOf(lens);
+  const focal = lens.focal ?? (lens.fx === lens.fy ? lens.fx : null);
+  if (!curve || !focal || !lens.max_theta) return null;
+  return { ...image, cx: lens.cx + 0.5, cy: lens.cy + 0.5, radius: focal * curve(lens.max_theta) };
+}
+
 /** The circle from which `calibrationOf` makes this file; null if there is none. */
 export function circleOf({ lens, mount, image }) {
-  const curve = CURVES[lens.model];
-  const focal = lens.focal ?? (lens.fx === lens.fy ? lens.fx : null);
+  const rim = CURVES[lens.model] ? rimOf({ lens, image }) : null;
   const up = mount?.world_up ?? STRAIGHT_DOWN;
   const isTilted = up.some((part, axis) => Math.abs(part - STRAIGHT_DOWN[axis]) > 1e-6);
-  if (!curve || !focal || !lens.max_theta || isTilted) return null;
+  if (!rim || isTilted) return null;
   return {
-    ...image,
+    ...rim,
     model: lens.model,
-    cx: lens.cx + 0.5,
-    cy: lens.cy + 0.5,
-    radius: focal * curve(lens.max_theta),
     fieldOfView: (lens.max_theta * 360) / Math.PI,
     cameraHeight: mount?.height_m ?? null,
   };

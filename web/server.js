@@ -7,12 +7,11 @@ export const key = {
   set: (value) => (value ? sessionStorage.setItem(KEY, value) : sessionStorage.removeItem(KEY)),
 };
 
-/** A problem document of the server (RFC 9457); `parameter` is the invalid parameter, if any. */
+/** A problem document of the server (RFC 9457) with its members, such as `parameter`, the invalid parameter. */
 export class Problem extends Error {
-  constructor(status, text, parameter) {
+  constructor(status, text, { parameter, refusal } = {}) {
     super(text);
-    this.status = status;
-    this.parameter = parameter;
+    Object.assign(this, { status, parameter, refusal });
   }
 }
 
@@ -30,7 +29,7 @@ export async function ask(path, options = {}) {
   if (answer.ok) return answer;
   const problem = await answer.json().catch(() => ({}));
   if (answer.status === 401) document.dispatchEvent(new Event("key-wanted"));
-  throw new Problem(answer.status, problem.detail ?? `The server returned ${answer.status}.`, problem.parameter);
+  throw new Problem(answer.status, problem.detail ?? `The server returned ${answer.status}.`, problem);
 }
 
 export const askJson = async (path, options) => (await ask(path, options)).json();

@@ -352,8 +352,10 @@ async fn camera_that_looks_straight_down_is_fitted_with_its_lens() {
     };
     let answer = fit("").await;
     assert_eq!(answer.status, 422);
-    let detail = answer.json()["detail"].to_string();
+    let problem = answer.json();
+    let detail = problem["detail"].to_string();
     assert!(detail.contains("give the model of the lens"), "{detail}");
+    assert_eq!(problem["refusal"], "uncertain");
     for (query, is_given) in [
         ("?lens=equidistant", false),
         ("?lens=equidistant&field_of_view_deg=180&ceiling=true", true),

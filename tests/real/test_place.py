@@ -4,7 +4,6 @@ Both show the rendered walks. The second one hangs at the same place, turned by 
 """
 
 import json
-import re
 import subprocess
 import tempfile
 import unittest
@@ -80,6 +79,16 @@ class Place(unittest.TestCase):
             placed = subprocess.run(place, capture_output=True, text=True, timeout=120)
         print(placed.stdout, placed.stderr, flush=True)
         self.assertEqual(placed.returncode, 0, placed.stderr)
-        x, y, yaw = map(float, re.findall(r"-?\d+\.?\d*", placed.stdout))
-        self.assertLess(max(abs(x), abs(y)), 0.15)
-        self.assertLess(abs(yaw - YAW_DEG), 2)
+        place = json.loads(placed.stdout)
+        self.assertLess(max(map(abs, place["mount"]["position_m"])), 0.15)
+        self.assertLess(abs(place["mount"]["yaw_deg"] - YAW_DEG), 2)
+        self.assert_is_checked(place)
+
+    def assert_is_checked(self, place: dict) -> None:
+        """Fails if the calibration with its place on a site does not have the sources of the place."""
+        calibration = json.loads((self.folder / "calibrations" / "lobby.json").read_text(encoding="utf-8"))
+        mount = calibration["mount"] | place["mount"] | {"site": "floor"}
+        file = self.folder / "placed.json"
+        file.write_text(json.dumps(calibration | place | {"mount": mount}), encoding="utf-8")
+        checked = subprocess.run([LOOKDOWN, "calibration", "check", file], capture_output=True, text=True, check=True)
+        self.assertRegex(checked.stdout, r"position_m: from_people ± \d")

@@ -15,7 +15,7 @@ pub(crate) struct Event {
 
 /// An event with more bytes than are accepted.
 #[derive(Debug, thiserror::Error)]
-#[error("an event has more than 8 MiB")]
+#[error("an event has more than {} MiB", MAX_EVENT_BYTES >> 20)]
 pub(crate) struct TooLarge;
 
 /// Splits a stream into events.

@@ -9,8 +9,8 @@ use crate::{Camera, Frame};
 
 /// Longest time for a report.
 const REPORT_TIMEOUT: Duration = Duration::from_secs(35);
-/// Largest report that is read.
-const MAX_REPORT_BYTES: usize = 32 << 20;
+/// Largest answer that is read: a report, with images where they are asked for.
+const MAX_ANSWER_BYTES: usize = 32 << 20;
 
 /// A connection to the server.
 pub(crate) struct Server {
@@ -60,7 +60,7 @@ impl Server {
         let status = response.status();
         if status.is_success() {
             // The rest is read so that the connection can be used again.
-            return match read_body(response, MAX_REPORT_BYTES).await {
+            return match read_body(response, MAX_ANSWER_BYTES).await {
                 Ok(_) => Answer::Report,
                 Err(error) => Answer::Failed(self.client.failure(&error)),
             };

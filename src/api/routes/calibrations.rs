@@ -3,6 +3,7 @@
 mod address;
 mod conditions;
 pub(in crate::api) mod fit;
+mod fit_form;
 mod row;
 mod upload;
 pub(in crate::api) mod views;

@@ -11,6 +11,7 @@ use anyhow::{Context, bail};
 use clap::Args;
 use jiff::Timestamp;
 use lookdown_common::{ServerClient, read_body};
+use lookdown_lens::calibration::native::{NativeSource, SourcedValue};
 use lookdown_tracking::{RelativePose, Walk, relative_pose};
 use serde::Deserialize;
 use serde_json::json;
@@ -62,7 +63,7 @@ struct TrackRow {
 #[derive(Default)]
 struct Walks(BTreeMap<u64, Walk>);
 
-/// Prints the fields `position_m` and `yaw_deg` of the camera's mount.
+/// Prints the place as a part of a calibration in the native format, with its sources.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let (first, second) = of_this_thread()?.block_on(follow(arguments))?;
     let Arguments {
@@ -84,13 +85,14 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
          {yaw_sd_deg:.1}°), by {walks} walks whose places differ by {residual_m:.2} m: give both the same mount.site"
     );
     let [x, y] = position_m.map(|value| rounded(value, 100.0));
-    let yaw = rounded(yaw_deg, 10.0);
-    let fields = format!(
-        "\"position_m\": {}, \"yaw_deg\": {}",
-        json!([x, y]),
-        json!(yaw)
-    );
-    writeln!(io::stdout(), "{fields}").context(UNWRITABLE)?;
+    let place = json!({
+        "mount": {"position_m": [x, y], "yaw_deg": rounded(yaw_deg, 10.0)},
+        "sources": BTreeMap::from([
+            (SourcedValue::PositionM, NativeSource::from_people(rounded(position_sd_m, 100.0))),
+            (SourcedValue::YawDeg, NativeSource::from_people(rounded(yaw_sd_deg, 10.0))),
+        ]),
+    });
+    writeln!(io::stdout(), "{place}").context(UNWRITABLE)?;
     Ok(ExitCode::SUCCESS)
 }
 

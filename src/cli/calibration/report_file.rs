@@ -52,7 +52,10 @@ fn next_line(reader: &mut impl BufRead) -> anyhow::Result<Option<Vec<u8>>> {
     let mut bounded = reader.take(MAX_REPORT_BYTES + 1);
     let bytes = bounded.read_until(b'\n', &mut line)?;
     if bytes as u64 > MAX_REPORT_BYTES {
-        bail!("it has more than 8 MiB: give one report per line, as `lookdown detect` prints them");
+        let mebibytes = MAX_REPORT_BYTES >> 20;
+        bail!(
+            "it has more than {mebibytes} MiB: give one report per line, as `lookdown detect` prints them"
+        );
     }
     Ok((bytes > 0).then_some(line))
 }

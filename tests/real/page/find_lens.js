@@ -27,6 +27,8 @@ for (const [device, options] of [["wide", {}], ["phone", { viewport: PHONE, hasT
       await straightenedAfter(page, () => page.getByRole("button", { name: "Try equidistant, as most ceiling cameras" }).click());
       assert.equal(await page.getByLabel("Known lens").inputValue(), "equidistant");
       assert.equal(await page.locator("#find-progress").textContent(), "");
+      assert.equal(await page.locator("#circle .rim").first().isVisible(), true);
+      assert.equal(await page.locator("#circle .handle").count(), 0);
       const rows = (await values(page)).join("\n");
       for (const row of [/^Lens \| equidistant/m, /^Field of view \| 1(79|80)\.\d°/m, /^Center \| 4\d\d\.\d, 4\d\d\.\d ± \d\.\d px \| measured$/m, /^Tilt \| \d\.\d° ± \d\.\d\d° \| measured$/m]) assert.match(rows, row);
       await assertFits(page);

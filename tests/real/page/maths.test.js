@@ -5,7 +5,7 @@ import test from "node:test";
 import { corners, holds, roundStep } from "../../../web/geometry.js";
 import { replacedIn } from "../../../web/calibration_sources.js";
 import { valuesOf } from "../../../web/calibration_values.js";
-import { assumedCircle, calibrationOf, circleOf, withFound } from "../../../web/lens.js";
+import { assumedCircle, calibrationOf, circleOf, rimOf, withFound } from "../../../web/lens.js";
 import { steps } from "../../../web/plot.js";
 import { parseEvent } from "../../../web/server.js";
 import { continued, straighten } from "../../../web/straighten.js";
@@ -30,6 +30,15 @@ test("an outline contains inner points, also when it is concave", () => {
 
 test("steps of axes are round", () => {
   assert.deepEqual([[6, 3], [4.9, 6], [0.5, 5], [70, 6]].map(([length, most]) => roundStep(length, most)), [2, 1, 0.1, 20]);
+});
+
+test("the circle of a found lens follows its polynomial", () => {
+  const lens = { model: "kannala_brandt", fx: 200, fy: 200, cx: 319.5, cy: 239.5, k: [0.1, -0.02, 0, 0], max_theta: 1.5 };
+  const { cx, cy, radius } = rimOf({ image: { width: 640, height: 480 }, lens });
+  assert.deepEqual([cx, cy], [320, 240]);
+  // 1.5 + 0.1 · 1.5³ - 0.02 · 1.5⁵ = 1.685625
+  near(radius, 200 * 1.685625);
+  assert.equal(rimOf({ image: { width: 640, height: 480 }, lens: { ...lens, fy: 190 } }), null);
 });
 
 test("a circle survives conversion to a lens and back", () => {

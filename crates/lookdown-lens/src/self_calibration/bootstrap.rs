@@ -9,7 +9,7 @@
 use super::{
     camera::RoomCamera,
     edge_curve::EdgeCurve,
-    evaluation::{Evaluation, Normal},
+    evaluation::{Evaluation, Normal, Parameters},
     evidence::evaluate,
     prior::Prior,
     uncertainty::{FitUncertainty, deviations, loose_covariance},
@@ -37,7 +37,7 @@ pub(super) fn bootstrap(
     let slopes: Vec<_> = slopes.collect::<Option<_>>()?;
     #[expect(clippy::cast_precision_loss, reason = "a few groups")]
     let count = slopes.len() as f64;
-    let mean = slopes.iter().sum::<super::evaluation::Parameters>() / count;
+    let mean = slopes.iter().sum::<Parameters>() / count;
     let scatter: Normal = slopes
         .iter()
         .map(|slope| (slope - mean) * (slope - mean).transpose())

@@ -125,7 +125,9 @@ impl RoomCamera {
     }
 }
 
-fn curve([k1, k2, k3]: Shape, theta: f64) -> (f64, f64) {
+/// The radius of a shape in focal lengths, `theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6)`, and
+/// its slope.
+pub(super) fn curve([k1, k2, k3]: Shape, theta: f64) -> (f64, f64) {
     let square = theta * theta;
     let radius = theta * (1.0 + square * (k1 + square * (k2 + square * k3)));
     let slope = 1.0 + square * (3.0 * k1 + square * (5.0 * k2 + square * 7.0 * k3));

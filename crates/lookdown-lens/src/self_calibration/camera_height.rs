@@ -75,7 +75,8 @@ pub struct CameraHeight {
 }
 
 /// The people do not determine the height.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, strum::IntoStaticStr)]
+#[strum(serialize_all = "snake_case")]
 pub enum HeightRefusal {
     /// Too few people, or people below the camera only.
     #[error(
@@ -97,13 +98,10 @@ pub enum HeightRefusal {
 }
 
 impl HeightRefusal {
-    /// Returns the name of the reason, for programs.
+    /// Returns the name of the reason, for programs: the variant in snake case.
     #[must_use]
     pub fn reason(&self) -> &'static str {
-        match self {
-            Self::TooFewPeople { .. } => "too_few_people",
-            Self::Uncertain { .. } => "uncertain",
-        }
+        self.into()
     }
 }
 

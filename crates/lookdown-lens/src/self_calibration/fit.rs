@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use super::{
     bootstrap::bootstrap,
-    camera::MIN_SLOPE,
+    camera::{MIN_SLOPE, curve},
     edge_curve::EdgeCurve,
     halves::halves,
     known_camera::{IdealLens, KnownCamera},
@@ -105,9 +105,7 @@ impl RoomFit {
     pub fn without_circle(self, distance: f64) -> Self {
         let [k1, k2, k3, _] = self.k;
         let is_within = |theta: &f64| {
-            let square = theta * theta;
-            let slope = 1.0 + square * (3.0 * k1 + square * (5.0 * k2 + square * 7.0 * k3));
-            let radius = theta * (1.0 + square * (k1 + square * (k2 + square * k3)));
+            let (radius, slope) = curve([k1, k2, k3], *theta);
             slope > MIN_SLOPE && self.focal * radius <= distance
         };
         let beyond = (1..)
@@ -172,16 +170,22 @@ impl RoomFit {
         let (mut maxima, prior) = best.ok_or(FitRefusal::NoDirections { explained: 0.0 })?;
         // The camera of another circle is a rival, too.
         maxima.extend(others);
-        let fit = checked(curves, weight, &maxima, &prior)?;
-        if let Some(refusal) = stranger(frames, &maxima[0], fit.explained) {
+        let fit = checked(curves, weight, &maxima, &prior);
+        let Some(found) = maxima.first() else {
+            return fit;
+        };
+        if let Ok(fit) = &fit
+            && let Some(refusal) = stranger(frames, found, fit.explained)
+        {
             return Err(refusal);
         }
-        match contradiction(curves, weight, &maxima[0], &prior, known) {
+        // False values are the cause of other refusals as well.
+        match contradiction(curves, weight, found, &prior, known) {
             Some(field_of_view_deg) => Err(FitRefusal::Contradicted {
                 field_of_view_deg,
-                explained: fit.explained,
+                explained: found.explained(),
             }),
-            None => Ok(fit),
+            None => fit,
         }
     }
 }
@@ -191,12 +195,9 @@ impl RoomFit {
 const OTHER_CIRCLE: f64 = 6.0;
 
 fn is_ordered(maxima: &[Maximum]) -> bool {
-    maxima.first().is_some_and(|first| {
-        has_order(
-            first.evaluation.shares.iter().sum(),
-            first.evaluation.evidence,
-        )
-    })
+    maxima
+        .first()
+        .is_some_and(|first| has_order(first.explained(), first.evaluation.evidence))
 }
 
 pub(super) fn prior(circle: &CircleGuess, known: KnownCamera) -> Prior {
@@ -286,7 +287,7 @@ fn checked(
     else {
         return Err(FitRefusal::NoDirections { explained: 0.0 });
     };
-    let explained: f64 = evaluation.shares.iter().sum();
+    let explained = maxima[0].explained();
     if !has_order(explained, evaluation.evidence) {
         return Err(FitRefusal::NoDirections { explained });
     }

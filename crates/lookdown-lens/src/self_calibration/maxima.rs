@@ -45,6 +45,11 @@ impl Maximum {
             is_upright: true,
         }
     }
+
+    /// The share of the edges along the three directions.
+    pub(super) fn explained(&self) -> f64 {
+        self.evaluation.shares.iter().sum()
+    }
 }
 
 /// The best maxima, best first, each different from the others.

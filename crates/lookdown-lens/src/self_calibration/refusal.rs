@@ -1,7 +1,8 @@
 //! Reasons to return no camera.
 
 /// The edges do not determine the camera.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, strum::IntoStaticStr)]
+#[strum(serialize_all = "snake_case")]
 pub enum FitRefusal {
     /// A blank or dark room.
     #[error(
@@ -14,8 +15,8 @@ pub enum FitRefusal {
     },
     /// Known values that no lens of the method has.
     #[error(
-        "no lens of the known model has such a field of view: orthographic lenses see less than 173°, others less than \
-         252°; correct field_of_view_deg, or leave it out"
+        "no lens of the known model has such a field of view, as an orthographic one that sees 180°: correct the model or \
+         the field of view, or leave one of them out"
     )]
     NoSuchLens,
     /// A room without a rectangular order.
@@ -62,8 +63,8 @@ pub enum FitRefusal {
     },
     /// Two cameras explain the edges equally well.
     #[error(
-        "two different cameras explain the edges equally well: give the model of the lens (a camera that looks \
-         straight down often needs it), or further frames"
+        "two different cameras explain the edges equally well: give the model of the lens if it is missing (a camera \
+         that looks straight down often needs it), or further frames"
     )]
     Ambiguous {
         /// Explained share of the edges.
@@ -72,7 +73,7 @@ pub enum FitRefusal {
     /// The evidence is flat.
     #[error(
         "the edges determine the lens to {radius_percent:.1} % and the level to {level_deg:.1}° only: give the model of \
-         the lens, or further frames"
+         the lens if it is missing, or further frames"
     )]
     Uncertain {
         /// Standard deviation of the radius, percent.
@@ -116,20 +117,9 @@ impl FitRefusal {
         }
     }
 
-    /// Returns the name of the reason, for programs.
+    /// Returns the name of the reason, for programs: the variant in snake case.
     #[must_use]
     pub fn reason(&self) -> &'static str {
-        match self {
-            Self::NoSuchLens => "no_such_lens",
-            Self::TooFewEdges { .. } => "too_few_edges",
-            Self::NoDirections { .. } => "no_directions",
-            Self::MissingDirection => "missing_direction",
-            Self::VerticalUnclear => "vertical_unclear",
-            Self::Contradicted { .. } => "contradicted",
-            Self::FrameDisagrees { .. } => "frame_disagrees",
-            Self::Ambiguous { .. } => "ambiguous",
-            Self::Uncertain { .. } => "uncertain",
-            Self::HalvesDisagree { .. } => "halves_disagree",
-        }
+        self.into()
     }
 }

@@ -19,9 +19,12 @@ use lookdown_lens::{
 };
 use serde::Serialize;
 use tokio_util::sync::CancellationToken;
-use utoipa::{IntoParams, ToSchema};
+use utoipa::ToSchema;
 
-use super::address::NewCalibrationAddress;
+use super::{
+    address::NewCalibrationAddress,
+    fit_form::{CEILING, FitForm, KnownCameraQuery},
+};
 use crate::{
     api::{
         ApiState,
@@ -40,28 +43,7 @@ use crate::{
     suggestions::FRAMES,
 };
 
-const CEILING: &str = "ceiling";
 const NAMES: [&str; 3] = [LENS, FIELD_OF_VIEW_DEG, CEILING];
-
-/// The known values of the camera, from its data sheet.
-#[derive(IntoParams)]
-#[into_params(parameter_in = Query)]
-#[expect(
-    dead_code,
-    reason = "documents the parameters that `known_camera` parses"
-)]
-struct KnownCameraQuery {
-    /// The projection of the lens. Cameras that look straight down need it. Most ceiling cameras
-    /// are `equidistant`.
-    #[param(pattern = "^(equidistant|equisolid|stereographic|orthographic)$")]
-    lens: Option<String>,
-    /// The field of view of the lens circle, degrees.
-    #[param(minimum = 60, maximum = 300)]
-    field_of_view_deg: Option<f64>,
-    /// `true`: the camera is on a ceiling, even if one wall fills the image. Otherwise, a camera
-    /// that may be on a wall is refused.
-    ceiling: Option<bool>,
-}
 
 /// Frames of one camera, and its known values.
 pub(in crate::api) struct FitRequest {
@@ -102,7 +84,8 @@ pub(in crate::api) struct FittedCamera {
 /// Fits lens, center and level to the straight edges of a frame of the camera, or says why the
 /// frame does not determine them. A form may have up to five frames of different times. Known
 /// values are kept. Nothing is stored, and the answer has nothing of a stored calibration of this
-/// ID.
+/// ID. A problem of frames that do not determine the camera has the kind of the refusal in
+/// `refusal`: those of `reason` in a suggested calibration.
 #[utoipa::path(
     post, path = "/calibrations/{id}/fit", tag = "calibrations", operation_id = "fit_calibration",
     params(
@@ -110,8 +93,11 @@ pub(in crate::api) struct FittedCamera {
         KnownCameraQuery,
     ),
     request_body(
-        description = "A frame: JPEG, PNG or WebP, with the lights on.",
-        content((inline(RawBytes) = "application/octet-stream"), (inline(RawBytes) = "image/jpeg")),
+        description = "Frames in a form, or one frame alone: JPEG, PNG or WebP, with the lights on.",
+        content(
+            (FitForm = "multipart/form-data"),
+            (inline(RawBytes) = "application/octet-stream"), (inline(RawBytes) = "image/jpeg"),
+        ),
     ),
     security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
     responses((status = OK, description = "The fitted camera.", body = FittedCamera))
@@ -165,7 +151,9 @@ fn fitted(
         }
         frames.push(frame);
     }
-    let fit = fit_room(&frames, known).map_err(|error| refused(&error.to_string()))?;
+    let fit = fit_room(&frames, known).map_err(|refusal| {
+        refused(&refusal.to_string()).with_member("refusal", refusal.reason())
+    })?;
     let (width, height) = frames[0].size();
     Ok(FittedCamera {
         calibration: room_calibration(id, NativeImage { width, height }, &fit, known),

@@ -67,8 +67,8 @@ fn report(arguments: &Arguments, fit: &RoomFit, sources: &BTreeMap<SourcedValue,
             SourcedValue::FieldOfView => format!("{field_of_view:.1}°"),
             SourcedValue::Center => format!("{cx:.1}, {cy:.1}"),
             SourcedValue::WorldUp => format!("tilted by {tilt:.1}°"),
-            // The fit says nothing about it.
-            SourcedValue::HeightM => continue,
+            // The fit says nothing about them.
+            SourcedValue::HeightM | SourcedValue::PositionM | SourcedValue::YawDeg => continue,
         };
         line(*value, found, source);
     }

@@ -4,17 +4,7 @@ use serde::{Deserialize, Deserializer, Serialize, de::Error};
 
 /// The values of a calibration that have a source.
 #[derive(
-    Debug,
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    PartialOrd,
-    Ord,
-    Serialize,
-    Deserialize,
-    strum::Display,
-    strum::EnumString,
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, strum::Display,
 )]
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
@@ -31,6 +21,10 @@ pub enum SourcedValue {
     WorldUp,
     /// The height above the floor.
     HeightM,
+    /// The floor point below the camera on the floor of its site.
+    PositionM,
+    /// The rotation on the floor of its site.
+    YawDeg,
 }
 
 impl SourcedValue {
@@ -40,9 +34,9 @@ impl SourcedValue {
         match self {
             Self::Lens => " % of the radius",
             Self::LensModel => "",
-            Self::FieldOfView | Self::WorldUp => "°",
+            Self::FieldOfView | Self::WorldUp | Self::YawDeg => "°",
             Self::Center => " pixels",
-            Self::HeightM => " m",
+            Self::HeightM | Self::PositionM => " m",
         }
     }
 }
@@ -98,6 +92,15 @@ impl NativeSource {
         Self {
             source: ValueSource::Measured,
             uncertainty,
+        }
+    }
+
+    /// A value from people with its standard deviation.
+    #[must_use]
+    pub fn from_people(uncertainty: f64) -> Self {
+        Self {
+            source: ValueSource::FromPeople,
+            uncertainty: Some(uncertainty),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::Rotation3;
 
-use super::{circle, edges, equisolid};
+use super::{circle, edges, equisolid, rivals};
 use crate::self_calibration::{FieldOfView, FitRefusal, IdealLens, KnownCamera, RoomFit};
 
 fn tilted() -> Rotation3<f64> {
@@ -32,6 +32,17 @@ fn lens_that_the_edges_contradict_is_refused() {
         ),
         other => panic!("{other:?}"),
     }
+}
+
+#[test]
+fn contradiction_is_named_before_a_rival() {
+    let (all, circles) = rivals();
+    // With a wrong circle, the true lens is contradicted, too.
+    let fit = RoomFit::of(&[all], &circles, equisolid());
+    assert!(
+        matches!(fit, Err(FitRefusal::Contradicted { .. })),
+        "{fit:?}"
+    );
 }
 
 #[test]
