@@ -9,6 +9,9 @@ import { shared, whenChanged } from "./shared.js";
 /** The reasons of refusals that another search with a known model may avoid. */
 const WANT_MODEL = ["ambiguous", "uncertain"];
 
+/** The models of many ceiling cameras. */
+const TRIED_MODELS = ["equisolid", "equidistant"];
+
 const LABEL = "Finding the lens";
 
 const field = (name) => find("#calibration-form").elements[name];
@@ -66,12 +69,13 @@ export function startFinding(nameOf, show) {
 
   /** Leads to the model of the lens after a refusal without one. */
   function askForModel(images) {
-    const repeat = () => {
-      field("knownLens").value = "equidistant";
+    const repeat = (model) => () => {
+      field("knownLens").value = model;
       find("#find-lens").focus();
       return search(images);
     };
-    host().append(element("button", { type: "button", id: "try-model", onclick: shown(repeat) }, "Try equidistant, as most ceiling cameras"));
+    const tries = TRIED_MODELS.map((model) => element("button", { type: "button", onclick: shown(repeat(model)) }, `Try ${model}`));
+    host().append(element("span", { id: "try-model" }, ...tries));
     field("knownLens").classList.add("wanted");
     if ([document.body, find("#find-lens")].includes(document.activeElement)) field("knownLens").focus();
   }

@@ -31,7 +31,6 @@ settings! {
         writable: bool = true => flag();
         /// The projection of the lenses of cameras without a calibration, from their data sheet.
         /// The server can find the calibration of a camera that looks straight down only with it.
-        /// Most ceiling cameras are equidistant.
         lens: Option<IdealLens> = None => optional(variant());
         /// `true` if a calibration that the server finds in five frames of a named camera is stored
         /// under the name of the camera, if it has none. `false`: it is only offered

@@ -152,7 +152,7 @@ impl Angles {
         for entry in 0..ENTRIES + 2 {
             #[expect(clippy::cast_precision_loss, reason = "a small index")]
             let target = end * entry as f64 / ENTRIES as f64;
-            for _ in 0..3 {
+            for _ in 0..2 {
                 let (value, slope) = curve(shape, theta);
                 if slope < MIN_SLOPE {
                     return None;

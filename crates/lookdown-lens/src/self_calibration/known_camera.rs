@@ -21,7 +21,7 @@ pub struct KnownCamera {
 )]
 #[strum(serialize_all = "snake_case")]
 pub enum IdealLens {
-    /// `r = f theta`: most ceiling cameras.
+    /// `r = f theta`.
     Equidistant,
     /// `r = 2 f sin(theta / 2)`.
     Equisolid,
@@ -75,7 +75,7 @@ impl FieldOfView {
     pub const MIN_DEGREES: f64 = 60.0;
     /// The largest one.
     pub const MAX_DEGREES: f64 = 300.0;
-    /// Half a sphere, as the data sheets of most ceiling cameras say.
+    /// Half a sphere, as many data sheets say.
     pub const HEMISPHERE: Self = Self { degrees: 180.0 };
 
     /// Checks a field of view in degrees.

@@ -21,7 +21,11 @@ const RIMS: [f64; 7] = [72.0, 78.0, 84.0, 90.0, 96.0, 102.0, 108.0];
 /// Width of the kernel: the sine of an angle.
 const KERNEL: f64 = 0.035;
 /// The same for the directions of `triples`, which are 3 degrees apart.
-const WIDE_KERNEL: f64 = 0.05;
+const WIDE_KERNEL: f32 = 0.05;
+/// Cosine of the angle at which an edge is so near a direction that it says nothing about it.
+const NEAR: f32 = 0.97;
+/// Planes of a block.
+const LANES: usize = 8;
 /// Verticals of one lens whose headings are tried.
 const VERTICALS: usize = 4;
 /// Headings over a quarter turn.
@@ -110,23 +114,74 @@ fn planes(curves: &[EdgeCurve], camera: &RoomCamera, angles: &Angles) -> Vec<Pla
     curves.iter().filter_map(plane).collect()
 }
 
-fn kernel(sine: f64, width: f64) -> f64 {
-    let ratio = sine / width;
+fn kernel(sine: f64) -> f64 {
+    let ratio = sine / KERNEL;
     let root = 1.0 / (1.0 + ratio * ratio);
     root * root
+}
+
+/// Planes by component in single precision, for vector instructions.
+#[derive(Default)]
+struct Block {
+    normal: [[f32; LANES]; 3],
+    middle: [[f32; LANES]; 3],
+    weight: [f32; LANES],
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "scores are not exact")]
+fn blocks(planes: &[Plane]) -> Vec<Block> {
+    let block = |planes: &[Plane]| {
+        let mut block = Block::default();
+        for (lane, plane) in planes.iter().enumerate() {
+            for axis in 0..3 {
+                block.normal[axis][lane] = plane.normal[axis] as f32;
+                block.middle[axis][lane] = plane.middle[axis] as f32;
+            }
+            block.weight[lane] = plane.weight as f32;
+        }
+        block
+    };
+    planes.chunks(LANES).map(block).collect()
+}
+
+fn dots(of: &[[f32; LANES]; 3], [x, y, z]: [f32; 3]) -> [f32; LANES] {
+    std::array::from_fn(|lane| x * of[0][lane] + y * of[1][lane] + z * of[2][lane])
+}
+
+/// The weight of the planes through a direction, without those of edges near it.
+#[expect(clippy::cast_possible_truncation, reason = "scores are not exact")]
+fn along(blocks: &[Block], direction: &Ray) -> f64 {
+    let [x, y, z] = [direction.x, direction.y, direction.z].map(|part| part as f32);
+    let mut sums = [0.0_f32; LANES];
+    for Block {
+        normal,
+        middle,
+        weight,
+    } in blocks
+    {
+        let mut scores = dots(normal, [x, y, z]);
+        for (score, weight) in scores.iter_mut().zip(weight) {
+            let ratio = *score * (1.0 / WIDE_KERNEL);
+            let squares = 1.0 + ratio * ratio;
+            *score = weight / (squares * squares);
+        }
+        let cosines = dots(middle, [x, y, z]);
+        for ((sum, score), cosine) in sums.iter_mut().zip(scores).zip(cosines) {
+            *sum += if cosine.abs() < NEAR { score } else { 0.0 };
+        }
+    }
+    sums.iter().copied().map(f64::from).sum()
 }
 
 /// The two best rooms with their scores.
 fn directions(planes: &[Plane], triples: &Triples) -> Vec<(Rotation3<f64>, f64)> {
     let total: f64 = planes.iter().map(|plane| plane.weight).sum();
-    let along = |direction: &Ray| -> f64 {
-        let hits = planes
-            .iter()
-            .filter(|plane| plane.middle.dot(direction).abs() < 0.97);
-        hits.map(|plane| plane.weight * kernel(plane.normal.dot(direction), WIDE_KERNEL))
-            .sum()
-    };
-    let along: Vec<f64> = triples.rays.iter().map(along).collect();
+    let blocks = blocks(planes);
+    let along: Vec<f64> = triples
+        .rays
+        .iter()
+        .map(|direction| along(&blocks, direction))
+        .collect();
     let mut scored = triples.scores(&along);
     scored.sort_by(|a, b| b.1.total_cmp(&a.1));
     let mut peaks: Vec<Ray> = Vec::new();
@@ -160,7 +215,7 @@ fn heading(planes: &[Plane], down: Ray, total: f64) -> (Rotation3<f64>, f64) {
         let mut score = 0.0;
         for plane in planes {
             let nearest = [&x, &y, &down].map(|direction| plane.normal.dot(direction).abs());
-            score += plane.weight * kernel(nearest[0].min(nearest[1]).min(nearest[2]), KERNEL);
+            score += plane.weight * kernel(nearest[0].min(nearest[1]).min(nearest[2]));
         }
         if score > best.1 {
             let axes = Matrix3::from_columns(&[x, y, down]);

@@ -26,8 +26,8 @@ fn known_values() -> [(&'static str, Object); 3] {
         .schema_type(Type::String)
         .pattern(Some(format!("^({})$", IdealLens::VARIANTS.join("|"))))
         .description(Some(
-            "The projection of the lens. Cameras that look straight down need it. Most ceiling \
-             cameras are `equidistant`.",
+            "The projection of the lens, from its data sheet. Cameras that look straight down \
+             need it.",
         ));
     let field_of_view = ObjectBuilder::new()
         .schema_type(Type::Number)

@@ -27,8 +27,8 @@ pub(in crate::cli) struct Arguments {
     /// Detect the lens circle only; lens, field of view and level are given or assumed
     #[arg(long)]
     pub(super) circle_only: bool,
-    /// Projection of the lens, from its data sheet. Most ceiling cameras are equidistant [default:
-    /// found; equidistant with --circle-only]
+    /// Projection of the lens, from its data sheet. Cameras that look straight down need it
+    /// [default: found; equidistant with --circle-only]
     #[arg(long, value_name = "MODEL", value_parser = one_of::<IdealLens>())]
     pub(super) lens: Option<IdealLens>,
     /// Field of view of the circle in degrees, from the data sheet [default: found; 180 with

@@ -19,7 +19,7 @@ use crate::{
     rounding::{meters as thousandths, radians_below},
 };
 
-/// The lens and the field of view of most ceiling cameras.
+/// The lens and the field of view that are assumed.
 const LENS: IdealLens = IdealLens::Equidistant;
 const FIELD_OF_VIEW: FieldOfView = FieldOfView::HEMISPHERE;
 

@@ -1,4 +1,4 @@
-//! The equidistant projection, which most ceiling fisheyes approximate.
+//! The equidistant projection.
 
 use std::f64::consts::PI;
 
