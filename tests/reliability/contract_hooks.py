@@ -58,8 +58,10 @@ def schema(declared):
 
 def reads_well(name, value, field):
     """Returns true if a value of the wrong type is valid as form text. In a form everything is text: a list is its
-    items, null is a word, and quoted digits are a number. DeepStack's clients send an empty text for a confidence that
+    items and an item is a list, null is a word, and quoted digits are a number. DeepStack's clients send an empty text for a confidence that
     they leave out."""
+    if field["type"] == "array":
+        return not isinstance(value, list)
     if isinstance(value, list) or (name, value) == ("min_confidence", ""):
         return True
     if field["type"] == "string":
