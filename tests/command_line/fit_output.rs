@@ -26,7 +26,11 @@ fn of_the_user(folder: &tempfile::TempDir) -> String {
         serde_json::from_slice(&std::fs::read("samples/calibrations/office.json").unwrap())
             .unwrap();
     calibration["zones"] = json!([{"name": "desk", "floor_m": [[0, 0], [1, 0], [1, 1]]}]);
-    calibration["sources"] = json!({"lens": {"source": "given"}, "height_m": {"source": "given"}});
+    calibration["sources"] = json!({
+        "lens": {"source": "given"},
+        "height_m": {"source": "given"},
+        "yaw_deg": {"source": "from_people", "uncertainty": 0.2},
+    });
     std::fs::write(&file, calibration.to_string()).unwrap();
     file.to_str().unwrap().to_owned()
 }
@@ -56,6 +60,7 @@ fn replaced_lens_leaves_zones_and_height() {
         (source("lens"), source("lens_model"), source("height_m")),
         ("measured".into(), "given".into(), "given".into())
     );
+    assert_eq!(source("yaw_deg"), "from_people");
     assert_eq!(found["zones"][0]["name"], "desk");
     assert_eq!(found["mount"]["height_m"], 2.9);
     let with_people = fit_into(&file, &["--replace", "--people"]);

@@ -58,8 +58,8 @@ def schema(declared):
 
 def reads_well(name, value, field):
     """Returns true if a value of the wrong type is valid as form text. In a form everything is text: a list is its
-    items and an item is a list, null is a word, and quoted digits are a number. DeepStack's clients send an empty text for a confidence that
-    they leave out."""
+    items and an item is a list, null is a word, and quoted digits are a number. DeepStack's clients send an empty text
+    for a confidence that they leave out."""
     if field["type"] == "array":
         return not isinstance(value, list)
     if isinstance(value, list) or (name, value) == ("min_confidence", ""):

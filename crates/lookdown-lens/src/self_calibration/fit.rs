@@ -279,15 +279,15 @@ fn checked(
     maxima: &[Maximum],
     prior: &Prior,
 ) -> Result<RoomFit, FitRefusal> {
-    let Some(Maximum {
+    let Some(best) = maxima.first() else {
+        return Err(FitRefusal::NoDirections { explained: 0.0 });
+    };
+    let Maximum {
         camera,
         evaluation,
         is_upright,
-    }) = maxima.first()
-    else {
-        return Err(FitRefusal::NoDirections { explained: 0.0 });
-    };
-    let explained = maxima[0].explained();
+    } = best;
+    let explained = best.explained();
     if !has_order(explained, evaluation.evidence) {
         return Err(FitRefusal::NoDirections { explained });
     }

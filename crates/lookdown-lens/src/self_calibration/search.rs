@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 use nalgebra::{Matrix3, Rotation3};
 
 use super::{
-    camera::{Angles, RoomCamera, ideal_shape},
+    camera::{Angles, RoomCamera, curve, ideal_shape},
     edge_curve::EdgeCurve,
     known_camera::{FieldOfView, KnownCamera},
     prior::Prior,
@@ -47,11 +47,9 @@ fn lenses(prior: &Prior, known: KnownCamera) -> impl Iterator<Item = (RoomCamera
         });
     let (center, radius) = (prior.center, prior.radius);
     let with = move |k1: f64, rim: f64| {
-        let shape = ideal_shape(k1);
-        let square = rim * rim;
-        let curve = rim * (1.0 + square * (shape[0] + square * (shape[1] + square * shape[2])));
+        let (at_rim, _) = curve(ideal_shape(k1), rim);
         let camera = RoomCamera {
-            focal: radius / curve,
+            focal: radius / at_rim,
             k1,
             k2_offset: 0.0,
             center,

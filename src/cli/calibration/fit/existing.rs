@@ -76,8 +76,9 @@ pub(super) fn put_into(
         );
     }
     let mut sources = found.sources;
-    let height = existing.sources.get(&SourcedValue::HeightM);
-    sources.extend(height.map(|source| (SourcedValue::HeightM, *source)));
+    let others = existing.sources.iter();
+    let others = others.filter(|(value, _)| !value.is_of_lens_or_level());
+    sources.extend(others.map(|(value, source)| (*value, *source)));
     Ok(NativeCalibration {
         id: found.id,
         lens: found.lens,

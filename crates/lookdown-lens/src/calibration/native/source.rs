@@ -28,6 +28,15 @@ pub enum SourcedValue {
 }
 
 impl SourcedValue {
+    /// Returns true for a value of the lens or of the level, which a fit to frames finds together.
+    #[must_use]
+    pub fn is_of_lens_or_level(self) -> bool {
+        match self {
+            Self::Lens | Self::LensModel | Self::FieldOfView | Self::Center | Self::WorldUp => true,
+            Self::HeightM | Self::PositionM | Self::YawDeg => false,
+        }
+    }
+
     /// Returns the unit of the standard deviation, to follow its number.
     #[must_use]
     pub fn unit(self) -> &'static str {
