@@ -24,6 +24,9 @@ pub use self::{
 
 /// Time from a search to the next one, seconds: a little less than a second, because frames jitter.
 pub const SEARCH_EVERY_S: f64 = 0.9;
+/// A person of this score or more who is lost is a reason to search: the default least score of a
+/// report. Boxes of lower scores come and go with the noise of a camera.
+const PERSON_SCORE: f64 = 0.3;
 /// Cells with motion belong to the same motion if at most this many cells less one lie between
 /// them.
 pub const JOINED_CELLS: f64 = 2.0;
@@ -49,6 +52,25 @@ impl<P: FoundPerson> FollowedPeople<P> {
     #[must_use]
     pub fn are_all_seen(&self) -> bool {
         self.targets.iter().all(|target| target.is_seen)
+    }
+
+    /// Returns true if crops at `at_s` (seconds) show everyone in motion who is seen. Someone who
+    /// may be further away needs a search.
+    #[must_use]
+    pub fn are_in_reach(&self, moving: &[bool], at_s: f64) -> bool {
+        let mut seen = self.targets.iter().zip(moving);
+        seen.all(|(target, is_moving)| !is_moving || !target.is_seen || target.is_in_reach(at_s))
+    }
+
+    /// Returns true if `after` lacks someone who is seen here, or has a score below `least_score`
+    /// instead. The frame of `after` needs a search.
+    #[must_use]
+    pub fn are_lost_in(&self, after: &Self, least_score: f64) -> bool {
+        let mut both = self.targets.iter().zip(&after.targets);
+        both.any(|(before, after)| {
+            let was_reported = before.is_seen && before.person.score() >= PERSON_SCORE;
+            was_reported && !(after.is_seen && after.person.score() >= least_score)
+        })
     }
 
     /// Returns for each person whether there is motion where it was or is expected at `at_s`

@@ -2,7 +2,7 @@
 
 use std::{path::PathBuf, time::Duration};
 
-use crate::{Credentials, Location};
+use crate::{Credentials, Location, operating_point::OperatingPoints};
 
 /// The settings of one camera.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,8 +13,8 @@ pub struct Camera {
     pub location: Location,
     /// The user name and the password of the source.
     pub credentials: Option<Credentials>,
-    /// The interval between two frames that are sent.
-    pub every: Duration,
+    /// The profiles and the intervals between two frames that are sent.
+    pub operating_points: OperatingPoints,
     /// The longest time without a frame, after which the source is started again.
     pub stall_after: Duration,
     /// The parameters of `/detect` except the time of capture.
@@ -24,6 +24,12 @@ pub struct Camera {
 }
 
 impl Camera {
+    /// Returns the shortest interval between two frames that are sent.
+    #[must_use]
+    pub fn every(&self) -> Duration {
+        self.operating_points.shortest_interval()
+    }
+
     /// Returns the value of a parameter of `/detect`, if the camera has one.
     #[must_use]
     pub fn parameter(&self, name: &str) -> Option<&str> {

@@ -9,7 +9,7 @@ use lookdown_common::{metric_set, metrics::text};
 use parking_lot::Mutex;
 use prometheus::{GaugeVec, IntCounter, IntCounterVec, IntGauge, Registry};
 
-use crate::rate::Rate;
+use crate::{operating_point::Choice, rate::Rate};
 
 /// The reason why a frame did not become a report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -82,6 +82,7 @@ pub(crate) struct CameraMetrics {
     /// The source, without credentials.
     source: String,
     rate: Mutex<Option<Rate>>,
+    choice: Mutex<Option<Choice>>,
     warning: Mutex<Option<String>>,
     problem: Mutex<Option<String>>,
 }
@@ -97,6 +98,8 @@ pub struct CameraState {
     pub last_frame_age: Duration,
     /// The rate of the last whole minute.
     pub rate: Option<Rate>,
+    /// The profile and the rate, once they are chosen.
+    pub choice: Option<Choice>,
     /// The reason and the remedies, if less than 80 % of the wanted rate is reached.
     pub warning: Option<String>,
     /// The reason why the source gives no frames.
@@ -131,6 +134,7 @@ impl Metrics {
             reconnects: of(&series.reconnects),
             source,
             rate: Mutex::default(),
+            choice: Mutex::default(),
             warning: Mutex::default(),
             problem: Mutex::default(),
         });
@@ -163,13 +167,18 @@ impl Metrics {
     #[must_use]
     pub fn states(&self) -> Vec<CameraState> {
         let cameras = self.cameras.lock();
-        let states = cameras.iter().map(|camera| CameraState {
-            name: camera.camera.clone(),
-            source: camera.source.clone(),
-            last_frame_age: camera.last_frame.lock().elapsed(),
-            rate: *camera.rate.lock(),
-            warning: camera.warning.lock().clone(),
-            problem: camera.problem.lock().clone(),
+        let states = cameras.iter().map(|camera| {
+            let choice = camera.choice.lock().clone();
+            let warning = camera.warning.lock().clone();
+            CameraState {
+                name: camera.camera.clone(),
+                source: camera.source.clone(),
+                last_frame_age: camera.last_frame.lock().elapsed(),
+                rate: *camera.rate.lock(),
+                warning: warning.or_else(|| choice.as_ref()?.warning()),
+                choice,
+                problem: camera.problem.lock().clone(),
+            }
         });
         states.collect()
     }
@@ -215,6 +224,21 @@ impl CameraMetrics {
     pub(crate) fn measured(&self, rate: Rate, warning: Option<String>) {
         *self.rate.lock() = Some(rate);
         *self.warning.lock() = warning;
+    }
+
+    /// Stores the profile and the rate in use. Logs a change.
+    pub(crate) fn chose(&self, choice: Choice) {
+        let mut last = self.choice.lock();
+        let is_changed = last.as_ref().is_none_or(|last| !last.is_same(&choice));
+        if is_changed {
+            tracing::info!("{choice}");
+            *last = Some(choice);
+        }
+    }
+
+    /// The number of whole frames of the camera.
+    pub(crate) fn frames_received(&self) -> u64 {
+        self.received.get()
     }
 
     /// Stores the reason why the source gives no frames.

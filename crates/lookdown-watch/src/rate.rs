@@ -6,8 +6,6 @@ use std::time::{Duration, Instant};
 const WINDOW: Duration = Duration::from_mins(1);
 /// The share of the wanted rate below which a camera is slow.
 const SLOW_SHARE: f64 = 0.8;
-/// The share of the time with a request in flight above which the server is the reason.
-const BUSY_SHARE: f64 = 0.8;
 
 /// The rate of the last whole minute.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,24 +25,25 @@ pub struct Rate {
 pub(crate) struct RateMeter {
     every: Duration,
     began: Instant,
+    /// The frames that the source had delivered until then.
+    received: u64,
     sent: u32,
-    busy: Duration,
 }
 
 impl RateMeter {
-    pub(crate) fn new(every: Duration, now: Instant) -> Self {
+    /// Starts a minute. `received` is the number of frames that the source has delivered so far.
+    pub(crate) fn new(every: Duration, received: u64, now: Instant) -> Self {
         Self {
             every,
             began: now,
+            received,
             sent: 0,
-            busy: Duration::ZERO,
         }
     }
 
-    /// Counts a frame whose request took `busy`. Returns the rate at the end of each minute.
-    pub(crate) fn add(&mut self, has_report: bool, busy: Duration, now: Instant) -> Option<Rate> {
+    /// Counts a frame that was sent. Returns the rate at the end of each minute.
+    pub(crate) fn add(&mut self, has_report: bool, received: u64, now: Instant) -> Option<Rate> {
         self.sent += u32::from(has_report);
-        self.busy += busy;
         let elapsed = now.duration_since(self.began).max(self.every);
         if elapsed < WINDOW {
             return None;
@@ -52,13 +51,14 @@ impl RateMeter {
         let wanted = self.every.as_secs_f64().recip();
         let reached = f64::from(self.sent) / elapsed.as_secs_f64();
         let is_slow = reached < SLOW_SHARE * wanted;
-        let is_busy = self.busy.as_secs_f64() > BUSY_SHARE * elapsed.as_secs_f64();
-        *self = Self::new(self.every, now);
+        let delivered = u32::try_from(received - self.received).unwrap_or(u32::MAX);
+        let has_frames = f64::from(delivered) / elapsed.as_secs_f64() >= SLOW_SHARE * wanted;
+        *self = Self::new(self.every, received, now);
         Some(Rate {
             wanted,
             reached,
-            is_server_slow: is_slow && is_busy,
-            is_camera_slow: is_slow && !is_busy,
+            is_server_slow: is_slow && has_frames,
+            is_camera_slow: is_slow && !has_frames,
         })
     }
 }
@@ -92,20 +92,24 @@ impl Rate {
 mod tests {
     use super::*;
 
-    /// Sends frames at this interval for two minutes, each of which takes `busy`.
-    fn rates(interval: Duration, busy: Duration) -> Vec<Rate> {
+    /// Sends frames at this interval for two minutes, while the source delivers one at this other.
+    fn rates(interval: Duration, delivered: Duration) -> Vec<Rate> {
         let start = Instant::now();
-        let mut meter = RateMeter::new(Duration::from_millis(200), start);
+        let mut meter = RateMeter::new(Duration::from_millis(200), 0, start);
         let frames = 1..=u32::try_from(121_000 / interval.as_millis()).unwrap();
         frames
-            .filter_map(|frame| meter.add(true, busy, start + interval * frame))
+            .filter_map(|frame| {
+                let elapsed = interval * frame;
+                let received = elapsed.as_millis() / delivered.as_millis();
+                meter.add(true, u64::try_from(received).unwrap(), start + elapsed)
+            })
             .collect()
     }
 
     #[test]
     fn a_slow_server_is_reported_with_its_remedies() {
         let millis = Duration::from_millis;
-        let slow = rates(millis(312), millis(310));
+        let slow = rates(millis(312), millis(200));
         assert_eq!(slow.len(), 2);
         assert!(slow[0].is_server_slow && !slow[0].is_camera_slow);
         let warning = slow[0].warning().unwrap();
@@ -121,7 +125,7 @@ mod tests {
     #[test]
     fn a_slow_camera_is_not_blamed_on_the_server() {
         let millis = Duration::from_millis;
-        let slow = rates(millis(500), millis(100));
+        let slow = rates(millis(500), millis(500));
         assert!(slow[0].is_camera_slow && !slow[0].is_server_slow);
         assert!(
             slow[0]
@@ -129,7 +133,7 @@ mod tests {
                 .unwrap()
                 .contains("frame rate of the camera")
         );
-        let reached = rates(millis(210), millis(150));
+        let reached = rates(millis(210), millis(200));
         assert_eq!(reached[0].warning(), None);
     }
 }

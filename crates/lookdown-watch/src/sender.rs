@@ -7,6 +7,7 @@ use tokio::time::{sleep, sleep_until};
 use crate::{
     Camera, Frame, Location,
     metrics::{CameraMetrics, Failure},
+    operating_point::Governor,
     pace::Pace,
     rate::RateMeter,
     server::{Answer, Server},
@@ -24,11 +25,12 @@ pub(crate) async fn run(
     slot: &Slot<Frame>,
     metrics: &CameraMetrics,
 ) {
-    let mut pace = Pace::new(camera.every);
+    let mut governor = Governor::new(&camera.operating_points, Instant::now());
+    let mut pace = Pace::new(governor.every());
     let (first, longest) = PAUSES;
     let mut backoff = Backoff::new(first, longest);
     let mut log = LogOnce::default();
-    let mut meter = RateMeter::new(camera.every, Instant::now());
+    let mut meter = RateMeter::new(governor.every(), metrics.frames_received(), Instant::now());
     let mut is_slow = false;
     loop {
         if let Some(earliest) = pace.earliest() {
@@ -39,9 +41,10 @@ pub(crate) async fn run(
         };
         let sent_at = Instant::now();
         pace.sent(sent_at);
-        let answer = server.detect(camera, &frame).await;
+        let answer = server.detect(camera, governor.profile(), &frame).await;
         let now = Instant::now();
-        if let Some(rate) = meter.add(answer == Answer::Report, now - sent_at, now) {
+        let has_report = matches!(answer, Answer::Report(_));
+        if let Some(rate) = meter.add(has_report, metrics.frames_received(), now) {
             // A folder, and a snapshot that does not change, have no rate of their own.
             let has_own_rate = matches!(camera.location, Location::Rtsp(_));
             let warning = rate.warning();
@@ -55,11 +58,20 @@ pub(crate) async fn run(
             metrics.measured(rate, warning);
         }
         let (failure, message, pause) = match answer {
-            Answer::Report => {
+            Answer::Report(search) => {
                 metrics.sent();
                 backoff.reset();
                 if log.clear() {
                     tracing::info!("the server accepts frames again");
+                }
+                let Some(search) = search else {
+                    continue;
+                };
+                if governor.record(search, now) {
+                    pace = Pace::new(governor.every());
+                    meter = RateMeter::new(governor.every(), metrics.frames_received(), now);
+                } else if let Some(choice) = governor.choice() {
+                    metrics.chose(choice);
                 }
                 continue;
             }

@@ -1,11 +1,15 @@
 //! Requests to the Lookdown server.
 
-use std::time::Duration;
+use std::{
+    borrow::Cow,
+    time::{Duration, Instant},
+};
 
 use lookdown_common::{ClientError, ServerClient, ServerOptions, read_body, retry_after};
 use reqwest::{Response, StatusCode, Url, header::CONTENT_TYPE};
+use serde::Deserialize;
 
-use crate::{Camera, Frame};
+use crate::{Camera, Frame, operating_point::FinishedSearch};
 
 /// Longest time for a report.
 const REPORT_TIMEOUT: Duration = Duration::from_secs(35);
@@ -21,14 +25,32 @@ pub(crate) struct Server {
 /// The answer to a frame.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Answer {
-    /// The server returned a report.
-    Report,
+    /// The server returned a report. Holds the search, if the whole frame was searched.
+    Report(Option<FinishedSearch>),
     /// The server is busy. Holds the time of `Retry-After`.
     Busy(String, Option<Duration>),
     /// The server refuses the frame or its parameters.
     Refused(String),
     /// The server cannot be reached, or failed.
     Failed(String),
+}
+
+/// The parts of a report that tell what the server did.
+#[derive(Deserialize)]
+struct Work<'a> {
+    #[serde(borrow)]
+    profile: Cow<'a, str>,
+    #[serde(borrow)]
+    search: Cow<'a, str>,
+    #[serde(borrow, default)]
+    defaults: Vec<ServerDefault<'a>>,
+}
+
+/// A parameter that is a setting of the server or of the calibration.
+#[derive(Deserialize)]
+struct ServerDefault<'a> {
+    #[serde(borrow)]
+    name: Cow<'a, str>,
 }
 
 impl Server {
@@ -42,26 +64,32 @@ impl Server {
         Ok(Self { client, detect })
     }
 
-    /// Sends a frame, and waits for its report.
-    pub(crate) async fn detect(&self, camera: &Camera, frame: &Frame) -> Answer {
+    /// Sends a frame, and waits for its report. `profile` replaces that of the server.
+    pub(crate) async fn detect(
+        &self,
+        camera: &Camera,
+        profile: Option<&str>,
+        frame: &Frame,
+    ) -> Answer {
         let mut url = self.detect.clone();
         url.query_pairs_mut()
             .extend_pairs(&camera.parameters)
+            .extend_pairs(profile.map(|profile| ("profile", profile)))
             .append_pair("captured_at", &frame.captured_at.to_string());
+        let began = Instant::now();
         let request = self.client.post(url).timeout(REPORT_TIMEOUT);
         let request = request.header(CONTENT_TYPE, frame.format.media_type());
         match self.client.send(request.body(frame.image.clone())).await {
-            Ok(response) => self.answer(response).await,
+            Ok(response) => self.answer(response, began).await,
             Err(error) => Answer::Failed(self.client.failure(&error)),
         }
     }
 
-    async fn answer(&self, response: Response) -> Answer {
+    async fn answer(&self, response: Response, began: Instant) -> Answer {
         let status = response.status();
         if status.is_success() {
-            // The rest is read so that the connection can be used again.
             return match read_body(response, MAX_ANSWER_BYTES).await {
-                Ok(_) => Answer::Report,
+                Ok(body) => Answer::Report(finished_search(&body, began.elapsed())),
                 Err(error) => Answer::Failed(self.client.failure(&error)),
             };
         }
@@ -77,4 +105,18 @@ impl Server {
             _ => Answer::Failed(message),
         }
     }
+}
+
+/// Returns the search of a report; `None` if people were followed, or if the report is of an
+/// unknown form.
+fn finished_search(report: &[u8], took: Duration) -> Option<FinishedSearch> {
+    let work: Work<'_> = serde_json::from_slice(report).ok()?;
+    (work.search == "full").then(|| FinishedSearch {
+        is_profile_named: work
+            .defaults
+            .iter()
+            .any(|default| default.name == "profile"),
+        profile: work.profile.into_owned(),
+        took,
+    })
 }

@@ -86,7 +86,10 @@ pub(in crate::api) struct CameraInfo {
     wanted_rate: Option<f64>,
     /// Frames per second with a report, in the last whole minute.
     reached_rate: Option<f64>,
-    /// The reason and the remedies, if less than 80 % of the wanted rate is reached.
+    /// The profile and the rate in use, with the time of a search that they were chosen by.
+    choice: Option<String>,
+    /// The reason and the remedies, if less than 80 % of the wanted rate is reached, or if the
+    /// machine is too slow for counts.
     warning: Option<String>,
     /// The reason why the source gives no frames.
     problem: Option<String>,
@@ -340,6 +343,7 @@ async fn rows(state: &ApiState, deadline: Deadline) -> Result<Vec<CameraInfo>, P
     let mut rows: Vec<_> = states
         .into_iter()
         .map(|state| CameraInfo {
+            choice: state.choice.map(|choice| choice.to_string()),
             warning: state.warning,
             wanted_rate: state.rate.map(|rate| rate.wanted),
             reached_rate: state.rate.map(|rate| rate.reached),

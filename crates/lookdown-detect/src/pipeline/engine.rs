@@ -301,8 +301,12 @@ impl Engine {
                 if let FirstPass::Crops(task) = pass {
                     observation.wait_for(&task)?;
                 }
-                timeline.leave(Instant::now());
-                return Ok(observation);
+                if self.confirms_followed(&mut observation) {
+                    timeline.leave(Instant::now());
+                    return Ok(observation);
+                }
+                observation.passes.clear();
+                observation.is_searched = true;
             }
         }
         timeline.enter(Stage::Queue, Instant::now());

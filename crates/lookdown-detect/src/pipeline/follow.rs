@@ -35,6 +35,9 @@ const LEAST_SCORE: f64 = 1e-4;
 /// The next search of a camera is not due before so many times the time that the last one took.
 /// Searches of frames that wait for others would otherwise leave no time to follow anyone.
 const SEARCH_TIMES: u32 = 3;
+/// … but it is due after this time. A search that takes longer than .7 s leaves no one in reach, so
+/// that only recordings, whose frames wait, need the limit.
+const MAX_SEARCH_EVERY: Duration = Duration::from_secs(2);
 
 /// The followed persons of each camera.
 #[derive(Default)]
@@ -64,6 +67,7 @@ impl FollowCache {
             at,
             before,
             moving,
+            is_confirmed: false,
         }
     }
 }
@@ -136,7 +140,8 @@ impl Followed {
         let moved: Vec<_> = moved.iter().map(|cell| cell.bounds).collect();
         let moving = self.people.moving(&moved, seconds(at));
         let count = moving.iter().filter(|is_moving| **is_moving).count();
-        (count <= MAX_MOVING).then_some(moving)
+        let can_follow = count <= MAX_MOVING && self.people.are_in_reach(&moving, seconds(at));
+        can_follow.then_some(moving)
     }
 
     /// Returns true if all strong motion is joined to a person, as a shadow is.
@@ -159,6 +164,8 @@ pub(super) struct FollowedFrame {
     before: Option<Followed>,
     /// The persons of `before` with motion; `None` if the whole frame is searched.
     moving: Option<Vec<bool>>,
+    /// True once the crops of the frame have confirmed the persons of `before`.
+    is_confirmed: bool,
 }
 
 impl FollowedFrame {
@@ -184,24 +191,42 @@ impl FollowedFrame {
         Some(targets)
     }
 
+    /// Confirms the persons in motion by those in the crops of the frame, which `found_by` returns.
+    /// Returns false if someone is lost: then the whole frame must be searched.
+    pub(super) fn confirm(
+        &mut self,
+        rig: &CameraRig,
+        found_by: impl Fn(&RefinementParameters) -> Vec<Person>,
+    ) -> bool {
+        let (Some(before), Some(moving)) = (self.before.as_mut(), self.moving.take()) else {
+            return false;
+        };
+        let refinement = self.origin.refinement;
+        let found = found_by(&RefinementParameters {
+            score_threshold: refinement.score_threshold.min(LEAST_SCORE),
+            ..refinement
+        });
+        let people = before.people.clone();
+        before.confirm(&moving, found, self.at, rig);
+        if people.are_lost_in(&before.people, refinement.score_threshold) {
+            before.people = people;
+            return false;
+        }
+        self.is_confirmed = true;
+        true
+    }
+
     /// Returns the persons of the frame, highest score first, and keeps them for the next frame.
-    /// `found_by` returns the persons in the views of the frame.
+    /// `found_by` returns the persons in the views of a search.
     pub(super) fn persons(
         self,
         rig: &CameraRig,
         found_by: impl Fn(&RefinementParameters) -> Vec<Person>,
     ) -> Vec<Person> {
         let refinement = self.origin.refinement;
-        let (persons, state) = match (self.before, self.moving) {
-            (Some(mut state), Some(moving)) => {
-                let found = found_by(&RefinementParameters {
-                    score_threshold: refinement.score_threshold.min(LEAST_SCORE),
-                    ..refinement
-                });
-                state.confirm(&moving, found, self.at, rig);
-                (state.persons(&refinement), state)
-            }
-            (before, _) => {
+        let (persons, state) = match self.before {
+            Some(state) if self.is_confirmed => (state.persons(&refinement), state),
+            before => {
                 let persons = found_by(&refinement);
                 let visible = before.as_ref().map(|before| Arc::clone(&before.visible));
                 let visible = visible.unwrap_or_else(|| visible_cells(&self.signature, rig));
@@ -267,7 +292,8 @@ impl FoundPerson for Person {
 
 /// Returns the time to the next search after one that took so long.
 fn search_every(took: Duration) -> Duration {
-    Duration::from_secs_f64(SEARCH_EVERY_S).max(took * SEARCH_TIMES)
+    let every = Duration::from_secs_f64(SEARCH_EVERY_S).max(took * SEARCH_TIMES);
+    every.min(MAX_SEARCH_EVERY)
 }
 
 /// Returns the seconds since the Unix epoch.

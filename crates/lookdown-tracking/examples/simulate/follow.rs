@@ -79,9 +79,13 @@ impl Follow {
             oriented,
             logit: logit(score),
         };
+        let people = state.people.clone();
         state
             .people
             .confirm(&moving, found.collect(), at_s, NEW_SCORE, place);
+        if people.are_lost_in(&state.people, NEW_SCORE) {
+            return self.search(camera, at_s, shown, Some(&people));
+        }
         let seen = state.people.seen().copied().collect();
         self.state = Some(state);
         seen
@@ -117,7 +121,9 @@ impl State {
         let others = self
             .people
             .unexplained(&moved, JOINED_CELLS * CELL_PX, at_s);
-        others.is_empty().then(|| self.people.moving(&moved, at_s))
+        let moving = self.people.moving(&moved, at_s);
+        let can_follow = others.is_empty() && self.people.are_in_reach(&moving, at_s);
+        can_follow.then_some(moving)
     }
 
     /// The bounds of persons that have moved since the search, where they were and where they are.

@@ -15,6 +15,18 @@ const MARGIN: f64 = 0.5;
 /// Most logit by which a score from a crop is moved toward that of the last search, which may have
 /// missed a person behind another one.
 const MAX_GAIN: f64 = 1.0;
+/// The distance from its expected place at which a crop still shows a person, as a share of the
+/// larger side of its box. A tile of a mosaic is 1.67 of these sides wide (`crop_fill` of .6), so
+/// that a third of a side remains around the person.
+const REACH: f64 = 0.33;
+/// Speed of a person whose motion is not known, larger sides of its box per second: 1.4 m/s for one
+/// of 1.7 m.
+const UNKNOWN_SPEED: f64 = 0.82;
+/// Change of the speed of a person whose motion is known, in the same unit: .5 m/s. Added to
+/// [`SPEED_CHANGE`] times its own speed, because people turn and stop.
+const KNOWN_SPEED: f64 = 0.3;
+/// Change of a known speed, as its share.
+const SPEED_CHANGE: f64 = 0.3;
 /// Longest time for which a person in motion whom a search has missed is still expected, seconds.
 const MISSED_S: f64 = 1.0;
 /// The score of a search that does not find a person who is there or was there.
@@ -29,8 +41,10 @@ pub(super) struct Target<P> {
     pub(super) person: P,
     /// False while no crop confirms the person.
     pub(super) is_seen: bool,
-    /// Its motion, pixels per second.
+    /// Its motion, pixels per second; zero while it was seen only once.
     velocity: Vector2<f64>,
+    /// True once it was seen at two times.
+    is_motion_known: bool,
     /// The time of its last place, seconds.
     at_s: f64,
     /// The box around all its places since the last search.
@@ -46,6 +60,7 @@ impl<P: FoundPerson> Target<P> {
         let mut target = Self {
             is_seen: true,
             velocity: Vector2::zeros(),
+            is_motion_known: before.is_some(),
             at_s,
             trail: person.bounds(),
             searched: (person.oriented_box(), person.score()),
@@ -78,6 +93,19 @@ impl<P: FoundPerson> Target<P> {
             x_max + moved.x,
             y_max + moved.y,
         ]
+    }
+
+    /// Returns true if a crop at the expected place shows the person at a time, from its speed and
+    /// the time since its last place.
+    pub(super) fn is_in_reach(&self, at_s: f64) -> bool {
+        let oriented = self.person.oriented_box();
+        let side = oriented.width.max(oriented.height);
+        let speed = if self.is_motion_known {
+            KNOWN_SPEED * side + SPEED_CHANGE * self.velocity.norm()
+        } else {
+            UNKNOWN_SPEED * side
+        };
+        speed * (at_s - self.at_s) <= REACH * side
     }
 
     /// Returns the box around all places since the last search and the one expected at a time.
@@ -121,6 +149,7 @@ impl<P: FoundPerson> Target<P> {
         };
         let bounds = found.bounds();
         self.velocity = self.velocity_to(&bounds, at_s);
+        self.is_motion_known = true;
         self.trail = hull(self.trail, bounds);
         self.at_s = at_s;
         self.is_seen = true;

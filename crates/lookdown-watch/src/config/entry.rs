@@ -4,15 +4,16 @@ use std::{collections::BTreeMap, path::PathBuf, time::Duration};
 
 use serde::Deserialize;
 
-use crate::{Camera, Credentials, Location, Transport, VideoOptions};
+use crate::{
+    Camera, Credentials, Location, OperatingPoints, Transport, VideoOptions,
+    operating_point::DEFAULT_EVERY,
+};
 use lookdown_common::{ConfigError, Secret, optional_duration, read_secret, text::is_camera_name};
 
 /// Shortest interval between two frames.
 const MIN_EVERY: Duration = Duration::from_millis(40);
 /// Longest interval between two frames.
 const MAX_EVERY: Duration = Duration::from_hours(1);
-/// Interval between two frames if none is given.
-const DEFAULT_EVERY: Duration = Duration::from_secs(1);
 /// Shortest time without a frame after which a source is started again.
 const MIN_STALL: Duration = Duration::from_secs(1);
 /// Time without a frame after which a source is started again, if none is given, and as a multiple
@@ -137,6 +138,8 @@ impl CameraEntry {
             self.every.as_deref(),
             MIN_EVERY..=MAX_EVERY,
         )?;
+        let is_stream = matches!(location, Location::Rtsp(_));
+        let operating_points = OperatingPoints::new(self.profile.is_some(), every, is_stream);
         let every = every.unwrap_or(DEFAULT_EVERY);
         let stall_after = optional_duration(
             &field("stall_after"),
@@ -162,7 +165,7 @@ impl CameraEntry {
             name,
             location,
             credentials,
-            every,
+            operating_points,
             stall_after,
         })
     }

@@ -52,7 +52,7 @@ pub(super) async fn run(
     sink: &Sink<'_>,
 ) -> Result<Infallible, SourceError> {
     let (shortest, longest) = CHECKS;
-    let pause = camera.every.clamp(shortest, longest);
+    let pause = camera.every().clamp(shortest, longest);
     let mut seen = Seen::new();
     // The last file if it was damaged: it may be in the middle of its upload.
     let mut damaged: Option<(PathBuf, FileState)> = None;

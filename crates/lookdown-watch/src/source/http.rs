@@ -26,7 +26,7 @@ pub(super) async fn run(
     sink: &Sink<'_>,
 ) -> Result<Infallible, SourceError> {
     let mut entity_tag = None;
-    let mut ticks = interval(camera.every);
+    let mut ticks = interval(camera.every());
     ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
         ticks.tick().await;

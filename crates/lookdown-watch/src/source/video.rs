@@ -60,7 +60,7 @@ pub(super) async fn run_stream(
     add(&["-i", "pipe:0", "-an", "-sn", "-dn"]);
     add(&[
         "-vf",
-        &first_of_each(camera.every),
+        &first_of_each(camera.every()),
         "-fps_mode",
         "passthrough",
     ]);
@@ -97,7 +97,7 @@ pub(super) async fn run_file(
     let mut arguments = decoding(&camera.video);
     arguments.push("-re".into());
     arguments.extend(file_input(path));
-    let filter = first_of_each(camera.every);
+    let filter = first_of_each(camera.every());
     arguments.extend(["-vf", &filter, "-fps_mode", "passthrough"].map(OsString::from));
     let mut ffmpeg = Ffmpeg::start(&camera.video, &arguments, Input::File).await?;
     while let Some(frame) = ffmpeg.next_frame().await? {

@@ -71,4 +71,17 @@ impl Engine {
             .queue_pass(Arc::new(crops), model, frame, ticket, None);
         FirstPass::Crops(task)
     }
+
+    /// Returns true if the crops of a frame confirm everyone who is followed.
+    pub(super) fn confirms_followed(&self, observation: &mut Observation) -> bool {
+        let timeline = observation.timeline.clone();
+        timeline.enter(Stage::Refine, Instant::now());
+        let Some(mut follow) = observation.follow.take() else {
+            return false;
+        };
+        let rig = Arc::clone(&observation.camera.rig);
+        let is_confirmed = follow.confirm(&rig, |refinement| self.persons(observation, refinement));
+        observation.follow = Some(follow);
+        is_confirmed
+    }
 }

@@ -135,13 +135,24 @@ fn motion_where_no_person_was_starts_a_search() {
 }
 
 #[test]
-fn a_person_whom_no_crop_confirms_disappears() {
+fn a_person_whom_no_crop_confirms_starts_a_search() {
     let camera = FollowedCamera::new();
     camera.report(0, [420.0, 300.0], 20.0);
     let gone = camera.report(200, [420.0, 300.0], 0.0);
-    assert_eq!((gone.search, gone.persons.len()), (Search::Followed, 0));
+    assert_eq!((gone.search, gone.persons.len()), (Search::Full, 0));
     let back = camera.report(400, [420.0, 300.0], 20.0);
-    assert_eq!((back.search, back.persons.len()), (Search::Followed, 1));
+    assert_eq!((back.search, back.persons.len()), (Search::Full, 1));
+}
+
+#[test]
+fn a_walker_out_of_reach_of_crops_starts_a_search() {
+    let camera = FollowedCamera::new();
+    camera.report(0, [420.0, 300.0], 20.0);
+    // After .5 s a walker whose motion is not known may be anywhere near.
+    let next = camera.report(500, [400.0, 300.0], 20.0);
+    assert_eq!((next.search, next.persons.len()), (Search::Full, 1));
+    let known = camera.report(900, [384.0, 300.0], 20.0);
+    assert_eq!((known.search, known.persons.len()), (Search::Followed, 1));
 }
 
 #[test]

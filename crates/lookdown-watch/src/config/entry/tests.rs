@@ -59,7 +59,7 @@ fn defaults_apply_to_every_camera() {
     let [hall, gate] = options.cameras.as_slice() else {
         panic!("two cameras")
     };
-    assert_eq!(hall.every.as_millis(), 500);
+    assert_eq!(hall.every().as_millis(), 500);
     let query = |camera: &crate::Camera| {
         let pairs = camera.parameters.iter();
         let pairs = pairs.map(|(key, value)| format!("{key}={value}"));
@@ -73,7 +73,7 @@ fn defaults_apply_to_every_camera() {
         query(gate),
         "camera=gate&profile=fast&motion=false&follow=false&score_threshold=0.4"
     );
-    assert_eq!(gate.every.as_secs(), 2);
+    assert_eq!(gate.every().as_secs(), 2);
     assert!(matches!(&gate.location, Location::Rtsp(url) if url.username().is_empty()));
     assert_eq!(gate.credentials.as_ref().unwrap().user, "viewer");
 }

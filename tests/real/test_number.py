@@ -1,0 +1,186 @@
+"""The number of people on the page of `lookdown run`, with the README's command and beside other work.
+
+`NUMBER_ROWS` names rows of `CONDITIONS` (default: those of `CI_ROWS`), `NUMBER_SECONDS` is the time that is measured of each,
+and `NUMBER_SERIES` a file that gets the series. Rows with a slow search infer on another server, which waits before each answer.
+"""
+
+import contextlib
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import mean, pstdev
+
+from cpu_share import cpu_share
+from harness.places import LOOKDOWN, ROOT, model
+from harness.processes import Server, free_ports, running
+from waiting import wait_until
+
+from cameras import rtsp_camera
+
+HERE = Path(__file__).resolve().parent
+CAMERA = "hall"
+SECONDS = float(os.environ.get("NUMBER_SECONDS", "30"))
+SETTLING_SECONDS = 15.0
+"""The time after the first report in which profile and rate are chosen and tracks begin."""
+BUSY = [sys.executable, "-c", "while True: pass"]
+NETWORK = "nanodet_g_views_416"
+RUNS_OF_A_SEARCH = 10
+"""Runs of the network in a search with `fast`."""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What else the machine does, and how `lookdown run` is started."""
+
+    busy: int = 0
+    """Processes that compute without a pause."""
+    cores: float | None = None
+    """A limit on the CPU time of `lookdown run`."""
+    search_seconds: float = 0.0
+    """The time that the network of a search waits."""
+    flags: tuple[str, ...] = ()
+    cameras: int = 1
+
+
+CONDITIONS = {
+    "idle": Condition(),
+    "busy 1": Condition(busy=1),
+    "busy 2": Condition(busy=2),
+    "busy 4": Condition(busy=4),
+    "busy 8": Condition(busy=8),
+    "1 core": Condition(cores=1.0),
+    "half a core": Condition(cores=0.5),
+    "search .3 s": Condition(search_seconds=0.3),
+    "search 1.5 s": Condition(search_seconds=1.5),
+    "search 4 s": Condition(search_seconds=4.0),
+    "5/s fast, busy 2": Condition(busy=2, flags=("--every", "200ms", "--profile", "fast")),
+    "two cameras, busy 2": Condition(busy=2, cameras=2),
+}
+CI_ROWS = ("idle", "search 1.5 s")
+
+
+@contextlib.contextmanager
+def busy(count: int) -> Iterator[None]:
+    """Other processes that use the processor."""
+    processes = [subprocess.Popen(BUSY) for _ in range(count)]
+    try:
+        yield
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
+
+
+@contextlib.contextmanager
+def slow_network(search_seconds: float) -> Iterator[dict[str, str]]:
+    """A network on another server that waits, and the settings that use it."""
+    if not search_seconds:
+        yield {}
+        return
+    (port,) = free_ports(1)
+    python = ROOT / ".setup" / "real" / "v2_backend" / "bin" / "python"
+    wait = 2 * search_seconds / RUNS_OF_A_SEARCH
+    command = [str(python), str(HERE / "slow_network.py"), str(port), str(model(NETWORK)), str(wait)]
+    with running("slow_network", command, port, f"/v2/models/{NETWORK}/ready", {}) as server:
+        settings = {"INFERENCE__BACKEND": "v2", "INFERENCE__URL": f"http://{server.address}"}
+        settings |= {"INFERENCE__MODEL": NETWORK, "MODEL__PATH": str(model(NETWORK).parent)}
+        yield settings | {"INFERENCE__TIMEOUT_MILLIS": "60000"}
+
+
+@dataclass(frozen=True)
+class Series:
+    """The number on the page, once a second, and the true one."""
+
+    shown: list[int]
+    true: list[int]
+
+    def within_one(self) -> float:
+        """The share of seconds in which the number is right within one."""
+        return mean(abs(shown - true) <= 1 for shown, true in zip(self.shown, self.true, strict=True))
+
+    def __str__(self) -> str:
+        changes = sum(a != b for a, b in zip(self.shown, self.shown[1:]))
+        return (
+            f"{mean(self.shown):.1f} ± {pstdev(self.shown):.1f}, within one {self.within_one():.0%}, "
+            f"{60 * changes / len(self.shown):.0f} changes a minute"
+        )
+
+
+class Number(unittest.TestCase):
+    """The number on the page is right within one, whatever else the machine does."""
+
+    def setUp(self):
+        self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
+        self.frames = self.folder / "frames"
+        self.frames.mkdir()
+        images = ["-q:v", "2", "-start_number", "0", self.frames / "%d.jpg"]
+        subprocess.run(["ffmpeg", "-v", "error", "-i", HERE / "walks" / "walks.mp4", *images], check=True)
+
+    @contextlib.contextmanager
+    def lookdown_run(self, condition: Condition, url: str) -> Iterator[Server]:
+        """`lookdown run URL --name hall` under a condition."""
+        (port,) = free_ports(1)
+        folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
+        with contextlib.ExitStack() as stack:
+            settings = stack.enter_context(slow_network(condition.search_seconds))
+            settings |= {"CALIBRATIONS__PATH": str(folder / "calibrations"), "STATE__PATH": str(folder / "state")}
+            (folder / "calibrations").mkdir()
+            command = [LOOKDOWN, "run"]
+            store = ["--store", folder / "counts.sqlite", "--port", port]
+            if condition.cameras == 1:
+                command += [url, "--name", CAMERA, *condition.flags, *store]
+            else:
+                names = [CAMERA, *(f"other-{number}" for number in range(1, condition.cameras))]
+                file = folder / "lookdown.toml"
+                file.write_text("".join(f'[[cameras]]\nname = "{name}"\nurl = "{url}"\n' for name in names))
+                command += [file, *store]
+            if condition.cores:
+                command = [*stack.enter_context(cpu_share("number", condition.cores)), *command]
+            environment = {f"LOOKDOWN__{name}": value for name, value in settings.items()}
+            command = [str(word) for word in command]
+            server = stack.enter_context(running("number", command, port, "/readyz", environment))
+            stack.enter_context(busy(condition.busy))
+            yield server
+
+    def series(self, server: Server, seconds: float, true: int) -> Series:
+        """The number of the camera in each second."""
+
+        def row() -> dict | None:
+            return next((row for row in json.loads(server.get("/results")) if row["camera"] == CAMERA), None)
+
+        wait_until(row, "there is a report", 60)
+        time.sleep(SETTLING_SECONDS)
+        shown = []
+        began = time.monotonic()
+        while (passed := time.monotonic() - began) < seconds:
+            shown.append(row()["persons"])
+            time.sleep(max(0.0, len(shown) - passed))
+        return Series(shown, [true] * len(shown))
+
+    def test_number_is_right_beside_other_work(self):
+        rows = os.environ.get("NUMBER_ROWS")
+        seen = {}
+        print()
+        for name in rows.split(",") if rows else CI_ROWS:
+            condition = CONDITIONS[name]
+            with self.subTest(name), rtsp_camera(self.frames, 5) as port:
+                with self.lookdown_run(condition, f"rtsp://127.0.0.1:{port}/stream") as server:
+                    series = self.series(server, SECONDS, 6)
+                    (camera,) = (row for row in json.loads(server.get("/cameras")) if row["name"] == CAMERA)
+                print(f"  {name}: {series}; {camera.get('choice')}; {camera.get('warning')}", flush=True)
+                seen[name] = series.shown
+                self.assertGreaterEqual(series.within_one(), 0.9)
+        if path := os.environ.get("NUMBER_SERIES"):
+            Path(path).write_text(json.dumps(seen), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    unittest.main()
