@@ -34,17 +34,18 @@ class Walker:
         (begin, first), (end, last) = self.places[after - 1 : after + 1]
         return first + (last - first) * (seconds - begin) / (end - begin)
 
-    def mask(self, seconds: float) -> np.ndarray:
-        """The pixels that the walker may cover."""
-        offset = np.remainder(AZIMUTH - self.azimuth(seconds) + 180, 360) - 180
-        return (np.abs(offset) < self.half_width_deg) & (RADIUS > self.radii_px[0]) & (RADIUS < self.radii_px[1])
+    def distance(self, seconds: float) -> np.ndarray:
+        """How far each pixel is from the walker, 1 where it ends."""
+        offset = np.abs(np.remainder(AZIMUTH - self.azimuth(seconds) + 180, 360) - 180) / self.half_width_deg
+        inner, outer = self.radii_px
+        return np.maximum(offset, np.abs(2 * RADIUS - inner - outer) / (outer - inner))
 
     def is_there(self, seconds: float) -> bool:
         """True while the walker is in the clip that is made."""
         return self.there[0] <= seconds < self.there[1]
 
 
-ROWS, COLUMNS = np.mgrid[:SIDE, :SIDE] - CENTER
+ROWS, COLUMNS = np.mgrid[:SIDE, :SIDE].astype(np.float32) - CENTER
 RADIUS = np.hypot(ROWS, COLUMNS)
 AZIMUTH = np.degrees(np.arctan2(COLUMNS, -ROWS))
 WALKERS = (
@@ -63,9 +64,9 @@ WALKERS = (
         (12, 36),
     ),
     Walker(((0, 265), (2, 265), (16, 100), (18, 100), (32, 265), (36, 265)), (280, 455), 13, (18, 36)),
+    Walker(((0, 58), (36, 58)), (185, 350), 22, (18, 30)),
 )
-MANNEQUIN = Walker(((0, 58), (36, 58)), (185, 350), 22, (18, 30))
-"""It is a person, too: 0 to 6."""
+"""The last one is the mannequin."""
 FLOOR_TURN_DEG = 60
 """The floor this much further clockwise is empty."""
 SECONDS = 60
@@ -84,7 +85,7 @@ def empty_room(frames: np.ndarray) -> np.ndarray:
     turn = np.radians(FLOOR_TURN_DEG)
     rows = np.rint(CENTER + ROWS * np.cos(turn) + COLUMNS * np.sin(turn)).astype(int).clip(0, SIDE - 1)
     columns = np.rint(CENTER + COLUMNS * np.cos(turn) - ROWS * np.sin(turn)).astype(int).clip(0, SIDE - 1)
-    mask = MANNEQUIN.mask(0)
+    mask = WALKERS[-1].distance(0) < 1
     turned = room[rows, columns]
     room[mask] = turned[mask]
     return room
@@ -101,15 +102,14 @@ def main(video: str, folder: str) -> None:
     for number in range(SECONDS * RATE):
         seconds = number / RATE
         in_loop = seconds % LOOP_SECONDS
-        there = np.zeros((SIDE, SIDE), bool)
-        gone = np.zeros((SIDE, SIDE), bool)
-        for walker in (*WALKERS, MANNEQUIN):
-            covered = there if walker.is_there(seconds) else gone
-            covered |= walker.mask(in_loop)
+        distances = np.stack([walker.distance(in_loop) for walker in WALKERS])
+        is_gone = np.array([not walker.is_there(seconds) for walker in WALKERS])
+        # A pixel of several walkers belongs to the nearest one.
+        gone = is_gone[distances.argmin(axis=0)] & (distances.min(axis=0) < 1)
         frame = frames[number % (LOOP_SECONDS * RATE)].copy()
-        frame[gone & ~there] = room[gone & ~there]
+        frame[gone] = room[gone]
         encoder.stdin.write(frame.tobytes())
-        true.append(sum(walker.is_there(seconds) for walker in (*WALKERS, MANNEQUIN)))
+        true.append(sum(walker.is_there(seconds) for walker in WALKERS))
     encoder.stdin.close()
     if encoder.wait():
         sys.exit("ffmpeg failed")
