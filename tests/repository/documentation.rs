@@ -7,8 +7,6 @@ use std::{env, fs, path::Path};
 use lookdown::api::problem_table;
 use lookdown_lens::warning::warning_table;
 
-use crate::layering::module_table;
-
 /// A generated part of a file.
 struct Section {
     file: &'static str,
@@ -17,7 +15,7 @@ struct Section {
 }
 
 /// Every generated part.
-const SECTIONS: [Section; 3] = [
+const SECTIONS: [Section; 2] = [
     Section {
         file: "docs/http.md",
         name: "problems",
@@ -27,11 +25,6 @@ const SECTIONS: [Section; 3] = [
         file: "docs/http.md",
         name: "warnings",
         content: warning_table,
-    },
-    Section {
-        file: "docs/modules.md",
-        name: "modules",
-        content: module_table,
     },
 ];
 

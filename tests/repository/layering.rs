@@ -1,12 +1,10 @@
 //! Dependencies between modules are acyclic, and only few modules use external systems.
 
 mod file_circles;
-mod module_table;
+mod module_circles;
 pub(crate) mod source_scan;
 
 use std::{collections::BTreeSet, fs};
-
-pub use module_table::module_table;
 
 use source_scan::{CRATES, all_sources, code, names_crate, sources, without_test_files};
 
