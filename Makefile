@@ -44,7 +44,7 @@ check: ## check formatting and lints and run the unit tests; without network onc
 	cargo test --workspace --lib --locked
 
 test: ## set up, then check formatting, lints, tests and documentation; needs only this repository
-	@$(PYTHON) scripts/setup.py toolchain runtime model converters s3-server checkers
+	@$(PYTHON) scripts/setup.py toolchain runtime model converters checkers
 	cargo fmt --all --check
 	@# cargo fmt does not find modules that a macro declares.
 	rustfmt --check --edition 2024 crates/lookdown-lens/src/geometry/lens/models/*.rs

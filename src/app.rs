@@ -24,14 +24,13 @@ use lookdown_common::{InProcess, ServerClient, ServerOptions};
 use crate::{
     access::AccessKeys,
     api::{self, Access, ApiState, Companions, Readiness},
-    calibration_store::{BucketStore, CalibrationStore, Calibrations, FolderStore},
+    calibration_store::{Calibrations, FolderStore},
     cameras::Cameras,
     metrics::Metrics,
     mqtt::Publisher,
     results::{MemoryResults, RedisResults, ResultStore},
     settings::{
-        AccessSettings, CalibrationPlace, CountSettings, LimitSettings, ResultSettings, Settings,
-        find_calibrations,
+        AccessSettings, CountSettings, LimitSettings, ResultSettings, Settings, find_calibrations,
     },
     telemetry::Tracer,
     tls::Tls,
@@ -68,7 +67,7 @@ pub struct Assembly {
 /// # Errors
 /// One sentence that names the setting, for a file that is missing or cannot be used.
 pub fn assemble(settings: &Settings) -> anyhow::Result<Assembly> {
-    let (store, writable) = calibration_store(settings)?;
+    let (store, writable) = (calibration_store(settings)?, settings.calibrations.writable);
     let metrics = Arc::<Metrics>::default();
     let calibrations =
         Calibrations::open_within(store, writable, CALIBRATIONS_WAIT, Arc::clone(&metrics));
@@ -290,28 +289,16 @@ fn models_to_load(defaults: &DefaultModels, also: &[String]) -> Vec<String> {
 }
 
 pub(crate) fn open_calibrations(settings: &Settings) -> anyhow::Result<Calibrations> {
-    let (store, writable) = calibration_store(settings)?;
+    let (store, writable) = (calibration_store(settings)?, settings.calibrations.writable);
     Calibrations::open(store, writable, Arc::default()).context("calibrations.path")
 }
 
-/// The calibration store of the settings, and true if it may be changed.
-fn calibration_store(settings: &Settings) -> anyhow::Result<(Box<dyn CalibrationStore>, bool)> {
-    let settings = &settings.calibrations;
-    let store: Box<dyn CalibrationStore> = match &settings.path {
-        CalibrationPlace::Bucket(url) => {
-            // Variables that are not UTF-8 are not for this program.
-            let variables = std::env::vars_os();
-            let variables = variables.filter_map(|(name, value)| {
-                Some((name.into_string().ok()?, value.into_string().ok()?))
-            });
-            Box::new(BucketStore::new(url, variables).context("calibrations.path")?)
-        }
-        CalibrationPlace::Folder(folder) => Box::new(match find_calibrations(folder)? {
-            Some(folder) => FolderStore::new(&folder),
-            None => FolderStore::that_may_be_missing(folder),
-        }),
-    };
-    Ok((store, settings.writable))
+fn calibration_store(settings: &Settings) -> anyhow::Result<Box<FolderStore>> {
+    let folder = &settings.calibrations.path;
+    Ok(Box::new(match find_calibrations(folder)? {
+        Some(folder) => FolderStore::new(&folder),
+        None => FolderStore::that_may_be_missing(folder),
+    }))
 }
 
 /// Opens the result store of the settings. It connects to a Redis in the background.

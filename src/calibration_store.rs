@@ -7,7 +7,4 @@ pub use calibrations::{
     CalibrationEntry, CalibrationRow, Calibrations, CalibrationsHealth, ChangeError, Put, Reading,
     WriteCondition, defaults,
 };
-pub use store::{
-    BucketStore, CalibrationStore, FolderStore, ListedFile, MAX_FILES, READ_AT_ONCE, Replaces,
-    StoreError,
-};
+pub use store::{CalibrationStore, FolderStore, ListedFile, MAX_FILES, Replaces, StoreError};

@@ -37,7 +37,7 @@ use std::{path::Path, time::Duration};
 use lookdown_common::ServerEntry;
 
 pub use access::AccessSettings;
-pub use calibrations::{CalibrationPlace, CalibrationSettings};
+pub use calibrations::CalibrationSettings;
 pub use counts::CountSettings;
 pub use engine_errors::explain;
 pub use error::SettingsError;

@@ -237,7 +237,7 @@ fn log_start(settings: &Settings, scheme: &str, address: SocketAddr) {
         sessions = settings.threads.sessions,
         threads_per_session = settings.threads.per_session,
         remap_threads = settings.threads.remapping,
-        calibrations = %settings.calibrations.path,
+        calibrations = %settings.calibrations.path.display(),
         "listening on {scheme}://{address}, API page at {scheme}://{address}/docs"
     );
 }

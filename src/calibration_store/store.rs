@@ -1,11 +1,9 @@
-//! Stores of calibration files: one trait and its implementations.
+//! The store of calibration files: a trait, which tests implement, too, and the folder.
 
-mod bucket;
 mod folder;
 
 use std::fmt;
 
-pub use bucket::BucketStore;
 pub use folder::FolderStore;
 
 /// A place with calibration files in one level, each by its name. Calls block.
@@ -19,13 +17,11 @@ pub trait CalibrationStore: fmt::Debug + Send + Sync {
     /// [`StoreError`] when the store cannot be read, or has more than [`MAX_FILES`].
     fn list(&self) -> Result<Vec<ListedFile>, StoreError>;
 
-    /// The contents of files, each cut after `at_most` bytes, in the order of `names`: several at
-    /// once, since a store that is far away reads them side by side. At most [`READ_AT_ONCE`].
+    /// Returns the content of a file, cut after `at_most` bytes.
     ///
     /// # Errors
-    /// Per file: [`StoreError::Unreachable`] when the store does not answer, others when this file
-    /// cannot be read, for example because it has gone meanwhile.
-    fn read(&self, names: &[&str], at_most: usize) -> Vec<Result<Vec<u8>, StoreError>>;
+    /// [`StoreError`] when the file cannot be read, for example because it has gone meanwhile.
+    fn read(&self, name: &str, at_most: usize) -> Result<Vec<u8>, StoreError>;
 
     /// Creates or replaces a file atomically: a reader, also after a crash, sees
     /// the old file or the new one.
@@ -44,8 +40,6 @@ pub trait CalibrationStore: fmt::Debug + Send + Sync {
 
 /// The maximum number of files in a store.
 pub const MAX_FILES: usize = 50_000;
-/// Most files read at once: bounds the memory and the connections that reading takes.
-pub const READ_AT_ONCE: usize = 16;
 
 /// The content that a write may replace.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -75,7 +69,7 @@ pub enum StoreError {
     Failed {
         /// The store.
         place: String,
-        /// The error of the operating system or the service.
+        /// The error of the operating system.
         problem: String,
     },
     /// The place may be read only.
@@ -83,15 +77,7 @@ pub enum StoreError {
     ReadOnly {
         /// The store.
         place: String,
-        /// The error of the operating system or the service.
-        problem: String,
-    },
-    /// The place does not answer, for whatever file.
-    #[error("{place} cannot be reached: {problem}")]
-    Unreachable {
-        /// The store.
-        place: String,
-        /// The error of the operating system or the service.
+        /// The error of the operating system.
         problem: String,
     },
     /// Another writer has changed the file meanwhile.

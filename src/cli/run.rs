@@ -25,7 +25,7 @@ use crate::{
     api::{Companions, Readiness},
     cameras::Cameras,
     probe,
-    settings::{CAMERA_VARIABLE, CalibrationPlace, Settings, environment},
+    settings::{CAMERA_VARIABLE, Settings, environment},
 };
 
 /// The name of the key with which cameras and counts use the server of this process.
@@ -114,10 +114,8 @@ fn check(settings: &Settings) -> anyhow::Result<()> {
 /// Creates the folder of calibrations in an existing folder, such as a new volume: the page saves
 /// calibrations there. If it cannot be created, the start names the setting.
 fn create_calibrations(settings: &Settings) {
-    if let CalibrationPlace::Folder(folder) = &settings.calibrations.path
-        && folder.is_absolute()
-        && settings.calibrations.writable
-    {
+    let folder = &settings.calibrations.path;
+    if folder.is_absolute() && settings.calibrations.writable {
         let _ = fs::create_dir(folder);
     }
 }

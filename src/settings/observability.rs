@@ -16,8 +16,8 @@ settings! {
         format: LogFormat = LogFormat::Text
             => choice(&[("text", LogFormat::Text), ("json", LogFormat::Json)]);
         /// The events that are logged: a level, or levels per module. `ort` is ONNX Runtime, which
-        /// logs much. `object_store` logs each request to a bucket that is repeated.
-        filter: String = "info,ort=warn,object_store=warn".to_owned() => filter();
+        /// logs much.
+        filter: String = "info,ort=warn".to_owned() => filter();
     }
 }
 

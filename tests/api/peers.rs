@@ -1,12 +1,11 @@
-//! HTTP peers that misbehave: an inference server, a bucket and a trace collector whose responses
-//! never end, never come or are not HTTP. The bytes and the time of each are bounded.
+//! HTTP peers that misbehave: an inference server and a trace collector whose responses never end,
+//! never come or are not HTTP. The bytes and the time of each are bounded.
 
 use std::{
-    env, fs,
+    fs,
     io::{Read, Write},
     net::{SocketAddr, TcpListener, TcpStream},
     num::NonZeroUsize,
-    process::Command,
     sync::{
         Arc,
         atomic::{AtomicU64, Ordering},
@@ -16,7 +15,6 @@ use std::{
 };
 
 use lookdown::{
-    calibration_store::{BucketStore, CalibrationStore},
     settings::TraceSettings,
     telemetry::{IncomingTrace, Tracer},
 };
@@ -169,126 +167,30 @@ fn provisional() -> Evil {
     Evil {
         name: "endless provisional responses",
         start: String::new(),
-        // Up to 6 MB/s, which a client without optimization still reads. Both clients get more than
-        // the bound of memory.
+        // Up to 6 MB/s, which a client without optimization still reads.
         rest: hints.repeat(7).into_bytes(),
         pause: Duration::from_millis(10),
     }
 }
 
-/// Returns the memory that this process uses, in bytes.
-fn resident_bytes() -> u64 {
-    let pages = fs::read_to_string("/proc/self/statm").unwrap();
-    let pages = pages.split(' ').nth(1).unwrap();
-    pages.parse::<u64>().unwrap() * 4096
-}
-
 #[test]
 fn provisional_responses_end_at_the_timeout() {
-    // In a process of its own: the memory of other tests is not measured with it.
-    let mut alone = Command::new(env::current_exe().unwrap());
-    alone.args(["peers::provisional_responses_alone", "--exact", "--ignored"]);
-    let output = alone.output().unwrap();
-    let printed = String::from_utf8_lossy(&output.stdout);
-    assert!(output.status.success(), "{printed}");
-    assert!(printed.contains("1 passed"), "{printed}");
-}
-
-#[tokio::test(flavor = "multi_thread")]
-#[ignore = "run by the test before in a process of its own"]
-async fn provisional_responses_alone() {
-    let before = resident_bytes();
-    let server = |address: SocketAddr| {
-        let options = RemoteOptions {
-            url: format!("http://{address}").parse().unwrap(),
-            token: None,
-            model: "there".to_owned(),
-            called: "here".to_owned(),
-            timeout: Duration::from_secs(3),
-        };
-        RemoteServer::new(options, Arc::default()).unwrap()
-    };
     let began = Instant::now();
     let peer = EvilServer::start(provisional());
-    let address = peer.address;
-    let probes = spawn_blocking(move || {
-        let server = server(address);
-        (0..3).for_each(|_| {
-            server.check_health();
-        });
-        assert!(!server.is_available());
-    });
-    let list = spawn_blocking(move || {
-        let bucket = bucket_at(address).list().unwrap_err().to_string();
-        assert!(bucket.contains("no answer in time"), "{bucket}");
-    });
-    probes.await.unwrap();
-    list.await.unwrap();
-    // Three probes of 2 s, and a request of 5 s beside them.
-    assert!(began.elapsed() < Duration::from_secs(20));
-    assert!(resident_bytes() < before + (40 << 20));
-}
-
-fn bucket_at(address: SocketAddr) -> BucketStore {
-    let variables = [
-        ("AWS_ENDPOINT", format!("http://{address}")),
-        ("AWS_ALLOW_HTTP", "true".to_owned()),
-        ("AWS_ACCESS_KEY_ID", "me".to_owned()),
-        ("AWS_SECRET_ACCESS_KEY", "secret".to_owned()),
-    ];
-    let variables = variables.map(|(name, value)| (name.to_owned(), value));
-    BucketStore::new(&"s3://cameras".parse().unwrap(), variables.into_iter()).unwrap()
-}
-
-/// Answers a request for an object of 50 MB, or for a part of it.
-fn answer_huge_object(mut stream: TcpStream) {
-    let mut request = [0; 1 << 13];
-    let length = stream.read(&mut request).unwrap();
-    let request = String::from_utf8_lossy(&request[..length]).to_ascii_lowercase();
-    let head =
-        "ETag: \"1\"\r\nLast-Modified: Mon, 23 Nov 2026 09:00:00 GMT\r\nConnection: close\r\n";
-    let answer = if request.contains("range: bytes=0-1023\r\n") {
-        let part = "Content-Range: bytes 0-1023/50000000\r\nContent-Length: 1024\r\n\r\n";
-        let body = " ".repeat(1024);
-        format!("HTTP/1.1 206 Partial Content\r\n{head}{part}{body}")
-    } else {
-        format!("{HEAD}{head}Content-Length: 50000000\r\n\r\n")
+    let options = RemoteOptions {
+        url: format!("http://{}", peer.address).parse().unwrap(),
+        token: None,
+        model: "there".to_owned(),
+        called: "here".to_owned(),
+        timeout: Duration::from_secs(3),
     };
-    // The client does not wait for the rest.
-    let _ = stream.write_all(answer.as_bytes());
-}
-
-#[test]
-fn a_huge_object_of_a_bucket_is_read_up_to_the_limit() {
-    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    let address = listener.local_addr().unwrap();
-    named(move || {
-        for stream in listener.incoming().map_while(Result::ok) {
-            named(move || answer_huge_object(stream));
-        }
-    });
-    let contents = bucket_at(address).read(&["huge.json"], 1024);
-    assert_eq!(contents[0].as_ref().unwrap().len(), 1024);
-}
-
-#[test]
-fn responses_of_a_bucket_are_bounded() {
-    let tests = every_kind().into_iter().map(|evil| {
-        named(move || {
-            let name = evil.name;
-            let peer = EvilServer::start(evil);
-            let store = bucket_at(peer.address);
-            let began = Instant::now();
-            let error = store.list().unwrap_err().to_string();
-            assert!(!error.contains('\n'), "{name}: {error}");
-            // Two attempts of at most 5 s each.
-            assert!(began.elapsed() < Duration::from_secs(13), "{name}");
-            assert!(peer.sent() < 3 * ((16 << 20) + SOCKET_BYTES), "{name}");
-        })
-    });
-    for test in tests.collect::<Vec<_>>() {
-        test.join().unwrap();
+    let server = RemoteServer::new(options, Arc::default()).unwrap();
+    for _ in 0..3 {
+        server.check_health();
     }
+    assert!(!server.is_available());
+    // Three probes of 2 s.
+    assert!(began.elapsed() < Duration::from_secs(20));
 }
 
 #[tokio::test(flavor = "multi_thread")]

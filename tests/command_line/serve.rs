@@ -242,32 +242,6 @@ fn freed_memory_is_returned_unless_the_operator_decides() {
     }
 }
 
-#[test]
-fn a_silent_calibration_store_does_not_delay_livez() {
-    let bucket = TcpListener::bind("127.0.0.1:0").unwrap();
-    let endpoint = format!("http://{}", bucket.local_addr().unwrap());
-    let mut server = Server::listening(
-        "",
-        &[
-            NO_GRACE,
-            ("LOOKDOWN__CALIBRATIONS__PATH", "s3://cameras"),
-            ("AWS_ENDPOINT", &endpoint),
-            ("AWS_ALLOW_HTTP", "true"),
-            ("AWS_ACCESS_KEY_ID", "me"),
-            ("AWS_SECRET_ACCESS_KEY", "secret"),
-        ],
-    );
-    // The connection of the server waits in the backlog, so the store is still being read.
-    assert!(server.get("/livez", "").contains(" 200 "));
-    assert!(server.get("/readyz", "").contains(" 503 "));
-    drop(bucket);
-    server.becomes_ready();
-    let ready = server.get("/readyz", "");
-    assert!(ready.contains("store_problem"), "{ready}");
-    server.signal("TERM");
-    server.has_ended();
-}
-
 /// A running server.
 pub(super) struct Server {
     process: Child,

@@ -1,7 +1,6 @@
-//! Files that a server reads: settings, models and calibrations in buckets.
+//! Files that a server reads: settings and models.
 #![expect(clippy::unwrap_used, reason = "a panic fails the test")]
 
-mod buckets;
 mod models;
 mod settings;
 mod upgrade;

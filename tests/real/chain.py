@@ -1,12 +1,10 @@
-"""Replicas of Lookdown on separate hosts behind HAProxy, with a shared Redis and a shared bucket."""
+"""Replicas of Lookdown on separate hosts behind HAProxy, with a shared Redis and a shared folder of calibrations."""
 
 import contextlib
 import hashlib
 import socket
-import subprocess
 import tempfile
 import time
-import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -67,6 +65,7 @@ class Chain:
     ):
         self._machines, self._folder, self._settings, self._cores = machines, folder, settings, cores
         self._front = front
+        self._calibrations = folder / "calibrations"
         self._stacks: dict[str, contextlib.ExitStack] = {}
         self.replicas: dict[str, Server] = {}
         self.front: Server
@@ -80,18 +79,14 @@ class Chain:
         """Starts a replica and waits until it is ready. A previous one has ended or is stopped."""
         self.end(name)
         stack = self._stacks[name] = contextlib.ExitStack()
-        host, store = self._machines[name], self._machines["store"].address
+        host = self._machines[name]
         variables = {f"LOOKDOWN__{key}": value for key, value in self._settings.items()} | {
             "LOOKDOWN__SERVER__LISTEN": f"0.0.0.0:{PORT}",
             "LOOKDOWN__SHUTDOWN__GRACE_MILLIS": str(GRACE_MILLIS),
             "LOOKDOWN__ACCESS__KEYS": KEYS,
-            "LOOKDOWN__CALIBRATIONS__PATH": "s3://cameras/ceiling",
+            "LOOKDOWN__CALIBRATIONS__PATH": str(self._calibrations),
             "LOOKDOWN__CALIBRATIONS__POLL_SECONDS": "1",
             "LOOKDOWN__RESULTS__URL": self._redis.url,
-            "AWS_ENDPOINT": f"http://{store}:5000",
-            "AWS_ALLOW_HTTP": "true",
-            "AWS_ACCESS_KEY_ID": "lookdown",
-            "AWS_SECRET_ACCESS_KEY": "of-the-test",
         }
         inside = host.inside
         if self._cores:
@@ -139,10 +134,7 @@ class Chain:
         """Starts what the replicas need, and HAProxy in front of them."""
         store, front = self._machines["store"], self._machines["front"]
         self._redis = stack.enter_context(RedisServer(host=store.address, inside=store.inside))
-        moto = [str(ROOT / ".setup" / "venv" / "bin" / "moto_server"), "-H", store.address, "-p", "5000"]
-        stack.enter_context(_started([*store.inside, *moto], store, 5000))
-        bucket = urllib.request.Request(f"http://{store.address}:5000/cameras", method="PUT")
-        urllib.request.urlopen(bucket, timeout=30).close()
+        self._calibrations.mkdir()
         listing = self._front
         for number, name in enumerate(REPLICAS, 1):
             listing = listing.replace(f"lookdown-{number}:", f"{self._machines[name].address}:")
@@ -171,21 +163,3 @@ def chain(settings: dict[str, str], cores: float | None = None, front: str = LEA
         for name in REPLICAS:
             made.wait_until(name, "UP")
         yield made
-
-
-@contextlib.contextmanager
-def _started(command: list[str], host: Host, port: int) -> Iterator[None]:
-    """Starts a server that speaks another protocol, and waits until it accepts connections."""
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-
-    def listens() -> bool:
-        with contextlib.suppress(OSError), socket.create_connection((host.address, port), 1):
-            return True
-        return False
-
-    try:
-        wait_until(listens, f"{command[-1]} listens")
-        yield
-    finally:
-        process.kill()
-        process.wait()

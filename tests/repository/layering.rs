@@ -9,7 +9,7 @@ use std::{collections::BTreeSet, fs};
 use source_scan::{CRATES, all_sources, code, names_crate, sources, without_test_files};
 
 /// Crates for external systems, and the only crates and modules that may use them.
-const MAY_USE_CRATE: [(&str, &[&str]); 27] = [
+const MAY_USE_CRATE: [(&str, &[&str]); 26] = [
     ("ort", &["inference"]),
     ("image", &["imaging"]),
     (
@@ -72,11 +72,9 @@ const MAY_USE_CRATE: [(&str, &[&str]); 27] = [
             "webhooks",
         ],
     ),
-    ("object_store", &["calibration_store"]),
     (
         "rustls",
         &[
-            "calibration_store",
             "http_transport",
             "inference",
             "probe",

@@ -86,14 +86,13 @@ const CLOCK_READERS: [&str; 18] = [
 /// its peers. The others end every request at a timeout, until which endless provisional responses
 /// keep one core busy (`provisional_responses_end_at_the_timeout`). Each has the reason for its own
 /// client.
-const CLIENTS: [&str; 4] = [
+const CLIENTS: [&str; 3] = [
     " Client::builder()",
     " Client::new()",
     "legacy::Client::builder(",
-    "ReqwestConnector",
 ];
 /// The files that may make them.
-const CLIENT_MAKERS: [&str; 7] = [
+const CLIENT_MAKERS: [&str; 6] = [
     "crates/lookdown-common/src/http_transport.rs",
     // Follows redirections and uses the proxies of the system; ends after 30 s.
     "crates/lookdown-detect/src/inference/fetch/source.rs",
@@ -103,9 +102,6 @@ const CLIENT_MAKERS: [&str; 7] = [
     "crates/lookdown-watch/src/credentials.rs",
     // Asks this machine's own server, whose certificate is for other names; ends after 3 s.
     "src/probe.rs",
-    // The client of buckets, which has the proxies, authorities and addresses that the variables of
-    // the provider name; ends after 5 s.
-    "src/calibration_store/store/bucket/bounded.rs",
     // Uses the proxies of the system; ends after 5 s.
     "src/telemetry/collector.rs",
 ];

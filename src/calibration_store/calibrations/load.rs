@@ -94,11 +94,6 @@ impl LoadedFile {
         }
     }
 
-    /// Returns true unless the store did not give this version.
-    pub(super) fn has_been_read(&self) -> bool {
-        !self.named.file.stamp.is_empty()
-    }
-
     /// Returns true for a result that differs from `before`: a repeated read failure does not
     /// differ.
     pub(super) fn is_changed(&self, before: Option<&Self>) -> bool {

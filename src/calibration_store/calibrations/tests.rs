@@ -162,9 +162,9 @@ fn an_unreadable_file_is_retried_and_reported_once() {
             let (name, stamp) = ("lobby.json".to_owned(), "1".to_owned());
             Ok(vec![ListedFile { name, stamp }])
         }
-        fn read(&self, _: &[&str], _: usize) -> Vec<Result<Vec<u8>, StoreError>> {
+        fn read(&self, _: &str, _: usize) -> Result<Vec<u8>, StoreError> {
             let (place, problem) = (self.place(), "it is gone".to_owned());
-            vec![Err(StoreError::Failed { place, problem })]
+            Err(StoreError::Failed { place, problem })
         }
         fn write(&self, _: &str, _: &[u8], _: Replaces<'_>) -> Result<(), StoreError> {
             Ok(())
@@ -192,12 +192,12 @@ fn a_change_that_cannot_be_looked_at_is_not_said_to_have_failed() {
         fn list(&self) -> Result<Vec<ListedFile>, StoreError> {
             if self.0.load(Ordering::Relaxed) {
                 let (place, problem) = (self.place(), "it is silent".to_owned());
-                return Err(StoreError::Unreachable { place, problem });
+                return Err(StoreError::Failed { place, problem });
             }
             Ok(Vec::new())
         }
-        fn read(&self, _: &[&str], _: usize) -> Vec<Result<Vec<u8>, StoreError>> {
-            Vec::new()
+        fn read(&self, _: &str, _: usize) -> Result<Vec<u8>, StoreError> {
+            Ok(Vec::new())
         }
         fn write(&self, _: &str, _: &[u8], _: Replaces<'_>) -> Result<(), StoreError> {
             self.0.store(true, Ordering::Relaxed);

@@ -102,12 +102,9 @@ impl CalibrationStore for FolderStore {
         Ok(files)
     }
 
-    fn read(&self, names: &[&str], at_most: usize) -> Vec<Result<Vec<u8>, StoreError>> {
-        let read = |name: &&str| files::read_start(&self.path.join(name), at_most as u64);
-        let contents = names.iter().map(read);
-        contents
-            .map(|content| content.map_err(|error: io::Error| self.failed(&error)))
-            .collect()
+    fn read(&self, name: &str, at_most: usize) -> Result<Vec<u8>, StoreError> {
+        files::read_start(&self.path.join(name), at_most as u64)
+            .map_err(|error: io::Error| self.failed(&error))
     }
 
     fn write(&self, name: &str, content: &[u8], replaces: Replaces<'_>) -> Result<(), StoreError> {

@@ -127,6 +127,11 @@ pub(in crate::settings) fn path() -> Form<PathBuf> {
                 let remedy = "give a path, or leave the key out";
                 return Err(Refusal::Shown(remedy.to_owned()));
             }
+            if text.contains("://") {
+                // It may hold a password.
+                let remedy = "give a path on this machine, and mount other storage as a volume";
+                return Err(Refusal::Part("a URL".to_owned(), remedy.to_owned()));
+            }
             Ok(PathBuf::from(text))
         },
         |path| path.display().to_string(),

@@ -27,11 +27,6 @@ impl From<ChangeError> for Problem {
                 let detail = "calibrations cannot be changed: their store is read-only";
                 return Self::new(ProblemKind::Forbidden, detail);
             }
-            ChangeError::Store(StoreError::Unreachable { .. }) => {
-                tracing::warn!("a calibration was not changed: {error}");
-                let detail = "the calibration store does not respond: retry";
-                return Self::new(ProblemKind::CalibrationsUnreachable, detail);
-            }
             // A full disk, for example, is not a fault of the server.
             ChangeError::Store(StoreError::Failed { .. }) => {
                 tracing::error!("a calibration was not changed: {error}");

@@ -165,7 +165,7 @@ problems! {
     /// The calibration store does not respond.
     CalibrationsUnreachable = SERVICE_UNAVAILABLE "calibrations-unreachable" "Calibration store unavailable"
         retry_after_seconds 1
-        => "Retry after `Retry-After`; check the bucket or the folder, and its credentials.";
+        => "Retry after `Retry-After`; check the folder and its mount.";
     /// The inference server does not respond.
     InferenceUnavailable = SERVICE_UNAVAILABLE "inference-unavailable" "Inference server unavailable"
         retry_after_seconds 1

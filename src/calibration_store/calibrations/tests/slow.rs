@@ -137,10 +137,10 @@ fn a_store_that_fails_after_the_start_is_reported() {
         fn list(&self) -> Result<Vec<ListedFile>, StoreError> {
             let _ = self.0.lock().recv();
             let (place, problem) = (self.place(), "it is silent".to_owned());
-            Err(StoreError::Unreachable { place, problem })
+            Err(StoreError::Failed { place, problem })
         }
-        fn read(&self, _: &[&str], _: usize) -> Vec<Result<Vec<u8>, StoreError>> {
-            Vec::new()
+        fn read(&self, _: &str, _: usize) -> Result<Vec<u8>, StoreError> {
+            Ok(Vec::new())
         }
         fn write(&self, _: &str, _: &[u8], _: Replaces<'_>) -> Result<(), StoreError> {
             Ok(())
@@ -160,66 +160,4 @@ fn a_store_that_fails_after_the_start_is_reported() {
     }
     let problem = calibrations.health().store_problem.unwrap();
     assert!(problem.contains("it is silent"), "{problem}");
-}
-
-/// Files with the content of their stem, of which those named `slow…` are never answered.
-#[derive(Debug)]
-struct HalfSilent(Vec<String>);
-
-impl CalibrationStore for HalfSilent {
-    fn place(&self) -> String {
-        "half".to_owned()
-    }
-    fn list(&self) -> Result<Vec<ListedFile>, StoreError> {
-        let file = |stem: &String| ListedFile {
-            name: format!("{stem}.json"),
-            stamp: "1".to_owned(),
-        };
-        Ok(self.0.iter().map(file).collect())
-    }
-    fn read(&self, names: &[&str], _: usize) -> Vec<Result<Vec<u8>, StoreError>> {
-        let read = |name: &&str| {
-            if name.starts_with("slow") {
-                let (place, problem) = (self.place(), "no answer in time".to_owned());
-                return Err(StoreError::Unreachable { place, problem });
-            }
-            let stem = name.trim_end_matches(".json");
-            Ok(content(stem, 190.0).into_bytes())
-        };
-        names.iter().map(read).collect()
-    }
-    fn write(&self, _: &str, _: &[u8], _: Replaces<'_>) -> Result<(), StoreError> {
-        Ok(())
-    }
-    fn delete(&self, _: &str) -> Result<(), StoreError> {
-        Ok(())
-    }
-}
-
-#[test]
-fn files_that_are_not_answered_stop_no_others() {
-    let slow = (0..100).map(|number| format!("slow{number}"));
-    let names = slow.chain(["lobby".to_owned(), "zoo".to_owned()]);
-    let store = Box::new(HalfSilent(names.collect()));
-    let calibrations = Calibrations::open(store, true, Arc::default()).unwrap();
-    assert!(revision(&calibrations, "zoo").is_some());
-    let problem = calibrations.health().store_problem;
-    assert_eq!(
-        problem.as_deref(),
-        Some("half cannot be reached: no answer in time")
-    );
-    // Two batches of files that do not answer are read at each scan, the new ones first.
-    for _ in 0..3 {
-        calibrations.refresh();
-    }
-    let health = calibrations.health();
-    assert_eq!((health.serving, health.problems.len()), (2, 100));
-}
-
-#[test]
-fn a_scan_of_a_silent_store_ends_after_a_few_files() {
-    let names = (0..1000).map(|number| format!("slow{number}"));
-    let store = Box::new(HalfSilent(names.collect()));
-    let calibrations = Calibrations::open(store, true, Arc::default()).unwrap();
-    assert_eq!(calibrations.health().problems.len(), 32);
 }

@@ -9,7 +9,7 @@ fn names(store: &FolderStore) -> Vec<String> {
 }
 
 fn read(store: &FolderStore, name: &str, at_most: usize) -> Vec<u8> {
-    store.read(&[name], at_most).swap_remove(0).unwrap()
+    store.read(name, at_most).unwrap()
 }
 
 #[test]
