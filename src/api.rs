@@ -37,10 +37,7 @@ use self::{
         envelope::{self, Envelope},
         rate_limit::{self, RateLimiter},
     },
-    protocols::{
-        deepstack,
-        open_inference::{self, repository},
-    },
+    protocols::{deepstack, open_inference},
     routes::{
         counts, health,
         openapi::{self as document, DocumentSource},
@@ -83,14 +80,8 @@ fn client_routes() -> OpenApiRouter<ApiState> {
     OpenApiRouter::with_openapi(<openapi::Common as utoipa::OpenApi>::openapi())
         .merge(routes::of_clients())
         .routes(routes!(open_inference::describe::model))
-        .routes(routes!(open_inference::describe::model_version))
         .routes(routes!(open_inference::describe::model_ready))
-        .routes(routes!(open_inference::describe::model_version_ready))
         .routes(routes!(open_inference::infer::infer))
-        .routes(routes!(open_inference::infer::infer_version))
-        .routes(routes!(repository::index))
-        .routes(routes!(repository::load))
-        .routes(routes!(repository::unload))
 }
 
 /// The routes of the DeepStack API.

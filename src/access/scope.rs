@@ -19,9 +19,9 @@ use strum::{Display, EnumString, IntoStaticStr, VariantArray};
 pub enum Scope {
     /// Detect persons in frames.
     Detect,
-    /// Read calibrations, view plans and the list of models.
+    /// Read calibrations, view plans, results and counts.
     Read,
-    /// Everything, including changes of calibrations and models.
+    /// Everything, including changes of calibrations and cameras.
     Admin,
 }
 

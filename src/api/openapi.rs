@@ -32,7 +32,6 @@ pub(super) use parameters::{
         (name = "results", description = "Stored reports and images, for dashboards. In memory or in a shared Redis, within limits."),
         (name = "calibrations", description = "Calibrations of the cameras. Changes need the scope `admin`."),
         (name = "cameras", description = "Cameras of `lookdown run`. Changes need the scope `admin`."),
-        (name = "models", description = "Loaded models. Changes need the scope `admin`."),
         (name = "operation", description = "Health checks, metrics and documentation."),
     ),
     components(schemas(ProblemBody)),

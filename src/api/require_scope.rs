@@ -21,9 +21,7 @@ pub(super) struct RequireScope<S>(PhantomData<S>);
 pub(super) type RequireDetect = RequireScope<Detect>;
 /// Proof that the request may read calibrations and reports.
 pub(super) type RequireRead = RequireScope<Read>;
-/// Proof that the request may list models, which reveals file names of the server's machine.
-pub(super) type RequireModelRead = RequireScope<ModelRead>;
-/// Proof that the request may change the models and the calibrations of the server.
+/// Proof that the request may change the calibrations and the cameras of the server.
 pub(super) type RequireAdmin = RequireScope<Admin>;
 
 /// A required scope.
@@ -50,7 +48,6 @@ macro_rules! required_scopes {
 required_scopes! {
     Detect = Detect, false;
     Read = Read, false;
-    ModelRead = Read, true;
     Admin = Admin, true;
 }
 

@@ -48,11 +48,6 @@ pub(super) fn open(
     let options = RepositoryOptions {
         folder: ModelFolder { path, elsewhere },
         warm_up_views: settings.threads.batch_views,
-        kept: defaults
-            .names()
-            .into_iter()
-            .map(ToOwned::to_owned)
-            .collect(),
         explain,
     };
     let repository = match remote {

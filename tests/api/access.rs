@@ -19,18 +19,15 @@ pub(crate) const ADMINISTRATOR: &str = "lookdown_administrator";
 pub(crate) const BOTH: &str = "lookdown_both";
 
 /// All routes that need a scope.
-const GUARDED: [(&str, &str, &str); 26] = [
+const GUARDED: [(&str, &str, &str); 20] = [
     ("POST", "/detect?calibration=lobby&profile=fast", "detect"),
     ("POST", "/v1/vision/detection", "detect"),
     ("POST", "/v1/vision/custom/lobby", "detect"),
     ("POST", "/v1/vision/custom/list", "read"),
     ("GET", "/v1/vision/custom/list", "read"),
-    ("GET", "/v2/models/eager", "detect"),
-    ("GET", "/v2/models/eager/ready", "detect"),
-    ("GET", "/v2/models/eager/versions/1", "detect"),
-    ("GET", "/v2/models/eager/versions/1/ready", "detect"),
+    ("GET", "/v2/models/lookdown", "detect"),
+    ("GET", "/v2/models/lookdown/ready", "detect"),
     ("POST", "/v2/models/lookdown/infer", "detect"),
-    ("POST", "/v2/models/lookdown/versions/1/infer", "detect"),
     ("GET", "/calibrations", "read"),
     ("GET", "/calibrations/lobby", "read"),
     ("GET", "/calibrations/lobby/views", "read"),
@@ -40,12 +37,9 @@ const GUARDED: [(&str, &str, &str); 26] = [
     ("GET", "/results/lobby/history", "read"),
     ("GET", "/results/lobby/events", "read"),
     ("GET", "/events", "read"),
-    ("POST", "/v2/repository/index", "read"),
     ("PUT", "/calibrations/lobby", "admin"),
     ("DELETE", "/calibrations/missing", "admin"),
     ("DELETE", "/results/missing", "admin"),
-    ("POST", "/v2/repository/models/eager/load", "admin"),
-    ("POST", "/v2/repository/models/eager/unload", "admin"),
 ];
 
 /// A line of a file of keys.
@@ -231,9 +225,7 @@ async fn without_keys_remote_clients_may_detect_and_read_only() {
     });
     for (method, path, scope) in GUARDED {
         let answer = service.ask(method, path, &[]).await;
-        // The list of loadable models is only useful to clients that may load them.
-        let closed = scope == "admin" || path == "/v2/repository/index";
-        assert_eq!(answer.status == 403, closed, "{method} {path}");
+        assert_eq!(answer.status == 403, scope == "admin", "{method} {path}");
     }
 }
 

@@ -31,7 +31,6 @@ mod readiness;
 mod refusals;
 mod remote;
 mod report;
-mod repository;
 mod results;
 mod results_away;
 mod results_events;

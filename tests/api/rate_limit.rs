@@ -81,11 +81,6 @@ async fn every_client_route_counts_and_reports_the_limit() {
         service.put("/calibrations/lobby", "nonsense").await,
         service.get("/v2/models/lookdown/ready").await,
         service.post("/v2/models/lookdown/infer", "").await,
-        service.post("/v2/repository/index", "").await,
-        service.post("/v2/repository/models/missing/load", "").await,
-        service
-            .post("/v2/repository/models/missing/unload", "")
-            .await,
     ] {
         left -= 1;
         let reported = answer.header("ratelimit");

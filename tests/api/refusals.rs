@@ -206,7 +206,7 @@ async fn refusals_of_the_framework_are_problem_documents() {
     assert_eq!(wrong_method.header("allow"), "POST");
     let no_such_page = service.get("/docs/nothing.js").await;
     assert_refused(&no_such_page, 404, "not-found", "/docs/nothing.js");
-    let no_text = service.post("/v2/repository/models/%FF/load", "").await;
+    let no_text = service.get("/v2/models/%FF").await;
     assert_refused(&no_text, 400, "malformed-request", "");
 }
 

@@ -170,7 +170,6 @@ pub(crate) fn assembly(gate: &Arc<Gate>) -> (Assembly, TempDir) {
                 elsewhere: Some(("eager".to_owned(), "eager".into())),
             },
             warm_up_views: one_view,
-            kept: vec!["eager".to_owned()],
             explain,
         },
         Box::new(move |path| {

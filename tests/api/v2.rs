@@ -1,10 +1,9 @@
-//! The Open Inference Protocol: JSON and bytes, frames and views.
+//! The Open Inference Protocol: frames in JSON and as bytes.
 
 mod batch;
 mod describe;
 mod frames;
 mod refusals;
-mod views;
 
 use axum::{body::Body, http::Request};
 use serde_json::{Value, json};
@@ -12,7 +11,6 @@ use serde_json::{Value, json};
 use crate::service::{Answer, Service, frame};
 
 const FRAMES: &str = "/v2/models/lookdown/infer";
-const VIEWS: &str = "/v2/models/eager/infer";
 const FAST: [(&str, &str); 2] = [("calibration", "lobby"), ("profile", "fast")];
 const HEAD_LENGTH: &str = "inference-header-content-length";
 

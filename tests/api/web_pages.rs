@@ -4,14 +4,11 @@ use lookdown::api::Access;
 
 use crate::service::{Answer, Bounds, Service};
 
-const CHANGING: [(&str, &str); 7] = [
+const CHANGING: [(&str, &str); 4] = [
     ("POST", "/detect?calibration=lobby&profile=fast"),
     ("PUT", "/calibrations/lobby"),
     ("DELETE", "/calibrations/missing"),
     ("POST", "/v2/models/lookdown/infer"),
-    ("POST", "/v2/repository/index"),
-    ("POST", "/v2/repository/models/eager/load"),
-    ("POST", "/v2/repository/models/eager/unload"),
 ];
 
 fn open(own_machine_only: bool) -> Service {

@@ -1,11 +1,8 @@
-"""Inference on another server of the Open Inference Protocol: MLServer, and Lookdown itself."""
+"""Inference on another server of the Open Inference Protocol: MLServer."""
 
 import contextlib
-import hashlib
 import json
-import os
 import signal
-import subprocess
 import tempfile
 import time
 import unittest
@@ -96,27 +93,6 @@ class RemoteInference(unittest.TestCase):
             with mlserver(port):
                 when_ready_is(server, 200)
                 self.assertEqual(answer(server, FAST, FRAME)[0], 200)
-
-    def test_lookdown_can_be_the_inference_server_with_bytes(self) -> None:
-        with lookdown({"MODEL__PATH": str(model(MODEL).parent), "LIMITS__MAX_FRAMES_IN_FLIGHT": "64"}) as here:
-            with lookdown(asking(f"http://{here.address}")) as front:
-                for path in (FAST, BALANCED):
-                    assert_same(self, json.loads(front.post(path, FRAME)), json.loads(here.post(path, FRAME)))
-
-    def test_the_bearer_token_is_sent(self) -> None:
-        keys = f"front:detect:{hashlib.sha256(b's3cret').hexdigest()}"
-        with lookdown({"MODEL__PATH": str(model(MODEL).parent), "ACCESS__KEYS": keys}) as here:
-            there = asking(f"http://{here.address}")
-            with lookdown(there | {"INFERENCE__BEARER_TOKEN": "s3cret"}) as front:
-                self.assertGreater(len(json.loads(front.post(FAST, FRAME))["persons"]), 0)
-            (own,) = free_ports(1)
-            variables = there | {"SERVER__LISTEN": f"127.0.0.1:{own}", "INFERENCE__BEARER_TOKEN": "mist4ken"}
-            environment = {f"LOOKDOWN__{name}": value for name, value in variables.items()}
-            command = [str(ROOT / "target" / "release" / "lookdown"), "serve"]
-            refused = subprocess.run(command, env=os.environ | environment, capture_output=True, text=True, timeout=60)
-            self.assertNotEqual(refused.returncode, 0)
-            self.assertIn("401", refused.stderr)
-            self.assertNotIn("mist4ken", refused.stderr)
 
 
 if __name__ == "__main__":

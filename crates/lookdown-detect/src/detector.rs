@@ -95,7 +95,6 @@ impl Detector {
                     elsewhere: None,
                 },
                 warm_up_views: NonZeroUsize::MIN,
-                kept: Vec::new(),
                 explain: ToString::to_string,
             },
             onnx_loader(options.onnx_runtime.clone(), onnx, engine_options.sessions),

@@ -35,6 +35,6 @@ pub use precision::{Int8Use, PrecisionChoice, cpu_has_integer_dot_product};
 pub use registry::{ModelRegistry, RegistryFull};
 pub use remote::{BearerToken, InvalidToken, RemoteDetector, RemoteOptions, RemoteServer};
 pub use repository::{
-    ModelFolder, ModelLoader, ModelRepository, NotLoaded, RepositoryError, RepositoryOptions,
-    RepositoryRow, is_fetched, model_names,
+    ModelFolder, ModelLoader, ModelRepository, RepositoryError, RepositoryOptions, is_fetched,
+    model_names,
 };

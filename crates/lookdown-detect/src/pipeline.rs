@@ -36,7 +36,7 @@ pub use default_models::DefaultModels;
 pub use engine::{Engine, EngineOptions, Observation};
 pub use error::PipelineError;
 pub use in_flight::{Stall, StalledWork};
-pub use job::{ClientViewsJob, DetectJob, DetectedFrame, JobImage};
+pub use job::{DetectJob, DetectedFrame, JobImage};
 pub use network::BatchOptions;
 pub use planned_views::{PlannedView, PlannedViews};
 pub use report::{

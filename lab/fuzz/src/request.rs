@@ -114,7 +114,6 @@ fn router() -> Router {
                 elsewhere: Some((MODEL.to_owned(), MODEL.into())),
             },
             warm_up_views: one,
-            kept: vec![MODEL.to_owned()],
             explain: ToString::to_string,
         },
         Box::new(|_| Ok(Model::new(Box::new(Silent(NetworkInput::plain(16, 16)))))),

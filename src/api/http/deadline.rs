@@ -25,9 +25,8 @@ pub(in crate::api) struct SlowStore {
     requests: &'static str,
 }
 
-/// The stored calibrations and the models, whose changes use their files.
-pub(in crate::api) static CALIBRATIONS_AND_MODELS: SlowStore =
-    SlowStore::new("changes of calibrations and models");
+/// The stored calibrations, whose changes use their files.
+pub(in crate::api) static CALIBRATIONS: SlowStore = SlowStore::new("changes of calibrations");
 /// The folder of the cameras, which every request about cameras uses.
 pub(in crate::api) static CAMERAS: SlowStore = SlowStore::new("requests about cameras");
 
@@ -185,7 +184,7 @@ mod tests {
         let refused = deadline().using(&HANGING, || Ok::<_, Problem>(())).await;
         let refused = refused.unwrap_err();
         assert_eq!(refused.kind(), ProblemKind::Overloaded);
-        for store in [&CALIBRATIONS_AND_MODELS, &CAMERAS] {
+        for store in [&CALIBRATIONS, &CAMERAS] {
             let other = deadline().using(store, || Ok::<_, Problem>(1)).await;
             assert_eq!(other.ok(), Some(1));
         }

@@ -49,20 +49,6 @@ fn requests() -> Vec<Row> {
             deepstack(frame),
         ),
         ("post", "/v2/models/{name}/infer", JSON, infer_request()),
-        (
-            "post",
-            "/v2/models/{name}/versions/{version}/infer",
-            JSON,
-            infer_request(),
-        ),
-        ("post", "/v2/repository/index", JSON, json!({"ready": true})),
-        ("post", "/v2/repository/models/{name}/load", JSON, json!({})),
-        (
-            "post",
-            "/v2/repository/models/{name}/unload",
-            JSON,
-            json!({}),
-        ),
     ]
 }
 
@@ -88,18 +74,12 @@ fn responses() -> Vec<Row> {
             JSON,
             json!({
                 "name": "lookdown", "version": env!("CARGO_PKG_VERSION"),
-                "extensions": ["binary_tensor_data", "model_repository"], "follow": false
+                "extensions": ["binary_tensor_data"], "follow": false
             }),
         ),
         ("get", "/v2/health/live", JSON, json!({"live": true})),
         ("get", "/v2/health/ready", JSON, json!({"ready": true})),
         ("get", "/v2/models/{name}/ready", JSON, model_ready()),
-        (
-            "get",
-            "/v2/models/{name}/versions/{version}/ready",
-            JSON,
-            model_ready(),
-        ),
     ]
 }
 

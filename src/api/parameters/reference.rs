@@ -56,8 +56,7 @@ fn interfaces(spec: &ParameterSpec) -> String {
     let flag = format!("`--{}`", spec.name.replace('_', "-"));
     let interfaces = [
         (Interface::Http, "`/detect`"),
-        (Interface::FrameModel, "`/v2` frames"),
-        (Interface::Detector, "`/v2` detectors"),
+        (Interface::FrameModel, "`/v2`"),
         (Interface::CommandLine, flag.as_str()),
         (Interface::Defaults, "[defaults](configuration.md#detect)"),
     ];

@@ -2,20 +2,16 @@
 //! (the extension `binary_tensor_data`). Source: the repository `open-inference-protocol`, and the
 //! extensions as Triton Inference Server describes them.
 //!
-//! The model `lookdown` accepts frames and returns their persons. Each loaded detector accepts
-//! views and returns its detections.
+//! The only model, `lookdown`, accepts frames and returns their persons.
 
 mod answer;
 mod content_encoding;
 pub(in crate::api) mod describe;
-mod detector;
 mod document;
 pub(in crate::api) mod infer;
 mod infer_parameters;
 mod own_metadata;
 mod persons;
-pub(in crate::api) mod repository;
 mod request;
-mod requested_model;
 mod tensor;
 mod wanted;

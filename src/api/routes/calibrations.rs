@@ -28,7 +28,7 @@ use crate::{
     api::{
         ApiState,
         http::{
-            deadline::{CALIBRATIONS_AND_MODELS, Deadline},
+            deadline::{CALIBRATIONS, Deadline},
             entity_tags::{entity_tag, is_unmodified},
             problem::{Problem, ProblemKind},
         },
@@ -129,7 +129,7 @@ pub(in crate::api) async fn put(
 ) -> Result<Response, Problem> {
     let condition = write_condition(&headers)?;
     let location = format!("/calibrations/{id}");
-    let put = deadline.using(&CALIBRATIONS_AND_MODELS, move || {
+    let put = deadline.using(&CALIBRATIONS, move || {
         let CalibrationUpload { content, reading } = upload;
         state.calibrations.put(&id, &content, &reading, &condition)
     });
@@ -164,7 +164,7 @@ pub(in crate::api) async fn delete(
     headers: HeaderMap,
 ) -> Result<StatusCode, Problem> {
     let condition = write_condition(&headers)?;
-    let delete = deadline.using(&CALIBRATIONS_AND_MODELS, move || {
+    let delete = deadline.using(&CALIBRATIONS, move || {
         state.calibrations.delete(&id, &condition)
     });
     delete.await?;

@@ -1,4 +1,4 @@
-//! Metadata and health checks of the server and its models, and their access rules.
+//! Metadata and health checks of the server and its model, and their access rules.
 
 use axum::http::StatusCode;
 use lookdown::api::Access;
@@ -8,15 +8,12 @@ use super::{FRAMES, assert_refused, fast, in_json};
 use crate::service::{Bounds, Service};
 
 #[tokio::test]
-async fn the_server_and_its_models_describe_themselves() {
+async fn the_server_and_its_model_describe_themselves() {
     let service = Service::start();
     let server = service.get("/v2").await.json();
     assert_eq!(service.get("/v2/").await.json(), server);
     assert_eq!(server["name"], "lookdown");
-    assert_eq!(
-        server["extensions"],
-        json!(["binary_tensor_data", "model_repository"])
-    );
+    assert_eq!(server["extensions"], json!(["binary_tensor_data"]));
     assert_eq!(server["follow"], false);
     assert_eq!(
         service.get("/v2/health/live").await.json(),
@@ -49,44 +46,22 @@ async fn the_server_and_its_models_describe_themselves() {
         ]
     );
 
-    let detector = service.get("/v2/models/eager/versions/1").await.json();
-    let views = json!([{ "name": "views", "datatype": "FP32", "shape": [-1, 3, 64, 64] }]);
+    let ready = service.get("/v2/models/lookdown/ready").await;
     assert_eq!(
-        (&detector["name"], &detector["inputs"]),
-        (&json!("eager"), &views)
+        (ready.status, &ready.json()["ready"]),
+        (StatusCode::OK, &json!(true))
     );
-    for model in [
-        "lookdown",
-        "eager",
-        "lookdown/versions/1",
-        "eager/versions/1",
-    ] {
-        let ready = service.get(&format!("/v2/models/{model}/ready")).await;
-        assert_eq!(
-            (ready.status, &ready.json()["ready"]),
-            (StatusCode::OK, &json!(true))
-        );
-    }
-    for path in [
-        "missing",
-        "missing/ready",
-        "eager/versions/2",
-        "lookdown/versions/2/ready",
-    ] {
+    for path in ["eager", "eager/ready"] {
         let answer = service.get(&format!("/v2/models/{path}")).await;
-        assert_refused(&answer, 404, "unknown-model", "model: ");
+        assert_refused(&answer, 404, "unknown-model", "use lookdown");
     }
 }
 
 #[tokio::test]
-async fn a_stopping_server_and_its_models_are_not_ready() {
+async fn a_stopping_server_and_its_model_are_not_ready() {
     let service = Service::start();
     service.readiness.stopping();
-    for path in [
-        "/v2/health/ready",
-        "/v2/models/lookdown/ready",
-        "/v2/models/eager/versions/1/ready",
-    ] {
+    for path in ["/v2/health/ready", "/v2/models/lookdown/ready"] {
         let answer = service.get(path).await;
         assert_refused(&answer, 503, "shutting-down", "shutting down");
         assert_eq!(answer.header("retry-after"), "1");
@@ -95,14 +70,14 @@ async fn a_stopping_server_and_its_models_are_not_ready() {
 }
 
 #[tokio::test]
-async fn without_keys_every_client_may_use_the_models() {
+async fn without_keys_every_client_may_use_the_model() {
     let service = Service::within(&Bounds {
         access: Access::Open {
             own_machine_only: false,
         },
         ..Bounds::default()
     });
-    assert_eq!(service.get("/v2/models/eager").await.status, 200);
+    assert_eq!(service.get("/v2/models/lookdown").await.status, 200);
     assert_eq!(
         service
             .post(FRAMES, &in_json(&fast()).to_string())

@@ -2,9 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::{
-    FRAMES, HEAD_LENGTH, VIEWS, assert_refused, fast, floats, in_bytes, in_json, output, send,
-};
+use super::{FRAMES, HEAD_LENGTH, assert_refused, fast, floats, in_bytes, in_json, output, send};
 use crate::service::{Service, frame};
 
 #[tokio::test]
@@ -208,11 +206,6 @@ async fn a_request_has_its_own_deadline_in_microseconds() {
         .post(FRAMES, &in_json(&parameters).to_string())
         .await;
     assert_refused(&answer, 504, "timeout", "within 0.04 s");
-    let views = json!({ "name": "views", "datatype": "UINT8", "shape": [1, 3, 64, 64],
-        "parameters": { "binary_data_size": 12288 } });
-    let head = json!({ "inputs": [views], "parameters": { "timeout": 40_000 } });
-    let answer = send(&service, VIEWS, &head, &[0; 12288]).await;
-    assert_refused(&answer, 504, "timeout", "timeout_millis");
     service.gate.open();
     service.still_works().await;
 }

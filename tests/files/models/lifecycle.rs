@@ -1,4 +1,4 @@
-//! Loading, reloading and unloading of models, and the state after failures.
+//! Loading and reloading of models, and the state after failures.
 
 use std::{
     fs,
@@ -12,9 +12,7 @@ use std::{
 
 use lookdown::settings::explain;
 use lookdown_detect::{
-    inference::{
-        InferenceError, ModelFolder, ModelRepository, NotLoaded, RepositoryError, RepositoryOptions,
-    },
+    inference::{InferenceError, ModelFolder, ModelRepository, RepositoryError, RepositoryOptions},
     metrics::DetectMetrics,
 };
 use lookdown_lens::revision::sha256_of;
@@ -24,7 +22,7 @@ use crate::models::folder::{fixture, model_of_two_sessions, write};
 
 const OTHER_ORDER: &str = "[input]\nchannel_order = \"bgr\"";
 
-/// Options for the models in a folder. `a` must stay loaded.
+/// Options for the models in a folder.
 fn options_of(folder: &TempDir) -> RepositoryOptions {
     RepositoryOptions {
         folder: ModelFolder {
@@ -32,7 +30,6 @@ fn options_of(folder: &TempDir) -> RepositoryOptions {
             elsewhere: None,
         },
         warm_up_views: NonZeroUsize::new(3).unwrap(),
-        kept: vec!["a".to_owned()],
         explain,
     }
 }
@@ -44,7 +41,7 @@ struct Models {
 }
 
 impl Models {
-    /// A repository with the models `a` and `b`. `a` must stay loaded.
+    /// A repository with the models `a` and `b`.
     fn new() -> Self {
         let folder = TempDir::new().unwrap();
         for name in ["a", "b"] {
@@ -68,54 +65,12 @@ impl Models {
         model.map(|model| model.revision().to_owned())
     }
 
-    /// The reason why a model is not loaded, or why its last load failed.
-    fn reason(&self, name: &str) -> Option<NotLoaded> {
-        let rows = self.repository.rows();
-        let row = rows.into_iter().find(|row| row.name == name);
-        row.unwrap().reason
-    }
-
-    /// The error of the last load of a model.
-    fn failure(&self, name: &str) -> String {
-        match self.reason(name) {
-            Some(NotLoaded::Failed(error)) => error,
-            other => panic!("{other:?}"),
-        }
-    }
-
     fn counts(&self) -> (u64, u64) {
         let loads = &self.metrics.model_loads;
         let [succeeded, failed] =
             ["success", "failure"].map(|result| loads.with_label_values(&[result]).get());
         (succeeded, failed)
     }
-}
-
-#[test]
-fn models_are_loaded_listed_and_unloaded_by_name() {
-    let models = Models::new();
-    let states = || {
-        let rows = models.repository.rows();
-        let states = rows
-            .iter()
-            .map(|row| (row.name.clone(), row.revision.is_some()));
-        states.collect::<Vec<_>>()
-    };
-    let state = |name: &str, loaded| (name.to_owned(), loaded);
-    assert_eq!(states(), [state("a", false), state("b", false)]);
-    models.repository.load("a").unwrap();
-    models.repository.load("b").unwrap();
-    assert_eq!(states(), [state("a", true), state("b", true)]);
-    models.repository.unload("b").unwrap();
-    assert_eq!(states(), [state("a", true), state("b", false)]);
-    let again = models.repository.unload("b").unwrap_err();
-    assert!(
-        matches!(again, RepositoryError::NotLoaded { .. }),
-        "{again}"
-    );
-    let kept = models.repository.unload("a").unwrap_err();
-    assert!(matches!(kept, RepositoryError::Kept { .. }), "{kept}");
-    assert_eq!(models.counts(), (2, 0));
 }
 
 #[test]
@@ -172,7 +127,6 @@ fn a_model_that_fails_its_check_does_not_replace_the_old_one() {
         let error = models.repository.load("a").err().unwrap().to_string();
         assert!(error.contains(reason), "{error}");
         assert_eq!(models.revision("a"), before);
-        assert_eq!(models.failure("a"), error);
         // A refused model is not loaded again until its files change.
         models.repository.reload_changed();
         models.repository.reload_changed();
@@ -182,7 +136,6 @@ fn a_model_that_fails_its_check_does_not_replace_the_old_one() {
         models.repository.reload_changed();
         models.repository.reload_changed();
         assert_ne!(models.revision("a"), before);
-        assert_eq!(models.reason("a"), None);
     }
 }
 
@@ -200,11 +153,10 @@ fn a_file_with_another_sum_is_refused_at_load_and_reload() {
     models.repository.reload_changed();
     models.repository.reload_changed();
     assert_eq!(models.revision("a"), before);
-    let reason = models.failure("a");
-    assert!(reason.contains("its SHA-256 is"), "{reason}");
-    assert!(!reason.contains('\n'), "{reason}");
+    assert_eq!(models.counts(), (1, 1));
     let error = models.repository.load("a").err().unwrap().to_string();
     assert!(error.contains("its SHA-256 is"), "{error}");
+    assert!(!error.contains('\n'), "{error}");
 }
 
 #[test]
@@ -227,11 +179,10 @@ fn an_invalid_manifest_is_reported_once_and_changes_nothing() {
         models.repository.reload_changed();
     }
     assert_eq!(models.counts(), (1, 1));
-    assert!(models.failure("a").contains("line 1"));
 }
 
 #[test]
-fn nothing_is_unloaded_while_a_model_is_being_loaded() {
+fn one_model_is_loaded_at_a_time() {
     let Models { folder, .. } = Models::new();
     let steps = Arc::new(Barrier::new(2));
     let steps_of_load = Arc::clone(&steps);
@@ -247,14 +198,13 @@ fn nothing_is_unloaded_while_a_model_is_being_loaded() {
     thread::scope(|scope| {
         let loading = scope.spawn(|| repository.load("b"));
         steps.wait();
-        let refused = repository.unload("b").unwrap_err();
+        let refused = repository.load("a").err().unwrap();
         assert!(matches!(refused, RepositoryError::Busy), "{refused}");
         assert!(repository.is_loading());
         steps.wait();
         loading.join().unwrap().unwrap();
     });
     assert!(!repository.is_loading());
-    repository.unload("b").unwrap();
 }
 
 #[test]
@@ -291,7 +241,6 @@ fn changed_files_are_retried_after_a_server_outage() {
 fn a_missing_model_file_is_reported_with_the_fetch_command() {
     let models = Models::new();
     fs::remove_file(models.folder.path().join("b/model.onnx")).unwrap();
-    assert_eq!(models.reason("b"), Some(NotLoaded::NoFile));
     let error = models.repository.load("b").err().unwrap().to_string();
     assert!(error.contains("make models"), "{error}");
 }

@@ -31,6 +31,7 @@ use lookdown_detect::{
 };
 use serde_json::Value;
 use tempfile::TempDir;
+use tokio::task::spawn_blocking;
 use tower::ServiceExt;
 
 use crate::models::folder::{model_of_two_sessions, of_repository, write};
@@ -38,8 +39,8 @@ use crate::models::folder::{model_of_two_sessions, of_repository, write};
 const CLIENTS: usize = 3;
 const SWAPS: usize = 6;
 
-/// A service whose only model is called `person`.
-fn service(folder: &Path) -> Router {
+/// A service whose only model is called `person`, and its models.
+fn service(folder: &Path) -> (Router, Arc<ModelRepository>) {
     let two = NonZeroUsize::new(2).unwrap();
     let metrics = Arc::<Metrics>::default();
     let models = ModelRepository::new(
@@ -49,7 +50,6 @@ fn service(folder: &Path) -> Router {
                 elsewhere: None,
             },
             warm_up_views: two,
-            kept: vec!["person".to_owned()],
             explain,
         },
         Box::new(model_of_two_sessions),
@@ -80,9 +80,10 @@ fn service(folder: &Path) -> Router {
     let store = FolderStore::that_may_be_missing(&folder.join("calibrations"));
     let calibrations = Calibrations::open(Box::new(store), false, Arc::clone(&metrics)).unwrap();
     let workers = Arc::new(workers.unwrap());
-    api::router(ApiState::new(
+    let models = Arc::new(models);
+    let router = api::router(ApiState::new(
         workers,
-        Arc::new(models),
+        Arc::clone(&models),
         Arc::new(calibrations),
         Arc::new(MemoryResults::new(
             ResultLimits::default(),
@@ -91,7 +92,8 @@ fn service(folder: &Path) -> Router {
         metrics,
         readiness,
         options,
-    ))
+    ));
+    (router, models)
 }
 
 async fn post(router: &Router, path: &str, body: Vec<u8>) -> (StatusCode, Value) {
@@ -110,7 +112,7 @@ async fn a_model_is_swapped_under_load_without_a_failed_request() {
     let weights = ["ssdlite_mobilenet_v2", "nanodet_g_416"]
         .map(|name| of_repository(&format!("models/{name}/model.onnx")));
     write(&person, "person", "", &weights[0]);
-    let router = service(folder.path());
+    let (router, models) = service(folder.path());
     let frame = fs::read(of_repository("samples/office.jpg")).unwrap();
 
     let done = Arc::new(AtomicBool::new(false));
@@ -133,14 +135,16 @@ async fn a_model_is_swapped_under_load_without_a_failed_request() {
     let mut revisions = BTreeSet::new();
     for swap in 1..=SWAPS {
         write(&person, "person", "", &weights[swap % 2]);
-        let path = "/v2/repository/models/person/load";
-        let (status, loaded) = post(&router, path, Vec::new()).await;
-        assert_eq!(
-            (status, &loaded["state"]),
-            (StatusCode::OK, &"READY".into()),
-            "{loaded}"
-        );
-        let revision = loaded["version"].as_str().unwrap().to_owned();
+        let reloading = Arc::clone(&models);
+        // The files must be unchanged between two checks.
+        let reload = move || (0..2).for_each(|_| reloading.reload_changed());
+        spawn_blocking(reload).await.unwrap();
+        let revision = models
+            .registry()
+            .get("person")
+            .unwrap()
+            .revision()
+            .to_owned();
         // A frame that starts now uses the new model.
         let (_, report) = post(&router, "/detect?profile=fast", frame.clone()).await;
         assert_eq!(report["model"]["revision"], revision.as_str());

@@ -10,7 +10,6 @@ from tritonclient.http import InferenceServerClient, InferInput, InferRequestedO
 from tritonclient.utils import InferenceServerException
 
 MODEL = "lookdown"
-DETECTOR = "nanodet_g_views_416_int8"
 OUTPUTS = ("boxes", "scores", "oriented_boxes", "views", "counts", "report")
 FAST = {"calibration": "office", "profile": "fast"}
 
@@ -23,12 +22,10 @@ def main(address: str, frame: bytes) -> dict:
             client.is_server_live(),
             client.is_server_ready(),
             client.is_model_ready(MODEL),
-            client.is_model_ready(MODEL, "1"),
             client.is_model_ready("unknown"),
         ],
         "server": client.get_server_metadata(),
         "model": client.get_model_metadata(MODEL),
-        "index": client.get_model_repository_index(),
         "found": {
             f"{'bytes' if sent else 'JSON'} to {'bytes' if answered else 'JSON'}": found(client, frame, sent, answered)
             for sent in (True, False)
@@ -36,7 +33,6 @@ def main(address: str, frame: bytes) -> dict:
         }
         | {"gzip": found(client, frame, True, True, request_compression_algorithm="gzip")},
         "batch": {way: batch(client, frame, way) for way in ("gzip", "deflate", None)},
-        "views": {datatype: views(client, datatype) for datatype in ("UINT8", "FP32")},
         "asynchronous": asynchronous(client, frame),
         "refused": refused(client, frame),
     }
@@ -77,15 +73,6 @@ def found(client: InferenceServerClient, frame: bytes, sent: bool, answered: boo
     told["report"] = report.decode() if isinstance(report, bytes) else report
     answer = result.get_response()
     return told | {"model": answer["model_name"], "id": answer["id"]}
-
-
-def views(client: InferenceServerClient, datatype: str) -> list:
-    """The shapes of the outputs for two gray views."""
-    shape = client.get_model_metadata(DETECTOR)["inputs"][0]["shape"]
-    grey = np.full([2, *shape[1:]], 128, dtype=np.uint8 if datatype == "UINT8" else np.float32)
-    tensor = InferInput("views", list(grey.shape), datatype).set_data_from_numpy(grey)
-    result = client.infer(DETECTOR, [tensor])
-    return [list(result.as_numpy(name).shape) for name in ("boxes", "scores")]
 
 
 def asynchronous(client: InferenceServerClient, frame: bytes) -> list[int]:

@@ -45,12 +45,6 @@ impl ModelRegistry {
         }
         Ok(models.insert(model.name().to_owned(), model))
     }
-
-    /// Removes a model. Frames in progress finish with it.
-    pub fn remove(&self, name: &str) -> Option<Arc<Model>> {
-        let mut models = self.0.write();
-        models.remove(name)
-    }
 }
 
 #[cfg(test)]
@@ -106,8 +100,6 @@ mod tests {
         }
         assert!(matches!(registry.put(blind("more")), Err(RegistryFull)));
         assert!(registry.put(blind("0")).unwrap().is_some());
-        assert!(registry.remove("0").is_some());
-        registry.put(blind("more")).unwrap();
         assert_eq!(registry.all().len(), MAX_MODELS);
     }
 }

@@ -1,5 +1,5 @@
-//! The model repository: models in a folder that are loaded and unloaded on request, and reloaded
-//! when their files change.
+//! The model repository: models in a folder that are loaded by name, and reloaded when their files
+//! change.
 //!
 //! A model is put into service only after it was loaded, checked and run once. If that fails, the
 //! previous model stays in service.
@@ -30,8 +30,6 @@ pub struct RepositoryOptions {
     pub folder: ModelFolder,
     /// Number of blank views in the warm-up of a model.
     pub warm_up_views: NonZeroUsize,
-    /// Models used by requests that do not name one. They cannot be unloaded.
-    pub kept: Vec<String>,
     /// Describes the error of a load to the users of the program: the text of the error, and what
     /// the engine does not know, such as the setting to change.
     pub explain: fn(&InferenceError) -> String,
@@ -51,34 +49,10 @@ pub struct ModelRepository {
 /// State of models in addition to the loaded ones.
 #[derive(Default)]
 struct Memory {
-    /// Error of the last load of each model.
-    failures: BTreeMap<String, String>,
     /// State of changed files at the last check.
     changed: BTreeMap<String, Stamp>,
     /// State of files that failed to load and are not tried again.
     refused: BTreeMap<String, Stamp>,
-}
-
-/// One model of the repository.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct RepositoryRow {
-    /// Name of the model.
-    pub name: String,
-    /// Revision in service, if any.
-    pub revision: Option<String>,
-    /// Reason why it is not loaded, or error of its last load.
-    pub reason: Option<NotLoaded>,
-}
-
-/// The reason why a model is not loaded, or why its last load failed.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum NotLoaded {
-    /// It was not asked for.
-    NotRequested,
-    /// Its ONNX file is missing.
-    NoFile,
-    /// The error of its last load.
-    Failed(String),
 }
 
 impl ModelRepository {
@@ -140,55 +114,10 @@ impl ModelRepository {
         self.replace(&mut memory, name, &path)
     }
 
-    /// Returns true while a model is being loaded, checked or unloaded.
+    /// Returns true while a model is being loaded or checked.
     #[must_use]
     pub fn is_loading(&self) -> bool {
         self.try_lock().is_err()
-    }
-
-    /// Unloads a model. Frames in progress finish with it.
-    ///
-    /// # Errors
-    /// [`RepositoryError`] when it is not loaded, must be kept, or a model is being loaded, which
-    /// may be this one.
-    pub fn unload(&self, name: &str) -> Result<(), RepositoryError> {
-        if self.options.kept.iter().any(|kept| kept == name) {
-            return Err(RepositoryError::Kept {
-                name: name.to_owned(),
-            });
-        }
-        let _no_load = self.try_lock()?;
-        let removed = self.registry.remove(name);
-        let removed = removed.ok_or_else(|| RepositoryError::NotLoaded {
-            name: name.to_owned(),
-        })?;
-        let row = [removed.name(), removed.revision()];
-        // It was added when the model was put into service.
-        let _ = self.metrics.model_info.remove_label_values(&row);
-        tracing::info!(model = name, revision = removed.revision(), "unloaded");
-        Ok(())
-    }
-
-    /// Returns every model that is loaded or in the folder, sorted by name.
-    #[must_use]
-    pub fn rows(&self) -> Vec<RepositoryRow> {
-        let mut rows: BTreeMap<String, RepositoryRow> = BTreeMap::new();
-        let failures = self.lock().failures.clone();
-        let failure = |name: &str| failures.get(name).cloned().map(NotLoaded::Failed);
-        let row = |name: &str, revision, reason: Option<NotLoaded>| RepositoryRow {
-            name: name.to_owned(),
-            revision,
-            reason: failure(name).or(reason),
-        };
-        for name in self.options.folder.names() {
-            let reason = self.options.folder.why_not_loaded(&name);
-            rows.insert(name.clone(), row(&name, None, Some(reason)));
-        }
-        for model in self.registry.all() {
-            let revision = Some(model.revision().to_owned());
-            rows.insert(model.name().to_owned(), row(model.name(), revision, None));
-        }
-        rows.into_values().collect()
     }
 
     /// Reloads the models whose files have changed. Files must be unchanged between two checks, so
@@ -209,7 +138,7 @@ impl ModelRepository {
                 memory.changed.remove(name);
             } else if memory.changed.get(name) == Some(&found) {
                 memory.changed.remove(name);
-                // The error is already logged, and the rows report it.
+                // The error is already logged.
                 let _ = self.replace(&mut memory, name, &files.path);
             } else {
                 memory.changed.insert(name.to_owned(), found);
@@ -234,7 +163,6 @@ impl ModelRepository {
         match outcome {
             Ok((model, replaced)) => {
                 self.count_load("success");
-                memory.failures.remove(name);
                 memory.refused.remove(name);
                 let replaced = replaced.as_ref().map(|replaced| replaced.revision());
                 let before = replaced.map(|revision| [name, revision]);
@@ -253,7 +181,6 @@ impl ModelRepository {
             }
             Err(error) => {
                 self.count_load("failure");
-                memory.failures.insert(name.to_owned(), error.to_string());
                 if error.is_of_model() {
                     memory.refused.insert(name.to_owned(), stamp);
                 }

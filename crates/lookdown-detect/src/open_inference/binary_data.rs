@@ -5,8 +5,6 @@ use std::num::TryFromIntError;
 
 use bytes::{Buf, BufMut, Bytes};
 
-use super::Datatype;
-
 /// Bytes of the length before an element of `BYTES`.
 pub(super) const LENGTH_BYTES: usize = 4;
 
@@ -62,41 +60,19 @@ pub fn put_element(content: &[u8], bytes: &mut Vec<u8>) -> Result<(), TryFromInt
     Ok(())
 }
 
-/// Returns `count` finite numbers of `UINT8` or `FP32`.
-///
-/// # Errors
-/// The end of a sentence: what was sent, and what is needed.
-pub fn numbers(bytes: &[u8], datatype: Datatype, count: usize) -> Result<Vec<f32>, String> {
-    if datatype == Datatype::Uint8 {
-        check_length(bytes, count, 1)?;
-        return Ok(bytes.iter().map(|&byte| f32::from(byte)).collect());
-    }
-    let numbers = floats(bytes, count)?;
-    if numbers.iter().all(|number| number.is_finite()) {
-        Ok(numbers)
-    } else {
-        Err("it holds a number that is not finite".to_owned())
-    }
-}
-
 /// Returns `count` numbers of `FP32`, finite or not.
 ///
 /// # Errors
 /// The end of a sentence: what was sent, and what is needed.
 pub fn floats(bytes: &[u8], count: usize) -> Result<Vec<f32>, String> {
-    check_length(bytes, count, size_of::<f32>())?;
+    let sent = bytes.len();
+    if Some(sent) != count.checked_mul(size_of::<f32>()) {
+        return Err(format!(
+            "it has {sent} bytes, but its shape needs {count} numbers of 4 bytes each"
+        ));
+    }
     let words = bytes.as_chunks().0.iter();
     Ok(words.map(|&word| f32::from_le_bytes(word)).collect())
-}
-
-fn check_length(bytes: &[u8], count: usize, width: usize) -> Result<(), String> {
-    let sent = bytes.len();
-    if Some(sent) == count.checked_mul(width) {
-        return Ok(());
-    }
-    Err(format!(
-        "it has {sent} bytes, but its shape needs {count} numbers of {width} bytes each"
-    ))
 }
 
 #[cfg(test)]
@@ -131,15 +107,12 @@ mod tests {
         }
 
         #[test]
-        fn any_bytes_give_finite_numbers_or_an_error(
+        fn any_bytes_give_numbers_or_an_error(
             bytes in prop::collection::vec(any::<u8>(), 0..40), count in any::<usize>(), few in 0_usize..12,
         ) {
             for count in [count, few] {
-                for datatype in [Datatype::Uint8, Datatype::Fp32] {
-                    if let Ok(numbers) = numbers(&bytes, datatype, count) {
-                        prop_assert_eq!(numbers.len(), count);
-                        prop_assert!(numbers.iter().all(|number| number.is_finite()));
-                    }
+                if let Ok(numbers) = floats(&bytes, count) {
+                    prop_assert_eq!(numbers.len(), count);
                 }
             }
         }
@@ -149,14 +122,7 @@ mod tests {
             sent in prop::collection::vec(prop::num::f32::NORMAL | prop::num::f32::ZERO, 0..20),
         ) {
             let bytes: Vec<_> = sent.iter().flat_map(|number| number.to_le_bytes()).collect();
-            prop_assert_eq!(numbers(&bytes, Datatype::Fp32, sent.len()).unwrap(), sent);
-        }
-    }
-
-    #[test]
-    fn numbers_that_are_not_finite_are_refused() {
-        for wrong in [f32::NAN, f32::INFINITY] {
-            assert!(numbers(&wrong.to_le_bytes(), Datatype::Fp32, 1).is_err());
+            prop_assert_eq!(floats(&bytes, sent.len()).unwrap(), sent);
         }
     }
 

@@ -15,8 +15,6 @@ pub enum Datatype {
     Fp32,
     /// 32-bit signed integers.
     Int32,
-    /// Integers from 0 to 255.
-    Uint8,
 }
 
 impl Datatype {

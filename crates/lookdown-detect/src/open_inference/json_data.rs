@@ -11,8 +11,6 @@ use base64::{
 use bytes::Bytes;
 use serde::de::{DeserializeSeed, Deserializer, Error, SeqAccess, Visitor};
 
-use super::Datatype;
-
 /// Base64 with or without padding.
 const BASE64: GeneralPurpose = GeneralPurpose::new(
     &STANDARD,
@@ -27,9 +25,8 @@ pub fn bytes_at_most(json: &str) -> usize {
     json.len() / 4 * 3
 }
 
-/// Most numbers that [`numbers`] returns for data of this length: each has a digit and a separator.
-#[must_use]
-pub fn numbers_at_most(json: &str, count: usize) -> usize {
+/// Most numbers that [`floats`] returns for data of this length: each has a digit and a separator.
+fn numbers_at_most(json: &str, count: usize) -> usize {
     count.min(json.len() / 2)
 }
 
@@ -55,13 +52,12 @@ pub fn byte_elements(json: &str, count: usize) -> Result<Vec<Bytes>, String> {
     bytes.map_err(|error| format!("its data are not base64: {error}"))
 }
 
-/// Returns `count` finite numbers of `UINT8` or `FP32`.
+/// Returns `count` finite numbers of `FP32`.
 ///
 /// # Errors
 /// The end of a sentence: what was sent, and what is needed.
-pub fn numbers(json: &str, datatype: Datatype, count: usize) -> Result<Vec<f32>, String> {
+pub fn floats(json: &str, count: usize) -> Result<Vec<f32>, String> {
     let mut numbers = Numbers {
-        datatype,
         count,
         values: Vec::with_capacity(numbers_at_most(json, count)),
     };
@@ -107,7 +103,6 @@ impl<'de> Elements<'de> for Texts<'de> {
 }
 
 struct Numbers {
-    datatype: Datatype,
     count: usize,
     values: Vec<f32>,
 }
@@ -118,12 +113,6 @@ impl Elements<'_> for Numbers {
             let count = self.count;
             return Err(format!(
                 "it has more numbers than the {count} that its shape needs"
-            ));
-        }
-        let is_byte = (0.0..=255.0).contains(&number) && number.fract() == 0.0;
-        if self.datatype == Datatype::Uint8 && !is_byte {
-            return Err(format!(
-                "it holds {number}: UINT8 is an integer from 0 to 255"
             ));
         }
         #[expect(clippy::cast_possible_truncation, reason = "FP32 is the target format")]
@@ -210,7 +199,7 @@ mod tests {
     #[test]
     fn lists_are_flat_or_nested() {
         for json in ["[1,2.5,3,4]", "[[1,2.5],[3,4]]", " [[[1],[2.5]],[[3],[4]]]"] {
-            let read = numbers(json, Datatype::Fp32, 4).unwrap();
+            let read = floats(json, 4).unwrap();
             assert_eq!(read, [1.0, 2.5, 3.0, 4.0], "{json}");
         }
     }
@@ -220,20 +209,18 @@ mod tests {
         for (json, count, part) in [
             ("[1,2]", 3, "it has 2 numbers, but its shape needs 3"),
             ("[1,2,3]", 2, "more numbers than the 2"),
-            ("[1,256]", 2, "256"),
-            ("[1,0.5]", 2, "an integer"),
             ("[\"a\"]", 1, "holds a string"),
             ("[true]", 1, "boolean"),
             ("{\"a\":1}", 1, "not a list"),
             ("7", 1, "not a list"),
         ] {
-            let error = numbers(json, Datatype::Uint8, count).unwrap_err();
+            let error = floats(json, count).unwrap_err();
             assert!(
                 error.contains(part) && !error.contains("at line"),
                 "{json}: {error}"
             );
         }
-        let error = numbers("[1e39]", Datatype::Fp32, 1).unwrap_err();
+        let error = floats("[1e39]", 1).unwrap_err();
         assert!(error.contains("out of range for FP32"), "{error}");
     }
 
@@ -265,10 +252,8 @@ mod tests {
     proptest! {
         #[test]
         fn any_text_gives_a_list_or_an_error(json in "[\\[\\]{},:\"0-9a-e.+\\- ]{0,40}", count in 0_usize..5) {
-            for datatype in [Datatype::Fp32, Datatype::Uint8] {
-                let length = numbers(&json, datatype, count).map(|read| read.len());
-                prop_assert!(length.is_err() || length == Ok(count));
-            }
+            let length = floats(&json, count).map(|read| read.len());
+            prop_assert!(length.is_err() || length == Ok(count));
             let _ = byte_elements(&json, count);
         }
 
@@ -284,7 +269,7 @@ mod tests {
             }
             let digits: Vec<_> = bytes.iter().map(|byte| byte % 10).collect();
             let json = format!("{digits:?}").replace(' ', "");
-            let read = numbers(&json, Datatype::Uint8, digits.len()).unwrap();
+            let read = floats(&json, digits.len()).unwrap();
             prop_assert_eq!(numbers_at_most(&json, usize::MAX), digits.len());
             prop_assert_eq!(read.capacity(), digits.len());
         }

@@ -60,7 +60,7 @@ pub struct ModelMetadata {
     #[serde(default, deserialize_with = "null_as_default")]
     #[schema(required)]
     pub name: String,
-    /// The only version: for a detector its revision, as in reports.
+    /// The only version.
     #[serde(default, deserialize_with = "null_as_default")]
     #[schema(required)]
     pub versions: Vec<String>,

@@ -3,7 +3,7 @@
 use bytes::Bytes;
 use serde_json::value::RawValue;
 
-use super::{BINARY_SIZE, Datatype, HEAD_LENGTH, binary_data, json_data};
+use super::{BINARY_SIZE, HEAD_LENGTH, binary_data, json_data};
 
 /// The values of a tensor as they were sent.
 #[derive(Debug)]
@@ -42,17 +42,14 @@ impl<'a> TensorData<'a> {
         }
     }
 
-    /// Returns the largest memory that `count` elements need besides the message, in bytes, before
-    /// they are read.
+    /// Returns the largest memory that the elements of a tensor of `BYTES` need besides the
+    /// message, in bytes, before they are read.
     #[must_use]
-    pub fn unpacked_bytes(&self, datatype: Datatype, count: usize) -> usize {
-        let numbers = |count| count * size_of::<f32>();
-        match (datatype, self) {
-            (Datatype::Bytes, Self::Json(text)) => json_data::bytes_at_most(text),
+    pub fn unpacked_bytes(&self) -> usize {
+        match self {
+            Self::Json(text) => json_data::bytes_at_most(text),
             // The values are a part of the message.
-            (Datatype::Bytes, Self::Binary(_)) => 0,
-            (_, Self::Json(text)) => numbers(json_data::numbers_at_most(text, count)),
-            (_, Self::Binary(bytes)) => numbers(count.min(bytes.len())),
+            Self::Binary(_) => 0,
         }
     }
 
@@ -67,24 +64,13 @@ impl<'a> TensorData<'a> {
         }
     }
 
-    /// Returns `count` finite numbers of `UINT8` or `FP32`.
-    ///
-    /// # Errors
-    /// The end of a sentence: what was sent, and what is needed.
-    pub fn numbers(self, datatype: Datatype, count: usize) -> Result<Vec<f32>, String> {
-        match self {
-            Self::Json(text) => json_data::numbers(text, datatype, count),
-            Self::Binary(bytes) => binary_data::numbers(&bytes, datatype, count),
-        }
-    }
-
     /// Returns `count` numbers of `FP32`. As bytes, they may be not finite.
     ///
     /// # Errors
     /// The end of a sentence: what was sent, and what is needed.
     pub fn floats(self, count: usize) -> Result<Vec<f32>, String> {
         match self {
-            Self::Json(text) => json_data::numbers(text, Datatype::Fp32, count),
+            Self::Json(text) => json_data::floats(text, count),
             Self::Binary(bytes) => binary_data::floats(&bytes, count),
         }
     }

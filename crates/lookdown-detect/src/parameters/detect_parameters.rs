@@ -35,7 +35,7 @@ const DETECTION_WITH_DEFAULTS: &[Interface] = &[
 ];
 const REQUESTS_WITH_DEFAULTS: &[Interface] =
     &[Interface::Http, Interface::FrameModel, Interface::Defaults];
-const EVERY_REQUEST: &[Interface] = &[Interface::Http, Interface::FrameModel, Interface::Detector];
+const EVERY_REQUEST: &[Interface] = &[Interface::Http, Interface::FrameModel];
 
 parameter_table! {
     /// The parameters of a detection.

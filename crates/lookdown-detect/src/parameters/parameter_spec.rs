@@ -85,8 +85,6 @@ pub enum Interface {
     Http,
     /// Requests to the model `lookdown` of the Open Inference Protocol.
     FrameModel,
-    /// Requests to a detector of the Open Inference Protocol.
-    Detector,
     /// Flags of `lookdown detect`.
     CommandLine,
     /// Defaults in a calibration (`detect`) and in the settings (table `detect`).

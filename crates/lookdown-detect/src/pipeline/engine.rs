@@ -7,13 +7,12 @@ mod detail_pass;
 mod first_pass;
 mod follow_pass;
 mod further_looks;
-mod given_views;
 mod observation;
 mod placed;
 
 use std::{
     num::NonZeroUsize,
-    sync::{Arc, atomic::AtomicUsize},
+    sync::Arc,
     time::{Duration, Instant},
 };
 
@@ -108,8 +107,6 @@ pub struct Engine {
     rigs: RigCache,
     motion_cache: MotionCache,
     follow_cache: FollowCache,
-    /// Round-robin counter for views that bypass the network's queue.
-    next_session: AtomicUsize,
     inference_cache: InferenceCache,
     /// The turn of all view plans, radians.
     plan_turn: f64,
@@ -143,7 +140,6 @@ impl Engine {
             rigs: RigCache::new(options.rig_cache_bytes, Arc::clone(&metrics)),
             motion_cache: MotionCache::default(),
             follow_cache: FollowCache::default(),
-            next_session: AtomicUsize::new(0),
             inference_cache: InferenceCache::new(
                 options.inference_cache_frames,
                 metrics.inference_cache_hits.clone(),

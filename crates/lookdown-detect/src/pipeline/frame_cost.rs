@@ -5,7 +5,7 @@
 //! also costs 1, because its header is enough to refuse it. No frame costs more than a client may
 //! use.
 
-use super::{ClientViewsJob, DetectJob};
+use super::DetectJob;
 
 /// Pixels, decoded or drawn, that add 1. With the default limits, two of the largest frames are
 /// decoded side by side, which keeps the memory below 2 GiB.
@@ -25,13 +25,6 @@ pub(super) fn of_frame(job: &DetectJob, max_pixels: u64) -> usize {
     let first_pass = plan.map_or(1, |plan| plan.directions().len());
     let inputs = first_pass + profile.max_crop_inputs();
     cost(size, job.ticket.drawn_width, inputs)
-}
-
-/// Returns the cost of views rendered by the client.
-pub(super) fn of_views(job: &ClientViewsJob) -> usize {
-    let input = job.model.input();
-    let values = (*job.pixels).as_ref().len();
-    cost((0, 0), 0, values / input.view_len().max(1))
 }
 
 fn cost((width, height): (u32, u32), drawn_width: u32, inputs: usize) -> usize {

@@ -10,7 +10,6 @@ use tokio_util::sync::CancellationToken;
 use super::{DetectionReport, Person, Ticket, camera_rig::CameraRig};
 use crate::{
     imaging::{Frame, annotate::ZoneOutline, decode::declared_size},
-    inference::Model,
     parameters::DetectParameters,
 };
 
@@ -101,19 +100,6 @@ impl DetectJob {
             calibration,
         }
     }
-}
-
-/// Views rendered by a client, for inference without changes.
-pub struct ClientViewsJob {
-    /// The time at which the whole request was in memory.
-    pub arrived: Instant,
-    /// The priority of the job and its cancellation state.
-    pub ticket: Ticket,
-    /// The model that runs.
-    pub model: Arc<Model>,
-    /// `[views, 3, height, width]` at the size of the model's input: planes of red, green and blue,
-    /// 0 to 255. The owner of the pixels, with any other resources, is dropped with the job.
-    pub pixels: Box<dyn AsRef<[f32]> + Send>,
 }
 
 /// A report together with its frame.

@@ -14,7 +14,7 @@ use tokio::sync::oneshot;
 use tokio_util::sync::CancellationToken;
 
 use super::{
-    ClientViewsJob, DetectJob, DetectedFrame, Engine, PipelineError, Stage, Stall, Ticket,
+    DetectJob, DetectedFrame, Engine, PipelineError, Stage, Stall, Ticket,
     error::internal,
     frame_cost,
     frame_queue::FrameQueue,
@@ -23,7 +23,6 @@ use super::{
 };
 use crate::{
     fairness::{BudgetError, Client, SharedBudget},
-    inference::HeadOutput,
     metrics::DetectMetrics,
 };
 
@@ -124,23 +123,6 @@ impl WorkerPool {
         ticket.timeline.enter(Stage::Queue, job.arrived);
         let cost = frame_cost::of_frame(&job, self.engine().options().decode_limits.max_pixels);
         let work = move |engine: &Engine| engine.detect(&job).map(finish);
-        self.queue(ticket, cost, work).await
-    }
-
-    /// Queues views rendered by the client and waits for their detections. Otherwise the same as
-    /// [`WorkerPool::detect_and`].
-    ///
-    /// # Errors
-    /// The same as [`WorkerPool::detect`].
-    pub async fn infer_and<T: Send + 'static>(
-        &self,
-        job: ClientViewsJob,
-        finish: impl FnOnce(HeadOutput) -> T + Send + 'static,
-    ) -> Result<T, PipelineError> {
-        let ticket = job.ticket.clone();
-        ticket.timeline.enter(Stage::Queue, job.arrived);
-        let cost = frame_cost::of_views(&job);
-        let work = move |engine: &Engine| engine.infer_views(&job).map(finish);
         self.queue(ticket, cost, work).await
     }
 

@@ -83,7 +83,7 @@ problems! {
         => "Add the camera to `results.images`.";
     /// The model is not loaded.
     UnknownModel = NOT_FOUND "unknown-model" "Unknown model"
-        => "`POST /v2/repository/index` lists the models.";
+        => "Name a model that `detail` lists.";
     /// The path does not support the method.
     MethodNotAllowed = METHOD_NOT_ALLOWED "method-not-allowed" "Method not allowed"
         => "Use a method that the header `Allow` lists.";
@@ -100,9 +100,6 @@ problems! {
     /// The camera is one of the settings.
     CameraConflict = CONFLICT "camera-conflict" "Camera conflict"
         => "Change the camera in the settings file.";
-    /// The models that are loaded do not allow the change.
-    ModelConflict = CONFLICT "model-conflict" "Model conflict"
-        => "Unload another model first; the models of the profiles cannot be unloaded.";
     /// The resource has another revision than the request requires.
     PreconditionFailed = PRECONDITION_FAILED "precondition-failed" "Precondition failed"
         => "Get the resource again, and send its new `ETag` as `If-Match`.";
@@ -118,9 +115,6 @@ problems! {
     /// The content is not a valid calibration.
     InvalidCalibration = UNPROCESSABLE_ENTITY "invalid-calibration" "Invalid calibration"
         => "`lookdown calibration check FILE` explains the reason.";
-    /// The model failed its check.
-    ModelRefused = UNPROCESSABLE_ENTITY "model-refused" "Invalid model"
-        => "`lookdown model check FOLDER` explains the reason.";
     /// A parameter or form field has a value that cannot be used.
     InvalidParameter = UNPROCESSABLE_ENTITY "invalid-parameter" "Invalid parameter"
         => "Send a value that `detail` allows.";
@@ -133,9 +127,6 @@ problems! {
     /// The frame does not match the calibration, or its size cannot be processed.
     UnfitImage = UNPROCESSABLE_ENTITY "unfit-image" "Image does not match"
         => "Use the calibration of this camera, and frames of its aspect ratio.";
-    /// Another model is being loaded.
-    ModelBusy = TOO_MANY_REQUESTS "model-busy" "Model change in progress" retry_after_seconds 1
-        => "Retry after `Retry-After`.";
     /// The queue of frames, or the memory for request bodies, is full.
     Overloaded = TOO_MANY_REQUESTS "overloaded" "Server overloaded" retry_after_seconds 1
         => "Retry after `Retry-After`; send fewer frames at a time, or use a faster profile.";

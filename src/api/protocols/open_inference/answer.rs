@@ -11,7 +11,10 @@ use lookdown_detect::open_inference::{
     message::{InferResponse, Message, OutputParameters, OutputTensor},
 };
 
-use super::wanted::Wanted;
+use super::{
+    own_metadata::{FRAME_MODEL, FRAME_MODEL_VERSION},
+    wanted::Wanted,
+};
 use crate::api::http::problem::Problem;
 
 /// An inference response.
@@ -36,13 +39,6 @@ pub(super) enum OutputValues {
     Texts(Vec<Bytes>),
 }
 
-/// The model that responds.
-pub(super) struct Answerer<'a> {
-    pub(super) model: &'a str,
-    pub(super) version: &'a str,
-    pub(super) id: Option<&'a str>,
-}
-
 impl OutputValues {
     fn as_tensor(&self) -> Result<TensorValues<'_>, Problem> {
         Ok(match self {
@@ -58,9 +54,9 @@ impl OutputValues {
 }
 
 impl InferAnswer {
-    /// Writes the requested outputs.
+    /// Writes the requested outputs; `id` is that of the request.
     pub(super) fn write(
-        answerer: &Answerer<'_>,
+        id: Option<String>,
         outputs: &[Output],
         wanted: &Wanted,
     ) -> Result<Self, Problem> {
@@ -85,9 +81,9 @@ impl InferAnswer {
             });
         }
         let response = InferResponse {
-            model_name: answerer.model.to_owned(),
-            model_version: Some(answerer.version.to_owned()),
-            id: answerer.id.map(ToOwned::to_owned),
+            model_name: FRAME_MODEL.to_owned(),
+            model_version: Some(FRAME_MODEL_VERSION.to_owned()),
+            id,
             outputs: Entries(written),
         };
         let message = Message::write(&response, &behind).map_err(Problem::internal)?;

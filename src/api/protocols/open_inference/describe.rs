@@ -1,13 +1,16 @@
-//! Metadata and health checks of the server and its models.
+//! Metadata and health checks of the server and its model.
 
-use axum::{Json, extract::State};
+use axum::{
+    Json,
+    extract::{Path, State},
+};
 use lookdown_detect::open_inference::metadata::{
     ModelMetadata, ModelReady, ServerLive, ServerMetadata, ServerReady,
 };
 
 use super::{
-    own_metadata::{EXTENSIONS, NAME},
-    requested_model::{ModelAddress, RequestedModel},
+    own_metadata::{EXTENSIONS, FRAME_MODEL, NAME, require_frame_model},
+    persons,
 };
 use crate::api::{ApiState, http::problem::Problem, require_scope::RequireDetect};
 
@@ -56,48 +59,27 @@ pub(in crate::api) async fn ready(
 
 /// Get model metadata
 ///
-/// `lookdown` accepts a frame and returns persons; the detectors accept views.
+/// The only model, `lookdown`, accepts a frame and returns persons.
 #[utoipa::path(
     get, path = "/v2/models/{name}", tag = "inference", operation_id = "get_model",
-    params(("name" = String, Path, description = "`lookdown`, or the name of a detector.")),
+    params(("name" = String, Path, description = "`lookdown`.")),
     security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
     responses(
         (status = OK, description = "The inputs and outputs of the model.", body = ModelMetadata),
     )
 )]
 pub(in crate::api) async fn model(
-    State(state): State<ApiState>,
-    _finder: RequireDetect,
-    address: ModelAddress,
+    _scope: RequireDetect,
+    Path(name): Path<String>,
 ) -> Result<Json<ModelMetadata>, Problem> {
-    Ok(Json(RequestedModel::find(&state, &address)?.metadata()))
-}
-
-/// Get metadata of a model version
-#[utoipa::path(
-    get, path = "/v2/models/{name}/versions/{version}", tag = "inference",
-    operation_id = "get_model_version",
-    params(
-        ("name" = String, Path, description = "`lookdown`, or the name of a detector."),
-        ("version" = String, Path, description = "The version in the metadata of the model."),
-    ),
-    security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
-    responses(
-        (status = OK, description = "The inputs and outputs of the model.", body = ModelMetadata),
-    )
-)]
-pub(in crate::api) async fn model_version(
-    state: State<ApiState>,
-    scope: RequireDetect,
-    address: ModelAddress,
-) -> Result<Json<ModelMetadata>, Problem> {
-    model(state, scope, address).await
+    require_frame_model(&name)?;
+    Ok(Json(persons::metadata()))
 }
 
 /// Check the readiness of a model
 #[utoipa::path(
     get, path = "/v2/models/{name}/ready", tag = "inference", operation_id = "get_model_readiness",
-    params(("name" = String, Path, description = "`lookdown`, or the name of a detector.")),
+    params(("name" = String, Path, description = "`lookdown`.")),
     security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
     responses(
         (status = OK, description = "It can.", body = ModelReady),
@@ -105,34 +87,13 @@ pub(in crate::api) async fn model_version(
 )]
 pub(in crate::api) async fn model_ready(
     State(state): State<ApiState>,
-    _finder: RequireDetect,
-    address: ModelAddress,
+    _scope: RequireDetect,
+    Path(name): Path<String>,
 ) -> Result<Json<ModelReady>, Problem> {
-    RequestedModel::find(&state, &address)?;
+    require_frame_model(&name)?;
     state.require_ready()?;
     Ok(Json(ModelReady {
-        name: address.name,
+        name: FRAME_MODEL.to_owned(),
         ready: true,
     }))
-}
-
-/// Check readiness of a model version
-#[utoipa::path(
-    get, path = "/v2/models/{name}/versions/{version}/ready", tag = "inference",
-    operation_id = "get_model_version_readiness",
-    params(
-        ("name" = String, Path, description = "`lookdown`, or the name of a detector."),
-        ("version" = String, Path, description = "The version in the metadata of the model."),
-    ),
-    security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
-    responses(
-        (status = OK, description = "It can.", body = ModelReady),
-    )
-)]
-pub(in crate::api) async fn model_version_ready(
-    state: State<ApiState>,
-    scope: RequireDetect,
-    address: ModelAddress,
-) -> Result<Json<ModelReady>, Problem> {
-    model_ready(state, scope, address).await
 }

@@ -48,10 +48,10 @@ struct InferInput {
     /// The size of each axis.
     #[schema(max_items = 16)]
     shape: Vec<u32>,
-    /// `BYTES`, `FP32` or `UINT8`.
+    /// `BYTES`.
     #[schema(example = "BYTES")]
     datatype: String,
-    /// Base64 for `BYTES`, numbers otherwise, row-major. The lists may be nested like the shape.
+    /// The elements in Base64. The lists may be nested like the shape.
     data: Vec<serde_json::Value>,
 }
 
@@ -86,8 +86,7 @@ impl ToSchema for InferParameters {
 impl PartialSchema for InferParameters {
     /// Returns the schema of the parameters of `/detect` and of the protocol.
     fn schema() -> RefOr<Schema> {
-        let description = "Parameters of `/detect`, and of the protocol. Detectors take the protocol's \
-                           and `timeout_millis`.";
+        let description = "Parameters of `/detect`, and of the protocol.";
         let timeout = ObjectBuilder::new()
             .schema_type(Type::Integer)
             .minimum(Some(1))

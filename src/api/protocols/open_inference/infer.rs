@@ -1,14 +1,16 @@
 //! Inference requests.
 
-use axum::{extract::State, response::IntoResponse};
+use axum::{
+    extract::{Path, State},
+    response::IntoResponse,
+};
 
 use super::{
     content_encoding::decompressed,
-    detector,
     document::{InferRequestBody, InferResponseBody},
+    own_metadata::require_frame_model,
     persons::{self, ArrivalTimes},
     request::InferRequest,
-    requested_model::{ModelAddress, RequestedModel},
 };
 use crate::api::{
     ApiState,
@@ -24,14 +26,11 @@ use crate::api::{
 /// (`[persons, 5]`) and `views` for the persons of all frames in order, and `counts` (persons) and
 /// `report` for each frame. The frames are processed one after another, each within the limits of
 /// a request. The parameters of `/detect` are parameters of the request. The body may be compressed
-/// (`Content-Encoding: gzip` or `deflate`). A
-/// detector accepts `views` (`FP32` or `UINT8`, `[views, 3, height, width]`, pixels 0 to 255) and
-/// returns `boxes` (`[views, candidates, 4]`) and `scores` (`[views, candidates]`), padded with
-/// zeros.
+/// (`Content-Encoding: gzip` or `deflate`).
 #[utoipa::path(
     post, path = "/v2/models/{name}/infer", tag = "inference", operation_id = "infer_with_model",
     params(
-        ("name" = String, Path, description = "`lookdown`, or the name of a detector."),
+        ("name" = String, Path, description = "`lookdown`."),
         ("Inference-Header-Content-Length" = Option<u32>, Header, nullable = false,
          description = "The length of the JSON, if tensors follow it as bytes."),
     ),
@@ -47,10 +46,10 @@ use crate::api::{
 )]
 pub(in crate::api) async fn infer(
     State(state): State<ApiState>,
-    address: ModelAddress,
+    Path(name): Path<String>,
     arrival: ReceivedRequest,
 ) -> Result<impl IntoResponse, Problem> {
-    let model = RequestedModel::find(&state, &address)?;
+    require_frame_model(&name)?;
     let context = arrival.context;
     context.note_upload(arrival.arrived);
     let tokens = arrival.parts.extensions.get::<RequestTokens>().cloned();
@@ -66,40 +65,5 @@ pub(in crate::api) async fn infer(
         received_at: arrival.received_at,
         arrived: arrival.arrived,
     };
-    match model {
-        RequestedModel::Frames => persons::infer(&state, &context, read, times, tokens).await,
-        RequestedModel::Views(model) => {
-            detector::infer(&state, &context, model, read, times.arrived).await
-        }
-    }
-}
-
-/// Run inference with a model version
-///
-/// Equivalent to the route without a version.
-#[utoipa::path(
-    post, path = "/v2/models/{name}/versions/{version}/infer", tag = "inference",
-    operation_id = "infer_with_model_version",
-    params(
-        ("name" = String, Path, description = "`lookdown`, or the name of a detector."),
-        ("version" = String, Path, description = "The version in the metadata of the model."),
-        ("Inference-Header-Content-Length" = Option<u32>, Header, nullable = false,
-         description = "The length of the JSON, if tensors follow it as bytes."),
-    ),
-    request_body(
-        description = "JSON, or JSON followed by the bytes of tensors.",
-        content((InferRequestBody = "application/json"), (inline(RawBytes) = "application/octet-stream"))
-    ),
-    security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
-    responses(
-        (status = OK, description = "The outputs.",
-         content((InferResponseBody = "application/json"), (inline(RawBytes) = "application/octet-stream"))),
-    )
-)]
-pub(in crate::api) async fn infer_version(
-    state: State<ApiState>,
-    address: ModelAddress,
-    arrival: ReceivedRequest,
-) -> Result<impl IntoResponse, Problem> {
-    infer(state, address, arrival).await
+    persons::infer(&state, &context, read, times, tokens).await
 }

@@ -12,11 +12,11 @@ use lookdown_detect::{
 };
 
 use super::{
-    answer::{Answerer, InferAnswer, Output, OutputValues},
+    answer::{InferAnswer, Output, OutputValues},
     infer_parameters::as_texts,
-    own_metadata::{NAME, tensor},
+    own_metadata::{FRAME_MODEL, FRAME_MODEL_VERSION, NAME, tensor},
     request::InferRequest,
-    tensor::{Values, misfit},
+    tensor::misfit,
 };
 use crate::api::{
     ApiState,
@@ -26,10 +26,6 @@ use crate::api::{
     http::{context::RequestContext, problem::Problem, query::pairs, rate_limit::RequestTokens},
 };
 
-/// The model that detects persons in frames.
-pub(super) const FRAME_MODEL: &str = "lookdown";
-/// The version of its inputs and outputs.
-pub(super) const FRAME_MODEL_VERSION: &str = "1";
 const INPUT: &str = "image";
 const OUTPUTS: [&str; 6] = [
     "boxes",
@@ -78,9 +74,7 @@ pub(super) async fn infer(
     tokens: Option<RequestTokens>,
 ) -> Result<InferAnswer, Problem> {
     request.wanted.check(&OUTPUTS)?;
-    let Values::Frames(frames) = request.only_input(INPUT)?.values else {
-        return Err(misfit(INPUT, "send the datatype BYTES: encoded frames"));
-    };
+    let frames = request.only_input(INPUT)?.frames;
     if let Some(index) = frames.iter().position(Bytes::is_empty) {
         let wrong = format!("element {index} is empty: send an encoded frame");
         return Err(misfit(INPUT, &wrong));
@@ -116,14 +110,7 @@ pub(super) async fn infer(
     if is_batch {
         headers = vec![(PERSON_COUNT, HeaderValue::from(found.scores.len()))];
     }
-    let write = move || {
-        let answerer = Answerer {
-            model: FRAME_MODEL,
-            version: FRAME_MODEL_VERSION,
-            id: request.id.as_deref(),
-        };
-        InferAnswer::write(&answerer, &found.into_outputs(), &request.wanted)
-    };
+    let write = move || InferAnswer::write(request.id, &found.into_outputs(), &request.wanted);
     let mut answer = context.deadline.blocking(write).await?;
     answer.report_headers = headers;
     Ok(answer)

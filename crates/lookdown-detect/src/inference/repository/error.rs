@@ -1,10 +1,10 @@
-//! Errors of loading and unloading models.
+//! Errors of loading models.
 
 use std::path::PathBuf;
 
 use crate::inference::{InferenceError, RegistryFull};
 
-/// A model that was not loaded or unloaded. Every message is one sentence that includes the remedy.
+/// A model that was not loaded. Every message is one sentence that includes the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum RepositoryError {
     /// There is no such model.
@@ -14,20 +14,6 @@ pub enum RepositoryError {
         name: String,
         /// The available names.
         known: String,
-    },
-    /// The model is not loaded.
-    #[error("model: {name:?} is not loaded")]
-    NotLoaded {
-        /// The requested name.
-        name: String,
-    },
-    /// Requests that do not name a model use it.
-    #[error(
-        "model: {name:?} is used by requests that do not name a model, so it cannot be unloaded"
-    )]
-    Kept {
-        /// Name of the model.
-        name: String,
     },
     /// The manifest's name differs from its folder's.
     #[error(

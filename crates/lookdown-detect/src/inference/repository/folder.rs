@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{NotLoaded, RepositoryError};
+use super::RepositoryError;
 use crate::inference::{
     ModelManifest,
     manifest::{FILE_NAME, is_name},
@@ -52,15 +52,6 @@ impl ModelFolder {
         let elsewhere = self.elsewhere.iter().map(|(name, _)| name.clone());
         let names: BTreeSet<_> = folders.chain(elsewhere).collect();
         names.into_iter().collect()
-    }
-
-    /// Reason why a model is not loaded that was not tried.
-    pub(super) fn why_not_loaded(&self, name: &str) -> NotLoaded {
-        if self.find(name).is_ok_and(|path| is_fetched(&path)) {
-            NotLoaded::NotRequested
-        } else {
-            NotLoaded::NoFile
-        }
     }
 }
 
