@@ -2,7 +2,6 @@
 
 mod counts;
 mod document;
-mod floor;
 mod frame_heat_map;
 mod furniture;
 mod heat_map;
@@ -58,7 +57,6 @@ fn routes() -> OpenApiRouter<Shared> {
         .routes(routes!(tracks::of_site))
         .routes(routes!(heat_map::json_of_site))
         .routes(routes!(heat_map::png_of_site))
-        .routes(routes!(floor::svg))
 }
 
 /// Returns the routes of the listener itself for clients with access.
