@@ -91,7 +91,6 @@ fn assemble_with(
         sessions: settings.threads.sessions,
         remap_threads: settings.threads.remapping,
         rig_cache_bytes: settings.calibrations.cache_bytes,
-        inference_cache_frames: settings.inference.inference_cache_frames,
     };
     let known = Arc::clone(&calibrations);
     let registry = Arc::clone(models.registry());

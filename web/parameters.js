@@ -10,11 +10,10 @@ const OWN_REFINEMENT = { paper: "soft_nms_gaussian", direct: "nms" };
 
 const form = () => find("#parameters");
 
-/** The query of a request. Reports of the page are not stored, and inference is cached, because sliders send the same
- * frame again. */
+/** The query of a request. Reports of the page are not stored. */
 export function query() {
   const given = [...new FormData(form())].filter(([, value]) => value !== "");
-  return new URLSearchParams([...given, ["camera", "web-page"], ["store", "false"], ["cache", "true"]]);
+  return new URLSearchParams([...given, ["camera", "web-page"], ["store", "false"]]);
 }
 
 export const profile = () => new FormData(form()).get("profile");

@@ -45,9 +45,6 @@ settings! {
         /// The most candidates kept of one view, best first.
         max_detections_per_view: NonZeroUsize = NonZeroUsize::new(CandidateOptions::DEFAULT.max_detections_per_view).unwrap_or(NonZeroUsize::MIN)
             => count();
-        /// The most frames whose candidates are kept for requests with `cache=true`: with
-        /// another refinement these need no new inference. They hold 32 MiB at most.
-        inference_cache_frames as "cache_frames": usize = 32 => count();
     }
 }
 

@@ -34,8 +34,6 @@ metric_set! {
     rig_cache_evictions: IntCounter = "rig_cache_evictions_total" [];
     /// Frames, by the origin of their persons: `full`, `followed` or `unchanged`.
     frame_searches: IntCounterVec = "frame_searches_total" ["search"];
-    /// Frames answered from the inference cache.
-    inference_cache_hits: IntCounter = "inference_cache_hits_total" [];
 }
 
 impl DetectMetrics {

@@ -10,7 +10,6 @@ mod follow;
 mod frame_cost;
 mod frame_queue;
 mod in_flight;
-mod inference_cache;
 mod job;
 mod merge;
 mod mosaic;

@@ -154,16 +154,6 @@ parameter_table! {
         example: None,
         interfaces: REQUESTS_WITH_DEFAULTS,
     };
-    CACHE = ParameterSpec {
-        name: "cache",
-        kind: ParameterKind::Switch,
-        default: ParameterDefault::Value("false"),
-        help: "Caches the detections in the views of this frame, and uses them if the same file was \
-               sent before with this parameter. Another refinement or threshold then needs no new \
-               inference, and the report counts all views as unchanged.",
-        example: None,
-        interfaces: REQUESTS,
-    };
     STORE = ParameterSpec {
         name: "store",
         kind: ParameterKind::Switch,
@@ -220,8 +210,6 @@ pub struct DetectParameters {
     pub motion: bool,
     /// Follows the persons of the camera between searches of the whole frame.
     pub follow: bool,
-    /// Caches the detections in the views, and uses cached ones.
-    pub cache: bool,
     /// Stores the report under the name of its camera.
     pub store: bool,
     /// The priority among queued frames.
@@ -288,7 +276,6 @@ impl DetectParameters {
             captured_at: given.optional(&CAPTURED_AT)?,
             motion: given.value(&MOTION)?,
             follow: given.value(&FOLLOW)?,
-            cache: given.value(&CACHE)?,
             store: given.optional(&STORE)?.unwrap_or(is_named),
             priority: Priority::of_level(given.value(&PRIORITY)?),
             timeout: timeout.map(Duration::from_millis),

@@ -26,7 +26,6 @@ use super::{
     BatchOptions, CalibrationLookup, DefaultModels, DetectJob, DetectedFrame, DetectionReport,
     JobImage, Person, PipelineError, Search, Stage, StageTimings,
     follow::FollowCache,
-    inference_cache::{FrameKey, InferenceCache},
     merge,
     motion_cache::{CameraViews, MotionCache},
     network::InferenceThreads,
@@ -62,16 +61,13 @@ pub struct EngineOptions {
     pub remap_threads: NonZeroUsize,
     /// Maximum memory of cached remap tables, bytes.
     pub rig_cache_bytes: usize,
-    /// Maximum number of frames in the inference cache, which requests opt in to.
-    pub inference_cache_frames: usize,
 }
 
 impl EngineOptions {
     /// The default memory of cached remap tables, bytes.
     pub const RIG_CACHE_BYTES: usize = 256 << 20;
 
-    /// Returns options with `threads` sessions and as many threads that render, a view in each run,
-    /// and no inference cache.
+    /// Returns options with `threads` sessions and as many threads that render, a view in each run.
     #[must_use]
     pub fn new(default_models: DefaultModels, threads: NonZeroUsize) -> Self {
         Self {
@@ -84,7 +80,6 @@ impl EngineOptions {
             sessions: threads,
             remap_threads: threads,
             rig_cache_bytes: Self::RIG_CACHE_BYTES,
-            inference_cache_frames: 0,
         }
     }
 
@@ -93,7 +88,6 @@ impl EngineOptions {
     pub fn for_testing(model: &str) -> Self {
         let mut options = Self::new(DefaultModels::One(model.to_owned()), NonZeroUsize::MIN);
         options.batches.max_views = NonZeroUsize::MIN.saturating_add(127);
-        options.inference_cache_frames = 4;
         options
     }
 }
@@ -107,7 +101,6 @@ pub struct Engine {
     rigs: RigCache,
     motion_cache: MotionCache,
     follow_cache: FollowCache,
-    inference_cache: InferenceCache,
     /// The turn of all view plans, radians.
     plan_turn: f64,
     options: EngineOptions,
@@ -140,10 +133,6 @@ impl Engine {
             rigs: RigCache::new(options.rig_cache_bytes, Arc::clone(&metrics)),
             motion_cache: MotionCache::default(),
             follow_cache: FollowCache::default(),
-            inference_cache: InferenceCache::new(
-                options.inference_cache_frames,
-                metrics.inference_cache_hits.clone(),
-            ),
             plan_turn: 0.0,
             options,
             metrics,
@@ -261,12 +250,6 @@ impl Engine {
         if !camera.rig.has_no_masks() {
             camera.rig.blank(Arc::make_mut(&mut frame));
         }
-        let key = job.parameters.cache.then(|| FrameKey {
-            digest: job.image.digest(),
-            is_model_named: job.parameters.model.is_some(),
-            rig: Arc::clone(&camera.rig),
-            model: Arc::clone(&model),
-        });
         let mut observation = Observation {
             profile: job.parameters.profile,
             tuning: self.tuning(&job.parameters, &model),
@@ -282,15 +265,6 @@ impl Engine {
             model,
             warnings,
         };
-        let cached = key
-            .as_ref()
-            .and_then(|key| self.inference_cache.lookup(key, |model| self.serves(model)));
-        if let Some(passes) = cached {
-            observation.passes = passes;
-            observation.unchanged_views = observation.view_count();
-            timeline.leave(Instant::now());
-            return Ok(observation);
-        }
         match self.follow_pass(job, &mut observation) {
             FirstPass::Search => {}
             pass => {
@@ -315,9 +289,6 @@ impl Engine {
         );
         observation.wait_for(&first)?;
         self.look_again(job, &mut observation)?;
-        if let Some(key) = key {
-            self.inference_cache.store(key, &observation.passes);
-        }
         Ok(observation)
     }
 
@@ -351,12 +322,6 @@ impl Engine {
 
     pub(super) fn metrics(&self) -> &Arc<DetectMetrics> {
         &self.metrics
-    }
-
-    /// Returns true if the registry still has this instance of the model under its name.
-    fn serves(&self, model: &Model) -> bool {
-        let now = self.models.get(model.name());
-        now.is_some_and(|now| std::ptr::eq(Arc::as_ptr(&now), model))
     }
 
     /// Returns the model for requests that name none.

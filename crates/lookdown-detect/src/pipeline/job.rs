@@ -4,7 +4,7 @@ use std::{sync::Arc, time::Instant};
 
 use bytes::Bytes;
 use jiff::Timestamp;
-use lookdown_lens::{calibration::Calibration, geometry::Pixel, revision::sha256_of};
+use lookdown_lens::{calibration::Calibration, geometry::Pixel};
 use tokio_util::sync::CancellationToken;
 
 use super::{DetectionReport, Person, Ticket, camera_rig::CameraRig};
@@ -23,14 +23,6 @@ pub enum JobImage {
 }
 
 impl JobImage {
-    /// Returns the SHA-256 of the file or of the pixels, hexadecimal.
-    pub(super) fn digest(&self) -> String {
-        match self {
-            Self::Encoded(file) => sha256_of(file),
-            Self::Decoded(frame) => sha256_of(frame.pixels()),
-        }
-    }
-
     /// Returns width and height in pixels, those of a file from its header. `None` without a
     /// readable header.
     pub(super) fn size(&self) -> Option<(u32, u32)> {

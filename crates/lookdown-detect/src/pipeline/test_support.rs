@@ -130,7 +130,6 @@ pub(super) fn engine(
             max_delay: Duration::ZERO,
         },
         remap_threads: NonZeroUsize::new(2).unwrap(),
-        inference_cache_frames: 2,
         ..EngineOptions::for_testing("blob")
     };
     let models = ModelRegistry::default();

@@ -35,12 +35,11 @@ fn every_parameter_is_parsed() {
         ("captured_at", "2026-11-21T09:30:00+01:00"),
         ("motion", "true"),
         ("follow", "true"),
-        ("cache", "true"),
         ("priority", "2"),
         ("timeout_millis", "1500"),
     ])
     .unwrap();
-    assert!(parameters.motion && parameters.follow && parameters.cache);
+    assert!(parameters.motion && parameters.follow);
     assert_eq!(parameters.priority, Priority::High);
     assert_eq!(parameters.timeout, Some(Duration::from_millis(1500)));
     assert_eq!(parameters.calibration.unwrap().as_str(), "lobby");

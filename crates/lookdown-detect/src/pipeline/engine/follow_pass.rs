@@ -11,8 +11,7 @@ impl Engine {
     /// Queues crops around followed persons, unless the frame must be searched.
     pub(super) fn follow_pass(&self, job: &DetectJob, observation: &mut Observation) -> FirstPass {
         let parameters = &job.parameters;
-        let is_followed = parameters.follow && !parameters.cache;
-        let camera = parameters.camera_name().filter(|_| is_followed);
+        let camera = parameters.camera_name().filter(|_| parameters.follow);
         let Some(camera) = camera.filter(|_| observation.profile.has_crops()) else {
             return FirstPass::Search;
         };

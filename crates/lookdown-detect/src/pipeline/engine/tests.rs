@@ -194,41 +194,6 @@ fn detail_views_without_motion_skip_inference() {
 }
 
 #[test]
-fn a_cached_frame_is_refined_without_inference() {
-    let engine = engine_with_lobby();
-    let report = |disc: [f64; 2], more: &[(&str, &str)]| {
-        let named = [("calibration", "lobby"), ("cache", "true")];
-        let named: Vec<_> = named.iter().chain(more).copied().collect();
-        let image = frame_with_disc(600, disc, 20.0);
-        engine.detect(&job(image, &named)).unwrap().report
-    };
-    let unchanged = |disc: [f64; 2], more: &[(&str, &str)]| report(disc, more).views.unchanged;
-    let first = report([420.0, 300.0], &[]);
-    assert_eq!((first.views.inferred, first.views.unchanged), (10, 0));
-    let again = report([420.0, 300.0], &[("refine", "nms")]);
-    assert_eq!((again.views.inferred, again.views.unchanged), (0, 10));
-    assert_eq!(
-        (again.batch_count, again.timings.inference.as_nanos()),
-        (0, 0)
-    );
-    assert_eq!(engine.metrics().inference_cache_hits.get(), 1);
-    // Inference without the cache gives the same result.
-    let parameters = [("calibration", "lobby"), ("refine", "nms")];
-    let image = frame_with_disc(600, [420.0, 300.0], 20.0);
-    let anew = engine.detect(&job(image, &parameters)).unwrap().report;
-    assert_eq!(anew.views.inferred, 10);
-    assert_eq!(anew.persons[0].bbox, again.persons[0].bbox);
-    assert_eq!(anew.persons[0].score, again.persons[0].score);
-
-    // Another frame and a named model are different cache keys.
-    assert_eq!(unchanged([420.0, 330.0], &[]), 0);
-    assert_eq!(unchanged([420.0, 300.0], &[("model", "blob")]), 0);
-    // The cache holds two frames: the first one was evicted.
-    assert_eq!(unchanged([420.0, 300.0], &[]), 0);
-    assert_eq!(unchanged([420.0, 300.0], &[("model", "blob")]), 10);
-}
-
-#[test]
 fn the_threshold_applies_to_reported_scores() {
     let engine = engine_with_lobby();
     let image = frame_with_disc(600, [420.0, 300.0], 20.0);
