@@ -105,7 +105,6 @@ arm64: ## cross-build for arm64 on Debian 12 and test it with an emulator: docs/
 	$(PYTHON) scripts/arm64.py
 
 test-real: ## test with real services; as root on Debian it installs missing packages
-	@scripts/packages.sh libfaketime
 	@$(MAKE) --no-print-directory reliability FORM=short
 	@$(MAKE) --no-print-directory real
 

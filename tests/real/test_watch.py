@@ -333,6 +333,19 @@ class Cameras(unittest.TestCase):
         times = [row["report"]["captured_at"] for row in rows]
         self.assertEqual(len(set(times)), len(times))
 
+    def test_a_playlist_is_not_read_as_a_video(self):
+        playlist = self.folder / "playlist.mp4"
+        settings = {f"LOOKDOWN__{name}": value for name, value in TINY.items()}
+        for text in (
+            f"#EXTM3U\n#EXT-X-TARGETDURATION:2\n#EXTINF:2,\n{self.clip()}\n#EXT-X-ENDLIST\n",
+            f"ffconcat version 1.0\nfile {self.clip().name}\n",
+        ):
+            playlist.write_text(text, encoding="utf-8")
+            command = [LOOKDOWN, "detect", playlist, "--every", "1s", "--profile", "fast"]
+            done = subprocess.run(command, env=os.environ | settings, capture_output=True, check=False, timeout=60)
+            self.assertNotEqual(done.returncode, 0)
+            self.assertEqual(done.stdout, b"")
+
     def test_detect_reads_videos_and_standard_input(self):
         clip, out = self.clip(), self.folder / "out.mp4"
         settings = {f"LOOKDOWN__{name}": value for name, value in TINY.items()}

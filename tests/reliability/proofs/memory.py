@@ -11,8 +11,6 @@ from support.memory_group import memory_group
 from support.places import OFFICE
 from support.row import Row
 
-from proofs import default_limits
-
 LIMIT_MIB = 384
 SETTINGS = TINY | {
     "LOG__FILTER": "error",
@@ -36,11 +34,7 @@ def frames() -> dict[str, tuple[bytes, set[int]]]:
 
 
 def prove(effort: Effort) -> list[Row]:
-    """Sends huge frames to a small server, and the largest permitted ones to one with the defaults."""
-    return [*_refused(effort), default_limits.prove(effort)]
-
-
-def _refused(effort: Effort) -> list[Row]:
+    """Sends huge frames to a small server."""
     made = frames()
     row = Row(
         "memory limit", f"{LIMIT_MIB} MiB; {len(made)} kinds of huge frames, {effort.huge_frames} × {AT_ONCE} of each"

@@ -21,13 +21,10 @@ class Effort:
     """Clients of each kind at the same time."""
     huge_frames: int
     """Frames of each kind."""
-    default_limit_seconds: float
-    """Time of the largest permitted frames at the default limits."""
     soak_seconds: float
     flood_clients: int
     """Clients of each flood at the same time."""
     flood_seconds: float
-    fairness_seconds: float
 
 
 SHORT = Effort(
@@ -39,11 +36,9 @@ SHORT = Effort(
     overload_seconds=8.0,
     rude_clients=100,
     huge_frames=5,
-    default_limit_seconds=20.0,
     soak_seconds=20.0,
     flood_clients=700,
     flood_seconds=4.0,
-    fairness_seconds=8.0,
 )
 
 LONG = Effort(
@@ -55,9 +50,7 @@ LONG = Effort(
     overload_seconds=60.0,
     rude_clients=400,
     huge_frames=100,
-    default_limit_seconds=120.0,
     soak_seconds=1800.0,
     flood_clients=1000,
     flood_seconds=30.0,
-    fairness_seconds=60.0,
 )
