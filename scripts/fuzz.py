@@ -1,4 +1,4 @@
-"""Runs the fuzzers one after another: `fuzz.py [--runs N] [--minimize] [TARGET...]`, all targets by default.
+"""Runs the fuzzers one after another: `fuzz.py [--runs N] [TARGET...]`, all targets by default.
 
 A target stops at its first panic, at an input that takes more than a second or at more than 256 MiB of memory,
 and the script then fails. Needs `cargo install cargo-fuzz` and a C++ compiler.
@@ -23,16 +23,12 @@ MAX_SECONDS = 1
 MAX_MEBIBYTES = 256
 # All fields of each format fit into this size; longer inputs only take more time.
 MAX_BYTES = 2048
-# The number of checked-in files of a corpus, without those that failed once.
-MAX_KEPT = 32
-FAILED = "failed-"
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("targets", nargs="*", metavar="TARGET", help=f"among {', '.join(TARGETS)}")
     parser.add_argument("--runs", type=int, default=1_000_000, help="how often each is run")
-    parser.add_argument("--minimize", action="store_true", help="keep the best finds in lab/fuzz/corpus")
     arguments = parser.parse_args()
     for target in arguments.targets:
         if target not in TARGETS:
@@ -44,8 +40,6 @@ def main() -> int:
     failed = False
     for target in arguments.targets or TARGETS:
         failed |= not fuzz(target, arguments.runs)
-        if arguments.minimize:
-            minimize(target)
     return int(failed)
 
 
@@ -69,26 +63,8 @@ def fuzz(target: str, runs: int) -> bool:
     return healthy
 
 
-def minimize(target: str) -> None:
-    """Keeps the inputs in the corpus that together reach the most code, and inputs that failed once."""
-    corpus, chosen = FUZZ / "corpus" / target, FUZZ / "found" / f"{target}.chosen"
-    corpus.mkdir(parents=True, exist_ok=True)
-    chosen.mkdir()
-    run(target, ["-merge=1", "-set_cover_merge=1", "-use_counters=0", chosen, FUZZ / "found" / target])
-    for old in corpus.iterdir():
-        if not old.name.startswith(FAILED):
-            old.unlink()
-    # They are sorted by their additional coverage.
-    best = sorted(chosen.iterdir(), key=lambda file: file.stat().st_mtime_ns)
-    for file in best[:MAX_KEPT]:
-        file.rename(corpus / file.name)
-    for file in best[MAX_KEPT:]:
-        file.unlink()
-    chosen.rmdir()
-
-
 def seeds(target: str) -> list[Path]:
-    folders = [FUZZ / "seeds" / target, FUZZ / "corpus" / target, *(ROOT / path for path in SEEDS.get(target, []))]
+    folders = [FUZZ / "seeds" / target, *(ROOT / path for path in SEEDS.get(target, []))]
     return [folder for folder in folders if folder.is_dir()]
 
 

@@ -1,5 +1,5 @@
 //! The functions under fuzzing, for the fuzzers of `fuzz_targets/`, which generate bytes, and for
-//! `tests/repository/fuzz_corpus.rs`, which replays their corpora.
+//! `tests/repository/fuzz_seeds.rs`, which replays their seeds.
 //!
 //! Each function panics on an error, and returns true if its bytes reached the code under test.
 

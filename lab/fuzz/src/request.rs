@@ -92,7 +92,7 @@ fn request(bytes: &[u8]) -> Option<Request<Body>> {
         let value = HeaderValue::from_bytes(header[colon + 1..].trim_ascii()).ok()?;
         request.headers_mut().append(name, value);
     }
-    // Every client sends a Host; one in the corpus is kept.
+    // Every client sends a Host; one in the input is kept.
     let host = request.headers_mut().entry(HOST);
     host.or_insert(HeaderValue::from_static("localhost"));
     *request.body_mut() = Body::from(rest.to_vec());

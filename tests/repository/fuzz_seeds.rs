@@ -1,5 +1,4 @@
-//! Replays the seeds of the fuzzers and the inputs that they kept. `docs/lab/reliability.md`
-//! describes how the fuzzers are run.
+//! Replays the seeds of the fuzzers. `docs/lab/reliability.md` describes how the fuzzers are run.
 
 #[path = "../../lab/fuzz/src/lib.rs"]
 mod targets;
@@ -19,22 +18,16 @@ fn replay(folder: &str, read: impl Fn(&[u8]) -> bool) -> usize {
     files.filter(|file| read(&fs::read(file).unwrap())).count()
 }
 
-/// Replays the seeds and the corpus of one target, and the files of `folders`.
+/// Replays the seeds of one target, and the files of `folders`.
 fn replay_all(name: &str, folders: &[&str], read: impl Fn(&[u8]) -> bool) {
-    let own = [
-        format!("lab/fuzz/seeds/{name}"),
-        format!("lab/fuzz/corpus/{name}"),
-    ];
-    let folders = own
-        .iter()
-        .map(String::as_str)
-        .chain(folders.iter().copied());
+    let seeds = format!("lab/fuzz/seeds/{name}");
+    let folders = [&*seeds].into_iter().chain(folders.iter().copied());
     let taken: usize = folders.map(|folder| replay(folder, &read)).sum();
     assert!(taken > 0, "{name}: no input reached the fuzzed code");
 }
 
 #[test]
-fn every_importer_survives_its_corpus() {
+fn every_importer_survives_its_seeds() {
     for (name, format) in importer::IMPORTERS {
         let fixtures = ["tests/fixtures/calibrations", "samples/calibrations"];
         replay_all(name, &fixtures, |content| importer::read(format, content));
@@ -42,21 +35,21 @@ fn every_importer_survives_its_corpus() {
 }
 
 #[test]
-fn decoding_survives_its_corpus() {
+fn decoding_survives_its_seeds() {
     replay_all("image_file", &["tests/fixtures/images"], image_file::read);
 }
 
 #[test]
-fn the_service_survives_its_corpus() {
+fn the_service_survives_its_seeds() {
     replay_all("request", &[], request::read);
 }
 
 #[test]
-fn settings_survive_their_corpus() {
+fn settings_survive_their_seeds() {
     replay_all("settings", &[], settings::read);
 }
 
 #[test]
-fn merging_survives_its_corpus() {
+fn merging_survives_its_seeds() {
     replay_all("merge", &[], merge::read);
 }
