@@ -1,10 +1,7 @@
 //! Slow bodies and slow work. In most tests the clock is paused and advances only while all tasks
 //! wait.
 
-use std::{
-    num::NonZeroU64,
-    time::{Duration, Instant},
-};
+use std::{num::NonZeroU64, time::Duration};
 
 use axum::{
     body::{Body, Bytes},

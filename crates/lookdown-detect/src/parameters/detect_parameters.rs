@@ -188,10 +188,6 @@ parameter_table! {
 }
 
 /// The checked parameters of one detection request.
-#[expect(
-    clippy::struct_excessive_bools,
-    reason = "each is a parameter of the interface"
-)]
 #[derive(Debug, Clone, PartialEq)]
 pub struct DetectParameters {
     /// The calibration. Without one, the lens circle is detected in the frame.
