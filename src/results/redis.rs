@@ -12,12 +12,9 @@ mod keys;
 mod link;
 mod message;
 mod news;
-mod node;
-mod nodes;
 mod outbox;
 mod pushes;
 mod reading;
-mod reply_limit;
 mod sender;
 mod session;
 mod shared;
@@ -38,7 +35,6 @@ use self::{
     followed::Followed,
     keys::Keys,
     link::Link,
-    nodes::Nodes,
     outbox::Outbox,
     reading::Reader,
     shared::Shared,
@@ -51,11 +47,6 @@ use crate::{annotated_image::StoredFrame, metrics::Metrics, tls::TlsError};
 
 /// Longest time that the shutdown waits for reports that Redis has not stored yet.
 const LAST_WAIT: Duration = Duration::from_secs(2);
-/// Most bytes that a report in a reply takes in addition to its size in the store: names of fields,
-/// IDs, times and the memory of their values.
-const ENTRY_BYTES: usize = 1 << 10;
-/// Most bytes of an image with its sketch: twice the largest frame that is stored.
-const MAX_IMAGE_BYTES: usize = 8 << 20;
 
 /// Keeps reports in a Redis, within limits.
 pub struct RedisResults {
@@ -76,9 +67,8 @@ impl RedisResults {
     ) -> Result<Self, TlsError> {
         let shared = Arc::new(Shared {
             keys: Keys::new(&options.key_prefix, options.address.database()),
-            nodes: Nodes::default(),
             followed: Followed::default(),
-            connector: Connector::new(options.address.clone(), max_reply_bytes(&limits))?,
+            connector: Connector::new(options.address.clone())?,
             options,
             link: Link::new(metrics.results_store_up.clone()),
             outbox: Outbox::new(metrics.results_dropped.clone()),
@@ -110,11 +100,6 @@ impl RedisResults {
             outcome.unwrap_or_else(|_| Err(io::Error::from(io::ErrorKind::TimedOut).into()));
         self.shared.link.outcome(&line, outcome)
     }
-}
-
-/// Most bytes of a reply. The largest replies are all reports, or the image of a camera.
-fn max_reply_bytes(limits: &ResultLimits) -> u64 {
-    (limits.max_bytes + limits.max_reports.get() * ENTRY_BYTES + MAX_IMAGE_BYTES) as u64
 }
 
 #[async_trait]

@@ -38,9 +38,8 @@ settings! {
     #[derive(Debug, Clone)]
     pub(super) struct ResultKeys in "results" {
         /// The Redis in which several servers keep their reports (docs/results-api.md), as
-        /// `redis://user:password@host:6379/0`, or `rediss://` for TLS. Any node of a Redis Cluster
-        /// will do. Empty: reports are kept in memory. A URL with a password is better kept in the
-        /// variable than in a file.
+        /// `redis://user:password@host:6379/0`, or `rediss://` for TLS. Empty: reports are kept in
+        /// memory. A URL with a password is better kept in the variable than in a file.
         url: Option<SecretString> = None => secret("URL of a Redis");
         /// The prefix of all keys in that Redis. Servers with the same prefix share their reports.
         key_prefix: String = "lookdown".to_owned() => key_prefix();

@@ -23,8 +23,6 @@ class RedisServer:
         """
         (self.port,) = free_ports(1)
         self.host, self.password = host, password
-        self.bus_port = 0
-        """The port of the cluster bus, if it is a node of a cluster."""
         self._inside = inside
         self._options = options
         self._folder = Path(tempfile.mkdtemp(prefix="lookdown-redis-"))

@@ -1,4 +1,4 @@
-//! Opens connections to Redis, with bounds on the time and the size of every reply.
+//! Opens connections to Redis, with a bound on the time of every reply.
 
 use std::{io, time::Duration};
 
@@ -10,9 +10,7 @@ use tokio::{net::TcpStream, spawn, time::timeout};
 
 use super::{
     RedisAddress,
-    node::Node,
     pushes::{self, Pushes},
-    reply_limit::BoundedReplies,
 };
 use crate::tls::{ClientTls, TlsError};
 
@@ -21,12 +19,11 @@ pub(super) const TIMEOUT: Duration = Duration::from_secs(2);
 /// Most queries in flight on a connection, which bounds the memory of all replies together.
 const MAX_QUERIES: usize = 4;
 
-/// Opens connections to one Redis, or to the nodes of a Redis Cluster.
+/// Opens connections to a Redis.
 pub(super) struct Connector {
     address: RedisAddress,
     /// Present if the address asks for TLS.
     tls: Option<ClientTls>,
-    max_reply_bytes: u64,
 }
 
 impl Connector {
@@ -34,49 +31,30 @@ impl Connector {
     ///
     /// # Errors
     /// [`TlsError`] if TLS cannot be used.
-    pub(super) fn new(address: RedisAddress, max_reply_bytes: u64) -> Result<Self, TlsError> {
+    pub(super) fn new(address: RedisAddress) -> Result<Self, TlsError> {
         let tls = match address.client().get_connection_info().addr() {
             ConnectionAddr::TcpTls { .. } => Some(ClientTls::new("results.url", None)?),
             _ => None,
         };
-        Ok(Self {
-            address,
-            tls,
-            max_reply_bytes,
-        })
+        Ok(Self { address, tls })
     }
 
-    /// The host and port of the address.
-    pub(super) fn node(&self) -> Node {
-        match self.address.client().get_connection_info().addr() {
-            ConnectionAddr::Tcp(host, port) | ConnectionAddr::TcpTls { host, port, .. } => {
-                Node::new(host, *port)
-            }
-            // No address of this kind can be configured.
-            _ => Node::new("", 0),
-        }
-    }
-
-    /// Connects to a node and logs in.
-    pub(super) async fn connect(&self, node: &Node) -> RedisResult<MultiplexedConnection> {
-        self.open(node, ProtocolVersion::RESP2, AsyncConnectionConfig::new())
+    /// Connects and logs in.
+    pub(super) async fn connect(&self) -> RedisResult<MultiplexedConnection> {
+        self.open(ProtocolVersion::RESP2, AsyncConnectionConfig::new())
             .await
     }
 
-    /// Connects to a node for subscriptions, and logs in.
-    pub(super) async fn connect_for_pushes(
-        &self,
-        node: &Node,
-    ) -> RedisResult<(MultiplexedConnection, Pushes)> {
+    /// Connects for subscriptions, and logs in.
+    pub(super) async fn connect_for_pushes(&self) -> RedisResult<(MultiplexedConnection, Pushes)> {
         let (accept, pushes) = pushes::queue();
         let config = AsyncConnectionConfig::new().set_push_sender(accept);
-        let connection = self.open(node, ProtocolVersion::RESP3, config).await?;
+        let connection = self.open(ProtocolVersion::RESP3, config).await?;
         Ok((connection, pushes))
     }
 
     async fn open(
         &self,
-        node: &Node,
         protocol: ProtocolVersion,
         config: AsyncConnectionConfig,
     ) -> RedisResult<MultiplexedConnection> {
@@ -86,8 +64,8 @@ impl Connector {
         let login = self.address.client().get_connection_info().redis_settings();
         let login = login.clone().set_protocol(protocol);
         let opened = async {
-            let replies = BoundedReplies::new(self.stream(node).await?, self.max_reply_bytes);
-            MultiplexedConnection::new_with_config(&login, replies, config).await
+            let stream = self.stream().await?;
+            MultiplexedConnection::new_with_config(&login, stream, config).await
         };
         let opened = timeout(TIMEOUT, opened).await;
         let (connection, driver) =
@@ -97,8 +75,13 @@ impl Connector {
         Ok(connection)
     }
 
-    async fn stream(&self, node: &Node) -> io::Result<Box<dyn AsyncStream + Send + Unpin>> {
-        let Node { host, port } = node;
+    async fn stream(&self) -> io::Result<Box<dyn AsyncStream + Send + Unpin>> {
+        let (ConnectionAddr::Tcp(host, port) | ConnectionAddr::TcpTls { host, port, .. }) =
+            self.address.client().get_connection_info().addr()
+        else {
+            // No address of this kind can be configured.
+            return Err(io::ErrorKind::Unsupported.into());
+        };
         let stream = TcpStream::connect((host.as_str(), *port)).await?;
         stream.set_nodelay(true)?;
         Ok(match &self.tls {

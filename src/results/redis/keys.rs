@@ -1,5 +1,5 @@
-//! The keys and channels in Redis. All of an installation share one hash tag, so that a Redis
-//! Cluster has them in one hash slot, and a script can change all of them in one atomic step.
+//! The keys and channels in Redis. All of an installation share one hash tag, so that a managed
+//! endpoint in front of several nodes has them on one, where a script can change all of them.
 
 use crate::results::Cameras;
 

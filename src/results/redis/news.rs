@@ -3,11 +3,7 @@
 //! while there is no connection: the next one reads them from the camera's stream.
 
 use std::{
-    collections::{HashMap, HashSet},
-    convert::Infallible,
-    io, iter,
-    num::NonZeroUsize,
-    sync::Arc,
+    collections::HashMap, convert::Infallible, io, iter, num::NonZeroUsize, sync::Arc,
     time::Duration,
 };
 
@@ -47,16 +43,15 @@ pub(super) async fn follow(
         connection,
         positions,
         channels: HashMap::new(),
-        ending: HashSet::new(),
     };
     let ended = pushes.ended();
     let follow = async {
         loop {
             tokio::select! {
                 push = pushes.next() => {
-                    news.publish(push.ok_or_else(lost)?)?;
+                    news.publish(push.ok_or_else(lost)?);
                     for push in iter::from_fn(|| pushes.waiting()).take(BATCH) {
-                        news.publish(push)?;
+                        news.publish(push);
                     }
                     batches.tick().await;
                 }
@@ -77,25 +72,18 @@ struct News<'a> {
     connection: MultiplexedConnection,
     positions: &'a mut Positions,
     channels: HashMap<String, Cameras>,
-    /// The channels whose subscription ends at the request of this server.
-    ending: HashSet<String>,
 }
 
 impl News<'_> {
     /// Publishes a report that Redis has pushed.
-    fn publish(&mut self, push: PushInfo) -> RedisResult<()> {
+    fn publish(&mut self, push: PushInfo) {
         let mut data = push.data.into_iter();
         let Some(Value::BulkString(channel)) = data.next() else {
-            return Ok(());
+            return;
         };
         let channel = String::from_utf8_lossy(&channel);
-        if push.kind == PushKind::SUnsubscribe {
-            // Otherwise another node serves the slot now.
-            let is_expected = self.ending.remove(&*channel);
-            return is_expected.then_some(()).ok_or_else(lost);
-        }
         let Some(cameras) = self.channels.get(&*channel) else {
-            return Ok(());
+            return;
         };
         if let (PushKind::SMessage, Some(Value::BulkString(report))) = (push.kind, data.next()) {
             let report = message::parse(report).map(Arc::new);
@@ -106,7 +94,6 @@ impl News<'_> {
                 self.shared.listeners.publish_to(cameras, &report);
             }
         }
-        Ok(())
     }
 
     /// Subscribes to the channels of cameras that have their first listener.
@@ -160,8 +147,8 @@ impl News<'_> {
         Ok(())
     }
 
-    /// Checks that Redis answers and still serves the slot, and unsubscribes from channels without
-    /// listeners. They are kept until then, as a client that polls comes back soon.
+    /// Checks that Redis answers, and unsubscribes from channels without listeners. They are kept
+    /// until then, as a client that polls comes back soon.
     async fn check(&mut self) -> RedisResult<()> {
         self.reader().newest().await?;
         self.unsubscribe().await?;
@@ -183,7 +170,6 @@ impl News<'_> {
             commands.cmd("SUNSUBSCRIBE").arg(&channel).ignore();
             self.channels.remove(&channel);
             self.positions.remove(&cameras);
-            self.ending.insert(channel);
         }
         if commands.is_empty() {
             return Ok(());

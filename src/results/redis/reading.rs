@@ -256,7 +256,7 @@ impl Reader<'_> {
     }
 }
 
-/// A pipeline whose replies are one reply, so that the limit of one holds for all of them.
+/// A pipeline whose commands Redis runs in one atomic step.
 fn atomic() -> Pipeline {
     let mut pipeline = pipe();
     pipeline.atomic();

@@ -10,6 +10,7 @@ use super::{
     Shared,
     news::{self, Positions},
     pushes::Pushes,
+    reading::Reader,
 };
 use crate::results::ReportId;
 
@@ -72,13 +73,14 @@ pub(super) async fn keep(shared: Arc<Shared>) {
 }
 
 async fn open(shared: &Shared) -> RedisResult<Session> {
-    let serving = shared
-        .nodes
-        .connect(&shared.connector, &shared.keys)
-        .await?;
+    let commands = shared.connector.connect().await?;
+    let mut reader = Reader {
+        connection: commands.clone(),
+        keys: &shared.keys,
+    };
     Ok(Session {
-        news: shared.connector.connect_for_pushes(&serving.node).await?,
-        commands: serving.connection,
-        newest: serving.newest,
+        newest: reader.newest().await?,
+        news: shared.connector.connect_for_pushes().await?,
+        commands,
     })
 }

@@ -3,8 +3,7 @@
 use std::sync::Arc;
 
 use super::{
-    RedisAddress, connect::Connector, followed::Followed, keys::Keys, link::Link, nodes::Nodes,
-    outbox::Outbox,
+    RedisAddress, connect::Connector, followed::Followed, keys::Keys, link::Link, outbox::Outbox,
 };
 use crate::{
     metrics::IntCounter,
@@ -24,7 +23,6 @@ pub struct RedisOptions {
 pub(super) struct Shared {
     pub(super) options: RedisOptions,
     pub(super) connector: Connector,
-    pub(super) nodes: Nodes,
     pub(super) limits: ResultLimits,
     pub(super) keys: Keys,
     pub(super) link: Link,
