@@ -105,7 +105,7 @@ function stateOf(info) {
   if (!info) return "";
   if (info.paused) return "Paused: no frames are read.";
   if (info.problem) return `No frames: ${info.problem}`;
-  return info.warning ?? "";
+  return info.warning ?? info.choice ?? "";
 }
 
 function managing(card) {

@@ -18,10 +18,11 @@ pub(super) struct CameraFlags {
     /// The ID of a calibration of the server
     #[arg(long, value_name = "ID")]
     calibration: Option<String>,
-    /// The profile [default: that of the server]
+    /// The profile [default: that of the server, or fast where searches take too long]
     #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Profile::VARIANTS))]
     profile: Option<String>,
-    /// The interval between two frames, such as 500ms or 2s [default: 1s]
+    /// The interval between two frames, such as 500ms or 2s [default: 1s; RTSP: 200ms where
+    /// searches are short enough]
     #[arg(long, value_name = "DURATION")]
     every: Option<String>,
     /// Skip views without motion [default: true]

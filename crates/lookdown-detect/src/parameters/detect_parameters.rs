@@ -145,10 +145,11 @@ parameter_table! {
         name: "follow",
         kind: ParameterKind::Switch,
         default: ParameterDefault::Value("false"),
-        help: "Searches the whole frame about once a second, less often where a search takes more than \
-               0.3 s, and when something moves where no person was. In the frames between, the \
-               detector sees only crops at the places where the persons of this camera are expected, \
-               and those without motion stay as they were. With `motion`, a frame in which nothing has \
+        help: "Searches the whole frame about once a second, when something moves where no person was, \
+               and when a crop loses a person. In the frames between, the detector sees only crops at \
+               the places where the persons of this camera are expected, and those without motion stay \
+               as they were. A frame is also searched if so much time has passed that people may have \
+               walked out of the crops: after 0.4 s, or 0.6 s where their motion is known. With `motion`, a frame in which nothing has \
                moved since the search is not searched for 10 s. Needs `camera` or `calibration`; up to \
                256 cameras are followed.",
         example: None,
