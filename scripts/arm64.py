@@ -13,11 +13,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from assets.archives import extract
-from assets.downloads import fetch_wheel
-from assets.pins import read_pins
-from assets.places import Places
-from assets.steps import LIBRARY
+from assets.runtime import LIBRARY, install_runtime, pinned_runtime
 from dist import make_dist
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -42,7 +38,7 @@ def main(arguments: list[str]) -> int:
     """The exit status."""
     subprocess.run([ROOT / "scripts" / "packages.sh", *PACKAGES], check=True)
     install_rust_library()
-    install_runtime()
+    install_runtime(pinned_runtime(CPU), OWN / "runtime", ROOT / ".setup" / "downloads")
     wanted = arguments or ["build", "test", "pack"]
     if "build" in wanted:
         cargo("build", "--release", "--bin", "lookdown")
@@ -52,7 +48,7 @@ def main(arguments: list[str]) -> int:
         cargo("test", "--release", "--lib", *packages)
         detect_in_sample()
     if "pack" in wanted:
-        make_dist(PROGRAM, CPU, OWN, EMULATOR)
+        make_dist(PROGRAM, CPU, OWN / "runtime", EMULATOR)
     return 0
 
 
@@ -76,17 +72,6 @@ def install_rust_library() -> None:
     done.touch()
 
 
-def install_runtime() -> None:
-    """Puts ONNX Runtime for arm64 into .setup/arm64/runtime."""
-    places, runtime = Places(ROOT), read_pins(ROOT / "scripts" / "pins.toml").runtime[CPU]
-    with places.locked(), places.temporary() as folder:
-        wheel = fetch_wheel(places, runtime, "arm64")
-        for member, file in zip(runtime.members, extract(wheel, runtime.members, folder), strict=True):
-            target = OWN / member.to
-            target.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(file, target)
-
-
 def cargo(command: str, *arguments: str) -> None:
     """Runs cargo for arm64 with Debian's compiler; tests run in the emulator."""
     prefix = f"CARGO_TARGET_{TARGET.upper().replace('-', '_')}"
@@ -102,7 +87,7 @@ def cargo(command: str, *arguments: str) -> None:
 
 def detect_in_sample() -> None:
     """Detects the persons of the sample in the emulator."""
-    environment = os.environ | {"LOOKDOWN__INFERENCE__LIBRARY_PATH": str(OWN / LIBRARY)}
+    environment = os.environ | {"LOOKDOWN__INFERENCE__LIBRARY_PATH": str(OWN / "runtime" / LIBRARY)}
     command = [*HIDE_CPU, *EMULATOR, PROGRAM, "detect", SAMPLE]
     report = subprocess.run(command, cwd=ROOT, env=environment, check=True, stdout=subprocess.PIPE).stdout
     found = len(json.loads(report)["persons"])

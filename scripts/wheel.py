@@ -1,4 +1,4 @@
-"""Builds the Python wheel: `wheel.py [PROFILE]`, after the set-up with the steps `model` and `wheel`.
+"""Builds the Python wheel: `wheel.py [PROFILE]`, after the step `wheel` of the set-up.
 
 `PROFILE` is one of Cargo.toml, by default `release`, into target/wheels. Any other one is for tests, and its wheel goes
 into target/PROFILE/wheels. The wheel has the default models inside and takes ONNX Runtime from its own package. It is
@@ -11,8 +11,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from assets.pins import read_pins
-from dist import ROOT, default_model_files
+from dist import ROOT, model_files
 
 CRATE = ROOT / "crates" / "lookdown-python"
 TOOLS = ROOT / ".setup" / "wheel" / "bin"
@@ -41,11 +40,9 @@ def main(profile: str = "release") -> int:
 
 
 def collect_models(package: Path) -> None:
-    """Copies the default models with their manifests and licenses into the package."""
+    """Copies our networks with their manifests and license into the package."""
     shutil.rmtree(package / "models", ignore_errors=True)
-    for source, name in default_model_files(ROOT, read_pins(ROOT / "scripts" / "pins.toml")):
-        if not source.is_file():
-            sys.exit(f"{source} is missing; run `make setup` first.")
+    for source, name in model_files(ROOT):
         (package / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(source, package / name)
 

@@ -176,9 +176,6 @@ impl App {
         } = assembly;
         settings.access.check_exposure(settings.server.listen)?;
         let keys = open_keys(&settings.access)?;
-        if let Some(int8) = engine.default_models().int8() {
-            tracing::info!("inference.precision: {}", int8.description());
-        }
         if settings.detect.follow() {
             tracing::info!(
                 "detect.follow: persons are followed between searches of the whole frame"
@@ -274,11 +271,7 @@ impl App {
 }
 
 fn models_to_load(defaults: &DefaultModels, also: &[String]) -> Vec<String> {
-    let mut names: Vec<_> = defaults
-        .names()
-        .into_iter()
-        .map(ToOwned::to_owned)
-        .collect();
+    let mut names: Vec<_> = defaults.names().map(ToOwned::to_owned).collect();
     for name in also {
         if !names.contains(name) {
             names.push(name.clone());

@@ -1,6 +1,6 @@
 """Detects persons in four quarter-turn tiles of each frame of a data set, and writes COCO results.
 
-    python lab/training/gate.py --data DATASET --model models/nanodet_g_416/model.onnx --out before.json
+    python lab/training/gate.py --data DATASET --model WORK/nanodet.onnx --out before.json
     python lab/training/gate.py --data DATASET --model WORK/runs/first/averaged.onnx --out after.json
     lookdown eval DATASET --from-detections before.json
     lookdown eval DATASET --from-detections after.json

@@ -70,7 +70,9 @@ class Network(nn.Module):
             elif kind in ("Add", "Concat", "LeakyRelu"):
                 self.steps.append((kind, inputs, out, attributes.get("alpha")))
             else:
-                raise ValueError(f"{path}: operation {kind} is not one of NanoDet-g's; give the model nanodet_g_416")
+                raise ValueError(
+                    f"{path}: operation {kind} is not one of NanoDet-g's; give the file of lab/training/networks/nanodet.py"
+                )
         self.steps = _fused(self.steps)
         self.last_use = {name: k for k, step in enumerate(self.steps) for name in step[1]}
 

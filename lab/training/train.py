@@ -1,6 +1,6 @@
 """Tunes NanoDet-g on a pool of samples (pool.py), averages with the given weights, and exports ONNX.
 
-    python lab/training/train.py --pool WORK/pools/views --model models/nanodet_g_416/model.onnx --out WORK/runs/first --minutes 60
+    python lab/training/train.py --pool WORK/pools/views --model WORK/nanodet.onnx --out WORK/runs/first --minutes 60
 
 With `--hold`, the network keeps its first answers within persons and learns from all other cells that they are negatives.
 
@@ -25,7 +25,7 @@ from network import Network, averaged, boxes_of, export
 def options_of():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--pool", type=Path, required=True, action="append")
-    parser.add_argument("--model", type=Path, required=True, help="the ONNX file of nanodet_g_416")
+    parser.add_argument("--model", type=Path, required=True, help="the ONNX file of NanoDet-g: README.md")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--minutes", type=float, default=60)
     parser.add_argument("--steps", type=int, help="ends after so many steps where that is sooner")

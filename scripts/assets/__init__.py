@@ -1,1 +1,1 @@
-"""Downloads ONNX Runtime and the models: pinned, checked, resumable, inside the repository."""
+"""The set-up: ONNX Runtime, pinned and checked, and environments for checks and tests, inside the repository."""

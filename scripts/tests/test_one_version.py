@@ -4,7 +4,7 @@ import re
 import tomllib
 import unittest
 
-from assets.pins import read_pins
+from assets.runtime import pinned_runtime
 from dist import ROOT
 
 OWN = ("docker/Dockerfile", "docker/Dockerfile.cuda", "docker/compose.yaml", "k8s/base/kustomization.yaml")
@@ -20,7 +20,7 @@ class OneVersion(unittest.TestCase):
 
     def test_the_image_for_gpus_has_the_onnx_runtime_of_the_other(self):
         text = (ROOT / "docker" / "Dockerfile.cuda").read_text(encoding="utf-8")
-        versions = {runtime.archive.version for runtime in read_pins(ROOT / "scripts" / "pins.toml").runtime.values()}
+        versions = {pinned_runtime("x86_64").version}
         self.assertEqual({*re.findall(r"onnxruntime-gpu==([\d.]+)", text)}, versions)
         self.assertEqual({*re.findall(r"libonnxruntime\.so\.([\d.]+\d)", text)}, versions)
 

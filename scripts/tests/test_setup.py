@@ -1,4 +1,4 @@
-"""The set-up as a whole: refusals, and a complete repository, which needs no client."""
+"""The set-up as a whole: what stops it."""
 
 import contextlib
 import io
@@ -9,14 +9,6 @@ from unittest import mock
 import setup
 from assets import main
 from assets.console import SetupError
-from assets.pins import Archive, Derived, Pins, Runtime
-from assets.steps import install_derived, install_model, install_runtime
-
-from .support import InEmptyRepository, archive_of, member, model_of, sha256
-
-LIBRARY = member("lib.so", b"library", to="runtime/libonnxruntime.so")
-LICENCE = member("LICENSE", b"licence", to="models/net/LICENSE-weights")
-WEIGHTS = member("weights", b"weights")
 
 
 class OldPython(unittest.TestCase):
@@ -31,49 +23,7 @@ class OldPython(unittest.TestCase):
             self.assertNotIn(too_new, source)
 
 
-class SecondRun(InEmptyRepository):
-    def test_nothing_is_fetched_when_everything_is_in_place(self):
-        for file, content in ((LIBRARY.to, b"library"), (LICENCE.to, b"licence"), ("models/net/model.onnx", b"onnx")):
-            self.write(file, content)
-        runtime = Runtime(Archive("r", "1", "r.whl", 1, "0" * 64), (LIBRARY,), "any", "3.11")
-        model = model_of(Archive("m", "1", "m.tgz", 1, "0" * 64), (LICENCE, WEIGHTS), b"onnx")
-        with mock.patch("subprocess.Popen", side_effect=AssertionError("a program was started")):
-            install_runtime(self.places, runtime)
-            install_model(self.places, model, Pins({}, (model,), (), (), (), (), ()))
-        self.assertIn("ONNX Runtime 1 is in place", self.printed.getvalue())
-        self.assertIn("net is in place", self.printed.getvalue())
-
-
-class Installing(InEmptyRepository):
-    def test_caution_is_printed_before_the_download(self):
-        model = model_of(archive_of(b""), (WEIGHTS,), b"onnx", caution="its license is not stated")
-        self.enterContext(mock.patch("assets.steps.fetch_package", side_effect=SetupError("No network.")))
-        with self.assertRaisesRegex(SetupError, "No network"):
-            install_model(self.places, model, Pins({}, (model,), (), (), (), (), ()))
-        self.assertIn("note on net: its license is not stated", self.printed.getvalue())
-
-    def test_an_int8_form_brings_the_model_it_is_made_from(self):
-        model = model_of(archive_of(b""), (WEIGHTS,), b"onnx")
-        form = Derived("net_int8", model, "convert.quantise", "activation_ranges.json", sha256(b"int8"), default=False)
-        self.enterContext(mock.patch("assets.steps.PrivatePython"))
-        install = self.enterContext(mock.patch("assets.steps.install_model"))
-
-        def quantise(_step, command, **_how):
-            module, source, result, ranges = command[2:]
-            self.assertEqual(module, "convert.quantise")
-            self.assertEqual(Path(source), self.places.root / "models/net/model.onnx")
-            self.assertEqual(Path(ranges), self.places.root / "models/net_int8/activation_ranges.json")
-            Path(result).write_bytes(b"int8")
-
-        self.enterContext(mock.patch("assets.steps.run", side_effect=quantise))
-        self.write("models/net_int8/activation_ranges.json", b"{}")
-        pins = Pins({}, (model,), (form,), (), (), (), ())
-        install_derived(self.places, form, pins)
-        install.assert_called_once_with(self.places, model, pins)
-        self.assertEqual((self.places.root / "models/net_int8/model.onnx").read_bytes(), b"int8")
-
-
-class Stopping(InEmptyRepository):
+class Stopping(unittest.TestCase):
     def stopped_by(self, cause: BaseException) -> tuple[int, str]:
         errors = io.StringIO()
         with mock.patch.object(main, "_set_up", side_effect=cause), contextlib.redirect_stderr(errors):
@@ -97,24 +47,4 @@ class Stopping(InEmptyRepository):
         errors = io.StringIO()
         with contextlib.redirect_stderr(errors):
             self.assertEqual(main.main(["everything"]), 2)
-        self.assertIn("toolchain, runtime, model, models", errors.getvalue())
-        self.assertIn("ssdlite_mobilenet_v2", errors.getvalue())
-
-
-class Choosing(unittest.TestCase):
-    def chosen(self, *arguments: str) -> list[str]:
-        archive = Archive("m", "1", "m.tgz", 1, "0" * 64)
-        models = tuple(model_of(archive, (), b"", name=name, default=name == "a") for name in ("a", "b", "c"))
-        return [model.name for model in main.chosen_models(models, list(arguments))]
-
-    def test_without_a_name_the_default_models_are_chosen(self):
-        self.assertEqual(self.chosen("toolchain", "runtime", "model"), ["a"])
-
-    def test_named_models_are_chosen_instead_of_the_default_ones(self):
-        self.assertEqual(self.chosen("model", "c", "b"), ["b", "c"])
-
-    def test_every_model_can_be_asked_for(self):
-        self.assertEqual(self.chosen("models"), ["a", "b", "c"])
-
-    def test_other_steps_choose_no_model(self):
-        self.assertEqual(self.chosen("runtime"), [])
+        self.assertIn("toolchain, runtime, models", errors.getvalue())

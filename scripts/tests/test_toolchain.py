@@ -9,20 +9,20 @@ from assets.console import SetupError
 from assets.toolchain import check_toolchain
 from dist import ROOT
 
-from .support import InEmptyRepository
+from .support import InEmptyFolder
 
 
-class Toolchain(InEmptyRepository):
+class Toolchain(InEmptyFolder):
     def setUp(self):
         super().setUp()
         self.write("Cargo.toml", b'[workspace.package]\nrust-version = "1.92"\n')
-        self.enterContext(mock.patch.dict("os.environ", {"PATH": str(self.places.root / "bin")}, clear=True))
+        self.enterContext(mock.patch.dict("os.environ", {"PATH": str(self.folder / "bin")}, clear=True))
 
     def check_with(self, *programs: str, rust: str = "rustc 1.95.0 (abc 2026-01-01)"):
         for program in programs:
             file = self.write(f"bin/{program}", f"#!/bin/sh\necho '{rust}'\n".encode())
             file.chmod(0o755)
-        check_toolchain(self.places.root)
+        check_toolchain(self.folder)
 
     def test_a_complete_toolchain_passes(self):
         self.check_with("cargo", "rustc", "cc")

@@ -5,18 +5,14 @@ use std::{path::Path, sync::Arc};
 use anyhow::anyhow;
 use lookdown_detect::{
     inference::{
-        CandidateOptions, Int8Use, Model, ModelFolder, ModelLoader, ModelManifest, ModelRepository,
-        OnnxOptions, RemoteDetector, RemoteOptions, RemoteServer, RepositoryOptions, is_fetched,
-        onnx_loader,
+        CandidateOptions, Model, ModelFolder, ModelLoader, ModelManifest, ModelRepository,
+        OnnxOptions, RemoteDetector, RemoteOptions, RemoteServer, RepositoryOptions, onnx_loader,
     },
-    metrics::{DetectMetrics, replace_info},
-    parameters::Profile,
+    metrics::DetectMetrics,
     pipeline::DefaultModels,
 };
 
-use crate::settings::{
-    InferenceSettings, RemoteSettings, Settings, SettingsError, explain, is_installed,
-};
+use crate::settings::{RemoteSettings, Settings, SettingsError, explain, is_installed};
 
 /// Opens the repository without loading a model. Also returns the default models.
 ///
@@ -41,10 +37,10 @@ pub(super) fn open(
         None => None,
     };
     let defaults = match &elsewhere {
-        Some((name, _)) => DefaultModels::One(name.clone()),
-        None => per_profile(&path, &settings.inference, metrics),
+        Some((name, _)) => DefaultModels::one(name.clone()),
+        None => DefaultModels::for_device(settings.inference.device),
     };
-    let called = defaults.of(Profile::default()).to_owned();
+    let called = defaults.model().to_owned();
     let options = RepositoryOptions {
         folder: ModelFolder { path, elsewhere },
         warm_up_views: settings.threads.batch_views,
@@ -126,21 +122,4 @@ fn candidate_options(settings: &Settings) -> CandidateOptions {
         score_floor: settings.inference.score_floor,
         max_detections_per_view: settings.inference.max_detections_per_view.get(),
     }
-}
-
-/// Selects the model of each profile, and publishes the precision.
-fn per_profile(
-    folder: &Path,
-    inference: &InferenceSettings,
-    metrics: &DetectMetrics,
-) -> DefaultModels {
-    let int8 = Int8Use::on(inference.device, inference.precision);
-    replace_info(&metrics.precision_info, None, &[int8.name()]);
-    let defaults = DefaultModels::per_profile(int8, |name| is_fetched(&folder.join(name)));
-    if let DefaultModels::PerProfile { missing, .. } = &defaults {
-        for name in missing {
-            tracing::warn!("{name} is missing, so another model is used: run `make setup`");
-        }
-    }
-    defaults
 }

@@ -21,7 +21,6 @@ use self::output::Output;
 pub(super) use self::{
     arguments::{Arguments, DEFAULT_SCORE_THRESHOLD},
     detect_group::detect_group,
-    truth::TruthFlags,
 };
 use crate::app::engine_for;
 

@@ -2,10 +2,9 @@
 
 mod check;
 mod description;
-mod fetch;
+mod list;
 mod manifest;
 mod sample;
-mod tune;
 
 use std::process::ExitCode;
 
@@ -20,18 +19,12 @@ pub(super) enum Command {
     Check(check::Arguments),
     /// List the models of the repository: name, size of the weights or `missing`, license
     List(SettingsFile),
-    /// Fetch, verify and install the weights of a model of the repository
-    Fetch(fetch::Arguments),
-    /// Measure the constants of the profiles that fit a model, and write them into its model.toml
-    Tune(tune::Arguments),
 }
 
 /// Runs the subcommand.
 pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
     match command {
         Command::Check(arguments) => check::run(arguments),
-        Command::List(settings_file) => fetch::list(settings_file),
-        Command::Fetch(arguments) => fetch::run(arguments),
-        Command::Tune(arguments) => tune::run(arguments),
+        Command::List(settings_file) => list::run(settings_file),
     }
 }

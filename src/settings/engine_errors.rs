@@ -14,14 +14,12 @@ pub fn explain(error: &InferenceError) -> String {
         }
         InferenceError::NoDevice { .. } => format!("inference.device: {error}"),
         InferenceError::Unreadable { .. } => format!(
-            "{error}; `make setup` fetches the default models, `make models` or `lookdown model \
-             fetch` the others"
+            "{error}; the repository has the default models, and `make models` fetches others"
         ),
         InferenceError::NoManifest { network, .. } => format!(
             "{error}: write it with `lookdown model check --write-manifest {}`",
             network.display()
         ),
-        InferenceError::DamagedRecord { .. } => format!("{error} with `lookdown model fetch`"),
         InferenceError::Remote { .. } | InferenceError::RemoteModel { .. } => {
             format!("inference.url: {error}")
         }
@@ -99,14 +97,6 @@ mod tests {
                     "model: /here ",
                     "/own/network.onnx: write it ",
                     "`lookdown model check --write-manifest /own/network.onnx`",
-                ],
-            ),
-            (
-                InferenceError::DamagedRecord { path: path() },
-                [
-                    "model: /here ",
-                    "64 hexadecimal digits",
-                    "`lookdown model fetch`",
                 ],
             ),
             (

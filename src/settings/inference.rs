@@ -2,12 +2,12 @@
 
 use std::{num::NonZeroUsize, path::PathBuf, time::Duration};
 
-use lookdown_detect::inference::{CandidateOptions, Device, PrecisionChoice, UnknownDevice};
+use lookdown_detect::inference::{CandidateOptions, Device, UnknownDevice};
 
 use super::{
     SettingsError,
     declare::settings,
-    form::{Form, Refusal, choice, count, millis, parsed, path, share},
+    form::{Form, Refusal, count, millis, parsed, path, share},
     locate::{DEFAULT_LIBRARY, locate},
 };
 
@@ -31,15 +31,6 @@ settings! {
         /// package `onnxruntime-gpu` or `onnxruntime-openvino`. `tensorrt`, `openvino:gpu` and
         /// `openvino:npu` are experimental: they have not been tested.
         device: Device = Device::Cpu => device();
-        /// The precision of the default models on the CPU. `auto`: 8-bit integers for upright
-        /// crops and all profiles, for `balanced` and `quality` only if the CPU has instructions
-        /// for them (VNNI, or `dotprod` on arm64). `int8`: for all on any CPU. Other devices use
-        /// `fp32`.
-        precision: PrecisionChoice = PrecisionChoice::Auto => choice(&[
-            ("auto", PrecisionChoice::Auto),
-            ("int8", PrecisionChoice::Int8),
-            ("fp32", PrecisionChoice::Fp32),
-        ]);
         /// The least score of a candidate. Candidates below it are dropped first of all.
         score_floor: f64 = CandidateOptions::DEFAULT.score_floor => share();
         /// The most candidates kept of one view, best first.

@@ -62,7 +62,7 @@ impl ModelSettings {
                 key: "model.repository",
                 what: "folder of models",
                 path: self.repository.clone(),
-                remedy: "run `make setup`, or set LOOKDOWN__MODEL__REPOSITORY to another"
+                remedy: "set LOOKDOWN__MODEL__REPOSITORY to the folder `models` of the repository"
                     .to_owned(),
             }),
         }

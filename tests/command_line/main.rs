@@ -17,7 +17,6 @@ mod serve;
 mod shell;
 mod systemd;
 mod telemetry;
-mod tuning;
 
 use std::{
     io::{BufRead, BufReader},

@@ -30,9 +30,7 @@ fn a_library_in_the_current_folder_is_not_loaded() {
     let folder = tempdir().unwrap();
     let program = install(&folder.path().join("installed"));
     plant(folder.path());
-    let model = folder
-        .path()
-        .join("installed/models/nanodet_g_views_416_int8");
+    let model = folder.path().join("installed/models/nanodet_g_views_416");
     let output = Command::new(&program)
         .args(["model", "check", model.to_str().unwrap()])
         .current_dir(folder.path())
@@ -79,7 +77,7 @@ fn a_program_without_files_does_not_take_planted_ones() {
 fn a_model_from_elsewhere_without_a_sum_gets_a_warning() {
     let folder = tempdir().unwrap();
     let model = folder.path().join("model.onnx");
-    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/nanodet_g_views_416_int8");
+    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/nanodet_g_views_416");
     fs::copy(shipped.join("model.onnx"), &model).unwrap();
     let detect = |model: &Path| {
         let sample = concat!(env!("CARGO_MANIFEST_DIR"), "/samples/office.jpg");

@@ -5,7 +5,6 @@ use std::{path::Path, process::Command, sync::Arc};
 use lookdown_detect::{
     Detector, DetectorOptions,
     imaging::decode::{DecodeLimits, decode},
-    inference::cpu_has_integer_dot_product,
     parameters::DetectParameters,
 };
 use lookdown_lens::calibration::Calibration;
@@ -167,34 +166,18 @@ fn report_names_the_models_of_views_and_crops() {
         })
     };
     let some = |name: &str| Some(name.to_owned());
-    // The CPU decides on INT8 for `balanced` and `quality`.
-    let expected = if cpu_has_integer_dot_product() {
-        "nanodet_g_views_416_int8"
-    } else {
-        "nanodet_g_views_416"
-    };
-    for profile in ["balanced", "quality"] {
-        let report = detect("office", &["--profile", profile]);
-        assert_eq!(
-            names(&report),
-            [some(expected), some("nanodet_g_fisheye_416_int8")]
-        );
-    }
+    let (views, crops) = (some("nanodet_g_views_416"), some("nanodet_g_fisheye_416"));
     let fast = detect("office", &["--profile", "fast"]);
-    assert_eq!(
-        names(&fast),
-        [
-            some("nanodet_g_views_416_int8"),
-            some("nanodet_g_fisheye_416_int8")
-        ]
-    );
+    assert_eq!(names(&fast), [views.clone(), crops]);
+    let direct = detect("office", &["--profile", "direct"]);
+    assert_eq!(names(&direct), [views, None]);
 }
 
 #[test]
 fn named_model_processes_the_crops_as_well() {
     let report = detect(
         "office",
-        &["--profile", "fast", "--model", "nanodet_g_views_416_int8"],
+        &["--profile", "fast", "--model", "nanodet_g_views_416"],
     );
     assert!(report.get("crop_model").is_none());
 }

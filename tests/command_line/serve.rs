@@ -117,7 +117,7 @@ fn every_invalid_setting_ends_the_start_with_a_sentence() {
         (
             "MODEL__REPOSITORY",
             "/nowhere",
-            &["model.repository", "make setup"],
+            &["model.repository", "LOOKDOWN__MODEL__REPOSITORY"],
         ),
         ("MODEL__ALSO_LOAD", "no_such_model", &["no_such_model"]),
     ];
@@ -160,7 +160,7 @@ fn a_check_reports_models_and_access_and_serves_no_client() {
         open.starts_with(&format!("ready to serve on {listen}: ")),
         "{open}"
     );
-    assert!(open.contains("ssdlite_mobilenet_v2"), "{open}");
+    assert!(open.contains("nanodet_g_views_416"), "{open}");
     assert!(open.contains("access: open, without API keys"), "{open}");
     let keys = format!(
         "gate:detect+read:{:064},alarm:detect:{:064}:1,batch:admin:{:064}:8,dash:read:{:064}",
@@ -437,7 +437,7 @@ fn the_process_may_open_as_many_files_as_its_hard_limit() {
 #[test]
 fn lack_of_file_descriptors_is_logged_once_and_recovered_from() {
     // With a single model, a ready server opens no more files.
-    let model = ("LOOKDOWN__MODEL__PATH", "models/ssdlite_mobilenet_v2");
+    let model = ("LOOKDOWN__MODEL__PATH", "models/nanodet_g_views_416");
     let mut server = Server::start("ulimit -n 64", &[NO_GRACE, model]);
     let held: Vec<_> = (0..100).map(|_| server.connect()).collect();
     let complaint = "connections cannot be accepted";

@@ -85,8 +85,7 @@ class Page(unittest.TestCase):
             keys.write_text(
                 f'page = {{ scopes = ["detect", "read", "admin"], sha256 = "{digest}" }}\n', encoding="utf-8"
             )
-            # The same persons on every CPU.
-            settings = {"RESULTS__IMAGES": CAMERAS_WITH_IMAGES, "INFERENCE__PRECISION": "int8"}
+            settings = {"RESULTS__IMAGES": CAMERAS_WITH_IMAGES}
             with lookdown(settings, calibrations=calibrations) as server:
                 with (
                     lookdown({"ACCESS__KEYS_FILE": str(keys)}) as keyed,

@@ -6,7 +6,10 @@ use lookdown_detect::inference::CandidateOptions;
 
 #[test]
 fn nanodet_decodes_as_many_cells_as_a_view_has_candidates() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scripts/convert/nanodet.py");
+    let path = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/lab/training/networks/nanodet.py"
+    );
     let cells = CandidateOptions::DEFAULT.max_detections_per_view;
     let declaration = format!("\nBEST_CELLS = {cells}\n");
     assert!(

@@ -19,7 +19,7 @@ pub const MAX_REPORT_BYTES: u64 = 8 << 20;
     "calibration": {"id": "lobby", "revision": "9f86d081884c", "assumed": false},
     "image": {"width": 1680, "height": 1680},
     "model": {"name": "nanodet_g_views_416", "revision": "533d5d09acd0"},
-    "crop_model": {"name": "nanodet_g_fisheye_416_int8", "revision": "ee6466ba3497"},
+    "crop_model": {"name": "nanodet_g_fisheye_416", "revision": "ee6466ba3497"},
     "profile": "quality",
     "refinement": {
         "name": "fusion", "score_threshold": 0.3, "iou_threshold": 0.5, "sigma": 0.3,

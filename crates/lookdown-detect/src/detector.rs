@@ -8,8 +8,8 @@ use parking_lot::Mutex;
 use crate::{
     imaging::Frame,
     inference::{
-        CandidateOptions, Device, Int8Use, ModelFolder, ModelRepository, OnnxOptions,
-        PrecisionChoice, RepositoryError, RepositoryOptions, is_fetched, onnx_loader,
+        CandidateOptions, Device, ModelFolder, ModelRepository, OnnxOptions, RepositoryError,
+        RepositoryOptions, onnx_loader,
     },
     metrics::DetectMetrics,
     parameters::DetectParameters,
@@ -20,7 +20,7 @@ use crate::{
 
 /// The library of ONNX Runtime that `make setup` fetches.
 pub const DEFAULT_ONNX_RUNTIME: &str = "runtime/libonnxruntime.so";
-/// The folder of the models that `make setup` fetches.
+/// The folder of the models in the repository.
 pub const DEFAULT_MODELS: &str = "models";
 
 /// The options of a [`Detector`].
@@ -77,9 +77,7 @@ impl Detector {
     /// # Errors
     /// [`DetectorError::Threads`].
     pub fn new(options: &DetectorOptions) -> Result<Self, DetectorError> {
-        let fetched = |name: &str| is_fetched(&options.models.join(name));
-        let int8 = Int8Use::on(options.device, PrecisionChoice::Auto);
-        let default_models = DefaultModels::per_profile(int8, fetched);
+        let default_models = DefaultModels::for_device(options.device);
         let metrics = Arc::<DetectMetrics>::default();
         let onnx = OnnxOptions {
             device: options.device,

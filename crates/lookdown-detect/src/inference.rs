@@ -1,9 +1,8 @@
-//! Person detectors: boxes with scores from rendered views, and the choice of INT8 or FP32.
+//! Person detectors: boxes with scores from rendered views.
 
 mod detector;
 mod device;
 mod error;
-mod fetch;
 mod guess;
 mod head_output;
 pub mod heads;
@@ -11,7 +10,6 @@ mod manifest;
 mod model;
 mod onnx;
 mod onnx_file;
-mod precision;
 mod registry;
 mod remote;
 mod repository;
@@ -21,17 +19,12 @@ mod staging;
 pub use detector::Detector;
 pub use device::{Device, OpenVinoDevice, UnknownDevice};
 pub use error::InferenceError;
-pub use fetch::{FetchError, Installed, ModelSource, Sha256Sum, fetch_upstream, fetch_weights};
 pub use guess::{GuessedHead, INPUTS, guess_head, guess_size};
 pub use head_output::{HeadOutput, ViewDetection};
 pub use heads::CandidateOptions;
-pub use manifest::{
-    FILE_NAME as MANIFEST, Layout, MAX_BYTES as MANIFEST_MAX_BYTES, ManifestInput, ModelManifest,
-    Upstream, name_from,
-};
+pub use manifest::{FILE_NAME as MANIFEST, Layout, ManifestInput, ModelManifest, name_from};
 pub use model::Model;
 pub use onnx::{ModelDescription, OnnxDetector, OnnxOptions, OnnxTensor, onnx_loader};
-pub use precision::{Int8Use, PrecisionChoice, cpu_has_integer_dot_product};
 pub use registry::{ModelRegistry, RegistryFull};
 pub use remote::{BearerToken, InvalidToken, RemoteDetector, RemoteOptions, RemoteServer};
 pub use repository::{

@@ -15,9 +15,6 @@ metric_set! {
     worker_stalls: IntCounter = "worker_stalls_total" [];
     /// Always 1; the labels are the loaded models.
     model_info: IntGaugeVec = "model_info" ["model", "revision"];
-    /// Always 1; the label tells which default models use 8-bit integers: `none`,
-    /// `small_profiles` or `all`.
-    precision_info: IntGaugeVec = "precision_info" ["int8_models"];
     /// Model loads, by result.
     model_loads: IntCounterVec = "model_loads_total" ["result"];
     /// 1 while the inference server answers, else 0; only with an inference server.

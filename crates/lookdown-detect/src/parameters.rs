@@ -13,7 +13,6 @@ mod priority;
 mod profile;
 mod score_calibration;
 mod tuning;
-mod tunings;
 
 pub use defaults::{DefaultSource, DefaultUsed, DetectDefaults};
 pub use detect_parameters::{DetectParameters, parse_profile};
@@ -24,4 +23,3 @@ pub use priority::Priority;
 pub use profile::Profile;
 pub(crate) use score_calibration::ScoreCalibration;
 pub use tuning::Tuning;
-pub use tunings::Tunings;

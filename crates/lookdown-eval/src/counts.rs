@@ -2,11 +2,7 @@
 //!
 //! Average precision considers every score. A user reads the persons above one threshold.
 
-mod score_fit;
-
 use super::{EvaluatedImage, MatchingRule, Outcome, Region, precision_recall::count};
-
-pub use score_fit::ScoreFit;
 
 /// The score threshold of a detection that sets none.
 pub const DEFAULT_COUNT_THRESHOLD: f64 = 0.3;

@@ -22,7 +22,7 @@ mod summary;
 pub mod sweep;
 
 pub use average_precision::AveragePrecision;
-pub use counts::{CalibrationError, CountFigures, Counts, DEFAULT_COUNT_THRESHOLD, ScoreFit};
+pub use counts::{CalibrationError, CountFigures, Counts, DEFAULT_COUNT_THRESHOLD};
 pub use data_set::{DataSet, DataSetError, DataSetImage, ImageId, ScoringMismatch};
 pub use ground_truth::{AnnotatedPerson, EvaluatedImage, GroundTruth, ScoredBox};
 pub use matching::{MatchingRule, Outcome};

@@ -35,8 +35,6 @@ fn the_table_has_each_key_of_a_manifest_and_no_other() {
     let mut keys = BTreeSet::from(["head".to_owned()]);
     keys.extend(expected::<ModelManifest>("unknown = 1"));
     keys.extend(expected::<ModelManifest>("[input]\nunknown = 1"));
-    keys.extend(expected::<ModelManifest>("[upstream]\nunknown = 1"));
-    keys.extend(expected::<ModelManifest>("[tuning.fast]\nunknown = 1"));
     let heads = expected::<Head>("head = \"unknown\"");
     assert_eq!(heads.len(), 7);
     for head in heads {

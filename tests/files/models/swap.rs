@@ -109,7 +109,7 @@ async fn post(router: &Router, path: &str, body: Vec<u8>) -> (StatusCode, Value)
 async fn a_model_is_swapped_under_load_without_a_failed_request() {
     let folder = TempDir::new().unwrap();
     let person = folder.path().join("person");
-    let weights = ["ssdlite_mobilenet_v2", "nanodet_g_416"]
+    let weights = ["nanodet_g_views_416", "nanodet_g_views_416_fp16"]
         .map(|name| of_repository(&format!("models/{name}/model.onnx")));
     write(&person, "person", "", &weights[0]);
     let (router, models) = service(folder.path());

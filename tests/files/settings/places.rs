@@ -26,7 +26,11 @@ fn a_path_that_is_set_must_exist() {
         ),
         (
             repository.model.find_repository().unwrap_err(),
-            ["model.repository", "no/such/models", "make setup"],
+            [
+                "model.repository",
+                "no/such/models",
+                "LOOKDOWN__MODEL__REPOSITORY",
+            ],
         ),
         (
             library.inference.find_library().unwrap_err(),

@@ -3,10 +3,7 @@
 use std::num::NonZeroUsize;
 
 use super::{HeadOutput, InferenceError};
-use crate::{
-    imaging::{NetworkInput, ViewBatch},
-    parameters::Tunings,
-};
+use crate::imaging::{NetworkInput, ViewBatch};
 
 /// A person detector. Runs on one thread at a time.
 pub trait Detector: Send {
@@ -22,11 +19,6 @@ pub trait Detector: Send {
     /// Number of views per run, if it is fixed. Fewer views cost as much.
     fn views_per_run(&self) -> Option<NonZeroUsize> {
         None
-    }
-
-    /// Tunings of the model.
-    fn tunings(&self) -> Tunings {
-        Tunings::default()
     }
 
     /// Detects persons in a batch rendered for [`Detector::input`]. Returns one list per view,

@@ -64,12 +64,6 @@ pub enum InferenceError {
         /// Path of the network.
         network: PathBuf,
     },
-    /// The record of an installed network's SHA-256 is damaged.
-    #[error("model: {path} does not begin with 64 hexadecimal digits; install the model again")]
-    DamagedRecord {
-        /// Path of the record.
-        path: PathBuf,
-    },
     /// The model on the inference server is not supported.
     #[error("the model {model} on the inference server cannot be used: {problem}")]
     RemoteModel {

@@ -1,28 +1,20 @@
 //! Model manifests, which describe the models in ONNX files.
 
 mod input;
-mod upstream;
 
-use std::{
-    io,
-    path::{Component, Path, PathBuf},
-};
+use std::path::{Component, Path, PathBuf};
 
 use lookdown_common::files;
 use serde::Deserialize;
 
 use super::{InferenceError, heads::Head};
-use crate::parameters::Tunings;
 
 pub use input::{Layout, ManifestInput};
-pub use upstream::Upstream;
 
 /// The manifest's name in a model's folder.
 pub const FILE_NAME: &str = "model.toml";
 /// Longest manifest, bytes.
-pub const MAX_BYTES: u64 = 1 << 20;
-/// Longest record of a sum, bytes.
-const MAX_RECORD_BYTES: u64 = 1 << 12;
+const MAX_BYTES: u64 = 1 << 20;
 
 /// Description and origin of a model. Fields that the ONNX file contains are optional.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -32,8 +24,7 @@ pub struct ModelManifest {
     pub name: String,
     /// The ONNX file, relative to the manifest and within its folder.
     pub onnx: PathBuf,
-    /// The ONNX file's SHA-256, hexadecimal. A file with a different one is refused. For a model
-    /// with `upstream`, the sum that was recorded when the file was installed.
+    /// The ONNX file's SHA-256, hexadecimal. A file with a different one is refused.
     #[serde(default)]
     pub sha256: Option<String>,
     /// SPDX identifier of the weights' license.
@@ -48,12 +39,6 @@ pub struct ModelManifest {
     /// Decoder of the outputs.
     #[serde(default)]
     pub output: Head,
-    /// The published file from which the ONNX file is installed.
-    #[serde(default)]
-    pub upstream: Option<Upstream>,
-    /// Constants of profiles that fit this model, as `lookdown model tune` writes them.
-    #[serde(default)]
-    pub tuning: Tunings,
 }
 
 impl ModelManifest {
@@ -90,8 +75,6 @@ impl ModelManifest {
             source: None,
             input: ManifestInput::default(),
             output: Head::default(),
-            upstream: None,
-            tuning: Tunings::default(),
         })
     }
 
@@ -114,15 +97,7 @@ impl ModelManifest {
             toml::from_str(&text).map_err(|error| unusable(one_line(&error, &text)))?;
         manifest.check().map_err(unusable)?;
         let onnx = within(folder, &manifest.onnx).map_err(unusable)?;
-        let sha256 = match manifest.upstream {
-            Some(_) => recorded_sum(&onnx)?,
-            None => manifest.sha256,
-        };
-        Ok(Self {
-            onnx,
-            sha256,
-            ..manifest
-        })
+        Ok(Self { onnx, ..manifest })
     }
 
     fn check(&self) -> Result<(), String> {
@@ -132,66 +107,16 @@ impl ModelManifest {
                 self.name
             ));
         }
-        for (key, sum) in [
-            ("sha256", self.sha256.as_ref()),
-            (
-                "upstream.sha256",
-                self.upstream.as_ref().and_then(|u| u.sha256.as_ref()),
-            ),
-        ] {
-            if let Some(sum) = sum.filter(|sum| !is_sum(sum)) {
-                return Err(format!("{key} is {sum:?}: use 64 hexadecimal digits"));
-            }
+        if let Some(sum) = self.sha256.as_ref().filter(|sum| !is_sum(sum)) {
+            return Err(format!("sha256 is {sum:?}: use 64 hexadecimal digits"));
         }
-        if let Some(upstream) = &self.upstream {
-            if self.sha256.is_some() {
-                return Err(
-                    "sha256 and upstream are both given: move the sum of the published \
-                            file to upstream.sha256"
-                        .to_owned(),
-                );
-            }
-            if upstream.cut && !matches!(self.output, Head::BoxesScores(_)) {
-                let head = self.output.name();
-                return Err(format!(
-                    "upstream.cut is true, but head is {head}: use boxes_scores, or remove cut"
-                ));
-            }
-        }
-        self.tuning.check()?;
         self.input.normalization().map(drop)
     }
 }
 
 /// Returns true for the SHA-256 of a file in hexadecimal digits.
-pub(super) fn is_sum(sum: &str) -> bool {
+fn is_sum(sum: &str) -> bool {
     sum.len() == 64 && sum.chars().all(|c| c.is_ascii_hexdigit())
-}
-
-/// Returns the file beside an installed ONNX file that records its SHA-256, in the format of
-/// `sha256sum`.
-pub(super) fn record_of(onnx: &Path) -> PathBuf {
-    let mut name = onnx.as_os_str().to_owned();
-    name.push(".sha256");
-    name.into()
-}
-
-/// Reads the recorded sum of an installed ONNX file. `None` without a record.
-fn recorded_sum(onnx: &Path) -> Result<Option<String>, InferenceError> {
-    let path = record_of(onnx);
-    let text = match files::read_text(&path, MAX_RECORD_BYTES) {
-        Ok(text) => text,
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
-        Err(error) => {
-            let detail = error.to_string();
-            return Err(InferenceError::Unreadable { path, detail });
-        }
-    };
-    let sum = text.split_whitespace().next().unwrap_or_default();
-    if is_sum(sum) {
-        return Ok(Some(sum.to_owned()));
-    }
-    Err(InferenceError::DamagedRecord { path })
 }
 
 /// Returns an ONNX file of a folder.

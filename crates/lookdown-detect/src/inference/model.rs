@@ -5,10 +5,7 @@ use std::{num::NonZeroUsize, path::PathBuf};
 use parking_lot::Mutex;
 
 use super::{Detector, HeadOutput, InferenceError, repository::Stamp};
-use crate::{
-    imaging::{NetworkInput, ViewBatch},
-    parameters::Tunings,
-};
+use crate::imaging::{NetworkInput, ViewBatch};
 
 /// A loaded model. A frame keeps a reference to its model, so a replaced model is dropped when its
 /// last frame ends.
@@ -17,7 +14,6 @@ pub struct Model {
     revision: String,
     input: NetworkInput,
     views_per_run: Option<NonZeroUsize>,
-    tunings: Tunings,
     /// Each session runs one batch at a time, in parallel with the others.
     sessions: Vec<Mutex<Box<dyn Detector>>>,
     files: Option<ModelFiles>,
@@ -53,7 +49,6 @@ impl Model {
             revision: first.revision().to_owned(),
             input: first.input().clone(),
             views_per_run: first.views_per_run(),
-            tunings: first.tunings(),
             sessions: std::iter::once(first)
                 .chain(others)
                 .map(Mutex::new)
@@ -89,12 +84,6 @@ impl Model {
     #[must_use]
     pub fn input(&self) -> &NetworkInput {
         &self.input
-    }
-
-    /// Tunings of the model.
-    #[must_use]
-    pub fn tunings(&self) -> &Tunings {
-        &self.tunings
     }
 
     /// The largest useful batch of at most `max_views` views. It is at least the number of views

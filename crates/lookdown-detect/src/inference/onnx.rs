@@ -19,10 +19,7 @@ use super::{
     signature::Signature,
     staging::{Staged, Staging},
 };
-use crate::{
-    imaging::{NetworkInput, ViewBatch},
-    parameters::Tunings,
-};
+use crate::imaging::{NetworkInput, ViewBatch};
 
 pub(super) use description::{FLOAT, Metadata, float_shapes};
 pub use description::{ModelDescription, OnnxTensor};
@@ -111,10 +108,9 @@ impl OnnxDetector {
         let ModelManifest {
             input: from,
             output,
-            tuning,
             ..
         } = &manifest;
-        let used = format!("{sha256} {from:?} {output:?} {tuning:?}");
+        let used = format!("{sha256} {from:?} {output:?}");
         let description = ModelDescription {
             revision: revision_of(used.as_bytes()),
             bytes: bytes.len(),
@@ -194,10 +190,6 @@ impl Detector for OnnxDetector {
 
     fn views_per_run(&self) -> Option<NonZeroUsize> {
         self.description.views_per_run
-    }
-
-    fn tunings(&self) -> Tunings {
-        self.description.manifest.tuning.clone()
     }
 
     fn detect(&mut self, batch: &ViewBatch) -> Result<HeadOutput, InferenceError> {

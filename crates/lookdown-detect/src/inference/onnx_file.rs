@@ -5,7 +5,6 @@
 //! resolves such paths even for models passed as bytes, so the graph is checked here first. The
 //! field numbers are those of `onnx.proto`, which are stable.
 
-mod cut;
 mod protobuf;
 
 use std::path::Path;
@@ -14,10 +13,8 @@ use lookdown_common::files;
 
 use self::protobuf::{Field, MAX_DEPTH, Value, fields, no_model};
 
-pub(super) use self::cut::cut;
-
 /// Largest ONNX file, bytes. Protocol buffers are limited to 2 GiB.
-pub(super) const MAX_BYTES: u64 = 1 << 30;
+const MAX_BYTES: u64 = 1 << 30;
 /// Most values of one tensor in a file.
 const MAX_VALUES: u64 = 1 << 29;
 /// The operator for an execution provider's compiled engine, which is mostly in another file.
@@ -87,7 +84,7 @@ impl Message {
             return check_tensor(bytes);
         }
         for field in fields(bytes) {
-            let Field { number, value, .. } = field.map_err(|()| no_model())?;
+            let Field { number, value } = field.map_err(|()| no_model())?;
             match (self, number, value) {
                 (Self::Node, 4, Value::Bytes(ENGINE)) => {
                     return Err("it contains a compiled engine: save the original model".into());
@@ -108,7 +105,7 @@ impl Message {
 fn check_tensor(bytes: &[u8]) -> Result<(), String> {
     let mut values: u64 = 1;
     for field in fields(bytes) {
-        let Field { number, value, .. } = field.map_err(|()| no_model())?;
+        let Field { number, value } = field.map_err(|()| no_model())?;
         match (number, value) {
             (13, _) | (14, Value::Varint(1..)) => {
                 return Err(

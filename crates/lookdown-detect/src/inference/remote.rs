@@ -22,10 +22,7 @@ use super::{
     heads::TensorView,
     staging::{Staged, Staging},
 };
-use crate::{
-    imaging::{NetworkInput, ViewBatch},
-    parameters::Tunings,
-};
+use crate::imaging::{NetworkInput, ViewBatch};
 
 pub use options::RemoteOptions;
 pub use server::RemoteServer;
@@ -80,10 +77,6 @@ impl Detector for RemoteDetector {
 
     fn views_per_run(&self) -> Option<NonZeroUsize> {
         self.understood.signature.views_per_run
-    }
-
-    fn tunings(&self) -> Tunings {
-        self.understood.manifest.tuning.clone()
     }
 
     fn detect(&mut self, batch: &ViewBatch) -> Result<HeadOutput, InferenceError> {

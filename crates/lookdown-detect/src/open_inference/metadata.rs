@@ -18,10 +18,6 @@ pub struct ServerMetadata {
     #[serde(default, deserialize_with = "null_as_default")]
     #[schema(required)]
     pub extensions: Vec<String>,
-    /// The default models that use 8-bit integers: `none`, `small_profiles` (`fast`, upright crops,
-    /// `paper`, `direct`) or `all`. Omitted with a single model for all profiles.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub int8_models: Option<String>,
     /// The default of the parameter `follow`: true if the persons of a camera are followed between
     /// searches of the whole frame. A camera of `watch` or `run` has its own setting.
     #[serde(default)]

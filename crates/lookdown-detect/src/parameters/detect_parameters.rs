@@ -86,7 +86,7 @@ parameter_table! {
         kind: ParameterKind::Text,
         default: ParameterDefault::Described("the model of the profile"),
         help: "Name of the person detector.",
-        example: Some("ssdlite_mobilenet_v2"),
+        example: Some("nanodet_g_views_416"),
         interfaces: DETECTION_WITH_DEFAULTS,
     };
     SCORE_THRESHOLD = ParameterSpec {

@@ -56,20 +56,6 @@ impl ScoreCalibration {
     }
 }
 
-impl Tuning {
-    /// Returns the tuning with which a score of `even_odds` becomes 0.5, and the odds of all scores
-    /// relative to it are raised to `power`. The scores were reported with this tuning, by fusion.
-    #[must_use]
-    pub fn recalibrated(self, even_odds: f64, power: f64) -> Self {
-        let calibration = ScoreCalibration::of(&self, Refinement::Fusion);
-        Self {
-            even_odds: calibration.merged(even_odds),
-            odds_power: self.odds_power * power,
-            ..self
-        }
-    }
-}
-
 /// Returns the odds of a probability, 0 to infinity.
 fn odds(probability: f64) -> f64 {
     let probability = probability.clamp(0.0, 1.0);
@@ -113,26 +99,7 @@ mod tests {
         assert_eq!(calibration.reported(0.42), 0.42);
     }
 
-    fn reported(tuning: &Tuning, merged: f64) -> f64 {
-        ScoreCalibration::of(tuning, Refinement::Fusion).reported(merged)
-    }
-
     proptest! {
-        #[test]
-        fn recalibration_is_a_line_in_the_logarithm_of_the_odds(
-            merged in 0.05..0.95_f64,
-            even_odds in 0.1..0.9_f64,
-            power in 0.5..2.0_f64,
-        ) {
-            let before = Profile::Fast.tuning();
-            let after = before.recalibrated(even_odds, power);
-            let line = power * (odds(reported(&before, merged)) / odds(even_odds)).ln();
-            let expected = from_odds(line.exp());
-            let got = reported(&after, merged);
-            // Near 1, the odds of a probability have few digits, but the probability has all.
-            prop_assert!((got / expected - 1.0).abs() < 1e-8, "{got} {expected}");
-        }
-
         #[test]
         fn merged_inverts_reported(score in 0.01..0.99_f64) {
             let back = QUALITY.merged(QUALITY.reported(score));

@@ -40,7 +40,7 @@ use crate::{
     },
     inference::{Model, ModelRegistry},
     metrics::{DetectMetrics, start_at_zero},
-    parameters::{DetectParameters, Profile},
+    parameters::DetectParameters,
 };
 
 /// The smallest frame side that can hold a lens image, pixels.
@@ -86,7 +86,7 @@ impl EngineOptions {
     /// Returns options for tests: `model` for all profiles, one session, large batches.
     #[must_use]
     pub fn for_testing(model: &str) -> Self {
-        let mut options = Self::new(DefaultModels::One(model.to_owned()), NonZeroUsize::MIN);
+        let mut options = Self::new(DefaultModels::one(model.to_owned()), NonZeroUsize::MIN);
         options.batches.max_views = NonZeroUsize::MIN.saturating_add(127);
         options
     }
@@ -252,7 +252,7 @@ impl Engine {
         }
         let mut observation = Observation {
             profile: job.parameters.profile,
-            tuning: self.tuning(&job.parameters, &model),
+            tuning: job.parameters.profile.tuning(),
             passes: Vec::with_capacity(3),
             is_searched: true,
             follow: None,
@@ -325,15 +325,15 @@ impl Engine {
     }
 
     /// Returns the model for requests that name none.
-    pub(super) fn default_model(&self, profile: Profile) -> Result<Arc<Model>, PipelineError> {
-        let name = self.options.default_models.of(profile);
+    pub(super) fn default_model(&self) -> Result<Arc<Model>, PipelineError> {
+        let name = self.options.default_models.model();
         self.models.get(name).ok_or(PipelineError::ModelStarting)
     }
 
     /// Returns the model that the request names, or the default model of its profile.
     fn model(&self, parameters: &DetectParameters) -> Result<Arc<Model>, PipelineError> {
         let Some(name) = &parameters.model else {
-            return self.default_model(parameters.profile);
+            return self.default_model();
         };
         self.models.get(name).ok_or_else(|| {
             let loaded = self.models.all();

@@ -81,13 +81,13 @@ impl Engine {
     /// some ten milliseconds.
     ///
     /// # Errors
-    /// [`PipelineError::ModelStarting`] while the profile's model is not loaded.
+    /// [`PipelineError::ModelStarting`] while the default model is not loaded.
     pub fn planned_views(
         &self,
         calibration: &Calibration,
         profile: Profile,
     ) -> Result<PlannedViews, PipelineError> {
-        let (model, options) = (self.default_model(profile)?, self.options());
+        let (model, options) = (self.default_model()?, self.options());
         let input = model.input();
         let (lens, (image_width, image_height)) = (calibration.lens(), calibration.image_size());
         let masked = CoarseMasks::new(&calibration.areas().masks, image_width, image_height);

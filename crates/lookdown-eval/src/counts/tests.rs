@@ -82,28 +82,3 @@ fn calibration_error_compares_scores_with_shares() {
     let none = Counts::of_images(&[image(&[0.0], &[])], MatchingRule::Coco);
     assert_eq!(none.calibration_error(), None);
 }
-
-#[test]
-fn a_fit_moves_the_best_threshold_to_the_default_one() {
-    // Right ones above .6, wrong ones below it: the best thresholds are .46 to .70.
-    let images = [
-        image(&[0.0, 10.0], &[(0.0, 0.8), (10.0, 0.7), (50.0, 0.45)]),
-        image(&[0.0], &[(0.0, 0.9), (50.0, 0.4), (60.0, 0.2)]),
-        image(&[], &[(50.0, 0.1)]),
-    ];
-    let fit = Counts::of_images(&images, MatchingRule::Coco)
-        .score_fit()
-        .unwrap();
-    let log_odds = |score: f64| (score / (1.0 - score)).ln();
-    let changed = fit.power * (log_odds(0.58) - log_odds(fit.even_odds));
-    assert!((changed - log_odds(0.3)).abs() < 1e-9, "{fit:?}");
-    // All are told apart, so that the steepest scores are the most likely ones.
-    assert!(fit.power > 5.0, "{fit:?}");
-}
-
-#[test]
-fn scores_without_a_wrong_detection_have_no_fit() {
-    let images = [image(&[0.0], &[(0.0, 0.8)])];
-    let counts = Counts::of_images(&images, MatchingRule::Coco);
-    assert_eq!(counts.score_fit(), None);
-}

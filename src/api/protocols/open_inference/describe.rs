@@ -17,15 +17,13 @@ use crate::api::{ApiState, http::problem::Problem, require_scope::RequireDetect}
 /// Get server metadata
 #[utoipa::path(
     get, path = "/v2", tag = "operation", operation_id = "get_server_metadata",
-    responses((status = OK, description = "The name, version, extensions, precision and default of `follow` of the server.", body = ServerMetadata))
+    responses((status = OK, description = "The name, version, extensions and default of `follow` of the server.", body = ServerMetadata))
 )]
 pub(in crate::api) async fn server(State(state): State<ApiState>) -> Json<ServerMetadata> {
-    let int8 = state.workers.engine().default_models().int8();
     Json(ServerMetadata {
         name: NAME.to_owned(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
         extensions: EXTENSIONS.map(ToOwned::to_owned).into(),
-        int8_models: int8.map(|int8| int8.name().to_owned()),
         follow: state.options.detect_defaults.follow(),
     })
 }

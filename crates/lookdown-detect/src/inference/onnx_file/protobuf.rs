@@ -15,8 +15,6 @@ pub(super) fn no_model() -> String {
 pub(super) struct Field<'a> {
     pub(super) number: u64,
     pub(super) value: Value<'a>,
-    /// The whole field with its tag.
-    pub(super) raw: &'a [u8],
 }
 
 /// Value of a field.
@@ -64,7 +62,6 @@ pub(super) fn fields(mut bytes: &[u8]) -> impl Iterator<Item = Result<Field<'_>,
 }
 
 fn field<'a>(bytes: &mut &'a [u8]) -> Option<Field<'a>> {
-    let start = *bytes;
     let tag = varint(bytes)?;
     let value = match tag & 7 {
         0 => Value::Varint(varint(bytes)?),
@@ -77,8 +74,7 @@ fn field<'a>(bytes: &mut &'a [u8]) -> Option<Field<'a>> {
         _ => return None,
     };
     let number = tag >> 3;
-    let raw = &start[..start.len() - bytes.len()];
-    (number > 0).then_some(Field { number, value, raw })
+    (number > 0).then_some(Field { number, value })
 }
 
 fn take<'a>(bytes: &mut &'a [u8], len: usize) -> Option<&'a [u8]> {
@@ -99,24 +95,4 @@ fn varint(bytes: &mut &[u8]) -> Option<u64> {
         }
     }
     None
-}
-
-/// Appends a varint.
-fn push_varint(bytes: &mut Vec<u8>, mut number: u64) {
-    loop {
-        let [low, ..] = number.to_le_bytes();
-        number >>= 7;
-        if number == 0 {
-            bytes.push(low & 0x7f);
-            return;
-        }
-        bytes.push(low | 0x80);
-    }
-}
-
-/// Appends a field with a string or a message.
-pub(super) fn push_bytes(bytes: &mut Vec<u8>, number: u64, content: &[u8]) {
-    push_varint(bytes, number << 3 | 2);
-    push_varint(bytes, content.len() as u64);
-    bytes.extend_from_slice(content);
 }

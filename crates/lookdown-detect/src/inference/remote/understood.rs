@@ -66,15 +66,8 @@ impl RemoteModel {
         manifest.output.check(&shapes, size).map_err(unusable)?;
         let (scale, offset) = manifest.input.normalization().map_err(unusable)?;
         let versions = &model.versions;
-        let ModelManifest {
-            input,
-            output,
-            tuning,
-            ..
-        } = &manifest;
-        let used = format!(
-            "{name_there} {versions:?} {inputs:?} {outputs:?} {input:?} {output:?} {tuning:?}"
-        );
+        let ModelManifest { input, output, .. } = &manifest;
+        let used = format!("{name_there} {versions:?} {inputs:?} {outputs:?} {input:?} {output:?}");
         Ok(Self {
             revision: revision_of(used.as_bytes()),
             input: NetworkInput {

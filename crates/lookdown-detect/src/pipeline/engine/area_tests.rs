@@ -1,6 +1,7 @@
 //! Tests of zones and masks in the report of a frame.
 
 use super::*;
+use crate::parameters::Profile;
 use crate::pipeline::ViewCounts;
 use crate::pipeline::test_support::{BlobDetector, calibration, engine, frame_with_disc, job};
 

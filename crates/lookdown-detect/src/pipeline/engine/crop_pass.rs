@@ -7,7 +7,7 @@ use lookdown_lens::geometry::crop_placement::{CropTarget, nadir_crop, place_crop
 use super::{Engine, Observation};
 use crate::{
     inference::Model,
-    parameters::{DetectParameters, Tuning},
+    parameters::DetectParameters,
     pipeline::{DetectJob, Stage, camera_rig::CameraRig, network::PassTask},
 };
 
@@ -73,16 +73,5 @@ impl Engine {
         let own = unnamed.then(|| models.crop_model(parameters.profile));
         let own = own.flatten().and_then(|name| self.models.get(name));
         own.unwrap_or_else(|| Arc::clone(model))
-    }
-
-    /// Returns the tuning of a request whose views `model` processes: that of the model if it
-    /// processes the crops, too.
-    pub(super) fn tuning(&self, parameters: &DetectParameters, model: &Arc<Model>) -> Tuning {
-        let profile = parameters.profile;
-        if Arc::ptr_eq(&self.crop_model(parameters, model), model) {
-            model.tunings().of(profile)
-        } else {
-            profile.tuning()
-        }
     }
 }

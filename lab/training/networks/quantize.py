@@ -1,0 +1,88 @@
+"""Makes the INT8 version of a network.
+
+Integers stand between pairs of QuantizeLinear and DequantizeLinear, which ONNX Runtime turns into integer kernels.
+docs/models.md has accuracy and times beside those of FP32.
+"""
+
+from pathlib import Path
+
+import numpy
+from onnx import NodeProto, helper
+
+from .folding import fold
+from .graph import OnnxGraph
+from .ranges import ActivationRanges
+from .regions import int8_nodes, int8_tensors
+from .weights import quantize_weights
+
+NOTE = "INT8 but for the first and the last convolutions."
+
+
+def quantize(fp32_file: Path, onnx_file: Path, samples: Path) -> None:
+    """Reads the model, measures its activation ranges and writes the INT8 model."""
+    # Needs packages that the tests of the rest have not.
+    from .calibrate import measure
+
+    write_int8(fp32_file, onnx_file, measure(fp32_file, samples))
+
+
+def write_int8(fp32_file: Path, onnx_file: Path, ranges: ActivationRanges) -> None:
+    """Reads the model and writes the INT8 model with these ranges."""
+    graph = OnnxGraph(fp32_file)
+    fold(graph)
+    Quantizer(graph, ranges).quantize()
+    graph.save(onnx_file, note=NOTE)
+
+
+class Quantizer:
+    """Rewrites the nodes of a folded graph."""
+
+    def __init__(self, graph: OnnxGraph, ranges: ActivationRanges):
+        self.graph = graph
+        self._ranges = ranges
+        self._int8_nodes = [node.name for node in int8_nodes(graph)]
+        self._int8_tensors = set(int8_tensors(graph))
+        self._written: list[NodeProto] = []
+
+    def quantize(self) -> None:
+        """Adds QuantizeLinear and DequantizeLinear to every quantized tensor, and replaces weights by integers."""
+        for node in self.graph.nodes:
+            if node.name in self._int8_nodes and node.op_type == "Conv":
+                self._use_integer_weights(node)
+            node.input[:] = [_dequantised(name) if name in self._int8_tensors else name for name in node.input]
+            self._written.append(node)
+            for tensor in self._int8_tensors.intersection(node.output):
+                self._round(tensor)
+        self.graph.nodes = self._written
+
+    def _round(self, tensor: str) -> None:
+        scale, zero_point = self._ranges.scale_and_zero_point(tensor)
+        self._constants(tensor, scale=scale, zero_point=zero_point)
+        parameters = [f"{tensor}/scale", f"{tensor}/zero_point"]
+        self._add("QuantizeLinear", [tensor, *parameters], f"{tensor}/quantised")
+        self._add("DequantizeLinear", [f"{tensor}/quantised", *parameters], _dequantised(tensor))
+
+    def _use_integer_weights(self, convolution: NodeProto) -> None:
+        activations, *parameters = convolution.input
+        weights, bias = (self.graph.constants[name] for name in parameters)
+        input_scale, _ = self._ranges.scale_and_zero_point(activations)
+        weights, bias, scales = quantize_weights(weights, bias, float(input_scale))
+        self._dequantise(parameters[0], weights, scales)
+        self._dequantise(parameters[1], bias, scales * input_scale)
+        convolution.input[1:] = [_dequantised(name) for name in parameters]
+
+    def _dequantise(self, name: str, integers: numpy.ndarray, scales: numpy.ndarray) -> None:
+        zero_points = numpy.zeros(len(scales), integers.dtype)
+        self._constants(name, quantised=integers, scale=scales, zero_point=zero_points)
+        inputs = [f"{name}/{kind}" for kind in ("quantised", "scale", "zero_point")]
+        self._add("DequantizeLinear", inputs, _dequantised(name), axis=0)
+
+    def _constants(self, name: str, **values) -> None:
+        self.graph.constants |= {f"{name}/{kind}": numpy.asarray(value) for kind, value in values.items()}
+
+    def _add(self, operation: str, inputs: list[str], output: str, **attributes) -> None:
+        self._written.append(helper.make_node(operation, inputs, [output], name=output, **attributes))
+
+
+def _dequantised(tensor: str) -> str:
+    return f"{tensor}/dequantised"
