@@ -54,7 +54,7 @@ export function drawCard(card, others) {
   const zones = report.zones?.map(({ name, persons }) => element("li", {}, `${name} `, element("b", {}, String(persons))));
   const focused = card.now.contains(document.activeElement) ? document.activeElement.dataset.box : undefined;
   card.now.replaceChildren(
-    element("div", { class: "sight" }, card.image ?? sketch(report), element("p", { class: "big" }, element("b", {}, String(count)), count === 1 ? "person" : "persons")),
+    element("div", { class: "sight" }, card.image ?? sketch(report), element("p", { class: "big" }, element("b", {}, count === null ? "–" : String(count)), count === null ? "paused" : count === 1 ? "person" : "persons")),
     card.isSingle && !card.hasImage ? imagesOff(card.camera) : "",
     zones ? element("ul", { class: "zones" }, zones) : "",
     stepPlot(history, Date.now()),

@@ -6,6 +6,7 @@ import { followStates, options } from "./camera_states.js";
 import { followCounts } from "./counts.js";
 import { element, find } from "./dom.js";
 import { forgetKey } from "./ignore_place.js";
+import { countedNumbers } from "./plot.js";
 import { shown, showFailure, withProgress } from "./progress.js";
 import { askJson, events } from "./server.js";
 
@@ -13,6 +14,8 @@ import { askJson, events } from "./server.js";
 const MAX_CARDS = 60;
 /** The number of steps in a plot. */
 const MAX_HISTORY = 100;
+/** The time before now of which the counts are drawn. */
+const COUNTED_MILLIS = 30 * 60_000;
 /** The pause between the end of a stream and the next attempt. */
 const PAUSE_MILLIS = 2000;
 /** The interval between two updates of the numbers of persons. */
@@ -50,9 +53,15 @@ async function listen(signal) {
   }
 }
 
-async function loadHistory({ camera }, signal) {
-  const rows = await askJson(`results/${encodeURIComponent(camera)}/history?limit=${MAX_HISTORY}`, { signal });
+/** Loads the numbers before now: those of the counts where the number is counted, else those of the reports. */
+async function loadHistory({ camera, persons_source: source }, signal) {
+  const name = encodeURIComponent(camera);
+  const query = new URLSearchParams({ from: new Date(Date.now() - COUNTED_MILLIS).toISOString(), step: "1m" });
+  const counts = source === "tracks" ? await askJson(`counts/${name}?${query}`, { signal }).catch(() => null) : null;
+  const rows = await askJson(`results/${name}/history?limit=${counts ? 1 : MAX_HISTORY}`, { signal });
   for (const { id, persons, report } of rows) addReport(id, report, persons);
+  const card = cards.get(camera);
+  if (counts?.steps.length && card) card.history = countedNumbers(counts.steps);
 }
 
 /** Updates the numbers of all cards until `signal` aborts: the server has one number of each camera. */
@@ -68,11 +77,12 @@ async function followNumbers(signal) {
 function showNumbers(rows) {
   for (const { camera, persons, received_at: receivedAt } of rows) {
     const card = cards.get(camera);
-    if (card) addNumber(card, Date.parse(receivedAt), persons);
+    if (card?.info?.paused) addNumber(card, Date.now(), null);
+    else if (card) addNumber(card, Date.parse(receivedAt), persons);
   }
 }
 
-/** Adds a number of persons to a card. Numbers that did not change are one step of its plot. */
+/** Adds a number of persons to a card, null while the camera is paused. Numbers that did not change are one step of its plot. */
 function addNumber(card, time, persons) {
   const last = card.history.at(-1);
   card.reportedAt = Math.max(time, card.reportedAt);

@@ -1,4 +1,4 @@
-/** Persons over time as a step plot: a count is valid until the next report. */
+/** Persons over time as a step plot: a count is valid until the next report. A number that is not known is null. */
 
 import { plural, shape } from "./dom.js";
 import { roundStep } from "./geometry.js";
@@ -12,30 +12,48 @@ export function stepPlot(history, now) {
   const first = history[0].time;
   // The clocks of the server and of this machine may differ.
   const last = Math.max(now, history.at(-1).time);
-  const most = Math.max(1, ...history.map(({ persons }) => persons));
+  const most = Math.max(1, ...history.map(({ persons }) => persons ?? 0));
   const step = Math.max(1, roundStep(most, 3));
   const top = Math.ceil(most / step) * step;
   const x = (time) => LEFT + ((time - first) / Math.max(1, last - first)) * (WIDTH - LEFT - 2);
   const y = (persons) => TOP + (1 - persons / top) * (HEIGHT - TOP - BOTTOM);
-  const line = `${steps(history, x, y)}H${x(last).toFixed(1)}`;
+  const ended = [...history, { time: last, persons: history.at(-1).persons }];
+  const below = steps(ended.map(({ time, persons }) => ({ time, persons: persons ?? 0 })), x, y);
   const ticks = Array.from({ length: top / step + 1 }, (_, index) => index * step);
   const count = history.at(-1).persons;
-  const label = `Persons over time: ${plural(count, "person")} now, at most ${most} since ${clock(first)}`;
+  const label = `Persons over time: ${count === null ? "not known" : plural(count, "person")} now, at most ${most} since ${clock(first)}`;
   return shape(
     "svg",
     { class: "plot", viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": label },
     ...ticks.map((tick) => shape("path", { class: "grid", d: `M${LEFT} ${y(tick)}H${WIDTH}` })),
     ...ticks.map((tick) => shape("text", { x: LEFT - 6, y: y(tick) + 4, "text-anchor": "end" }, String(tick))),
-    shape("path", { class: "area", d: `${line}V${y(0)}H${x(first)}Z` }),
-    shape("path", { class: "steps", d: line }),
-    shape("circle", { class: "now", cx: x(last), cy: y(count), r: 3 }),
+    shape("path", { class: "area", d: `${below}V${y(0)}H${x(first)}Z` }),
+    shape("path", { class: "steps", d: steps(ended, x, y) }),
+    ...(count === null ? [] : [shape("circle", { class: "now", cx: x(last), cy: y(count), r: 3 })]),
     shape("text", { x: LEFT, y: HEIGHT - 3 }, clock(first)),
     shape("text", { x: WIDTH - 2, y: HEIGHT - 3, "text-anchor": "end" }, last > first ? clock(last) : ""),
   );
 }
 
-/** The path of the steps. */
+/** The path of the steps, with a gap where the number is not known. */
 export function steps(history, x, y) {
-  const rest = history.slice(1).map(({ time, persons }) => `H${x(time).toFixed(1)}V${y(persons).toFixed(1)}`);
-  return `M${x(history[0].time).toFixed(1)} ${y(history[0].persons).toFixed(1)}${rest.join("")}`;
+  let path = "";
+  let before = null;
+  for (const { time, persons } of history) {
+    const at = x(time).toFixed(1);
+    if (before !== null) path += `H${at}`;
+    if (persons !== null) path += before === null ? `M${at} ${y(persons).toFixed(1)}` : `V${y(persons).toFixed(1)}`;
+    before = persons;
+  }
+  return path;
+}
+
+/** The history of the steps of a camera's counts: the mean number of each. */
+export function countedNumbers(counted) {
+  const history = [];
+  for (const { from, persons } of counted) {
+    const number = persons ? Math.round(persons.mean) : null;
+    if (history.at(-1)?.persons !== number) history.push({ time: Date.parse(from), persons: number });
+  }
+  return history;
 }

@@ -6,7 +6,7 @@ import { corners, holds, roundStep } from "../../../web/geometry.js";
 import { replacedIn } from "../../../web/calibration_sources.js";
 import { valuesOf } from "../../../web/calibration_values.js";
 import { assumedCircle, calibrationOf, circleOf, rimOf, withFound } from "../../../web/lens.js";
-import { steps } from "../../../web/plot.js";
+import { countedNumbers, steps } from "../../../web/plot.js";
 import { parseEvent } from "../../../web/server.js";
 import { continued, straighten } from "../../../web/straighten.js";
 
@@ -206,4 +206,17 @@ test("events are read as they are sent", () => {
   assert.deepEqual(parseEvent('id: 17\ndata: {"a": 1}'), { id: "17", data: '{"a": 1}' });
   assert.deepEqual(parseEvent(": nothing new"), { id: "", data: "" });
   assert.deepEqual(parseEvent("data: one\ndata: two"), { id: "", data: "one\ntwo" });
+});
+
+test("a time without a number is a gap of the plot", () => {
+  const counted = [
+    { from: "1970-01-01T00:00:00Z", persons: { mean: 1.6, max: 3 } },
+    { from: "1970-01-01T00:01:00Z", persons: { mean: 2.1, max: 3 } },
+    { from: "1970-01-01T00:02:00Z", persons: null },
+    { from: "1970-01-01T00:03:00Z", persons: { mean: 1, max: 1 } },
+  ];
+  const history = countedNumbers(counted);
+  assert.deepEqual(history, [{ time: 0, persons: 2 }, { time: 120_000, persons: null }, { time: 180_000, persons: 1 }]);
+  const path = steps(history, (time) => time / 60_000, (persons) => persons);
+  assert.equal(path, "M0.0 2.0H2.0M3.0 1.0");
 });
