@@ -69,21 +69,23 @@ impl Rate {
         let Self {
             wanted, reached, ..
         } = self;
-        let remedies = if self.is_server_slow {
-            "set a faster profile or a longer `every` for the camera, send fewer cameras to this \
-             server, or give it more cores"
+        let (reason, remedies) = if self.is_server_slow {
+            (
+                "the machine is too slow",
+                "choose a faster profile or a lower rate (`every`) for the camera, or leave both \
+                 out; or send fewer cameras to this server, or give it more cores",
+            )
         } else if self.is_camera_slow {
-            "raise the frame rate of the camera, or set a longer `every` for it"
+            (
+                "the camera sends fewer frames",
+                "raise the frame rate of the camera, or choose a lower rate (`every`) for it",
+            )
         } else {
             return None;
         };
-        let reason = if self.is_server_slow {
-            "the server is slow"
-        } else {
-            "the camera sends fewer frames"
-        };
         Some(format!(
-            "{reached:.1} of {wanted:.1} frames per second become reports, as {reason}: {remedies}"
+            "{reached:.1} of {wanted:.1} frames per second become reports, so that counts may be too \
+             low, as {reason}: {remedies}"
         ))
     }
 }
@@ -117,7 +119,7 @@ mod tests {
             warning.starts_with("3.2 of 5.0 frames per second"),
             "{warning}"
         );
-        for remedy in ["faster profile", "longer `every`", "more cores"] {
+        for remedy in ["faster profile", "lower rate (`every`)", "more cores"] {
             assert!(warning.contains(remedy), "{warning}");
         }
     }
