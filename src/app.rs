@@ -19,7 +19,7 @@ use lookdown_detect::{
     pipeline::{BatchOptions, DefaultModels, Engine, EngineOptions, WorkerPool},
 };
 
-use lookdown_common::{InProcess, ServerClient, ServerOptions};
+use lookdown_common::{InProcess, OwnCameras, ServerClient, ServerOptions};
 
 use crate::{
     access::AccessKeys,
@@ -189,7 +189,9 @@ impl App {
         let workers = WorkerPool::start(&Arc::new(engine), workers, capacity)
             .context("the operating system creates no thread for a worker")?;
         let workers = Arc::new(workers);
-        let results = open_results(&settings.results, Arc::clone(&metrics))?;
+        let companions = companions(&settings.counts)?;
+        let own = companions.own_cameras();
+        let results = open_results(&settings.results, own, Arc::clone(&metrics))?;
         let readiness = Readiness::default();
         let tls = match settings.tls.clone() {
             Some(options) => Some(Arc::new(Tls::open(options, Arc::clone(&metrics))?)),
@@ -208,7 +210,6 @@ impl App {
             },
         };
         let tracer = Tracer::start(&settings.traces)?;
-        let companions = companions(&settings.counts)?;
         let options = api_options(&settings, access, companions.clone(), tracer.clone());
         let state = ApiState::new(
             Arc::clone(&workers),
@@ -254,7 +255,8 @@ impl App {
     /// Returns the connection of parts of this process to the server.
     #[must_use]
     pub fn in_process(&self) -> InProcess {
-        api::in_process(api::in_process_router(self.state.clone()))
+        let router = api::in_process_router(self.state.clone());
+        api::in_process(router, self.companions.own_cameras())
     }
 
     /// The readiness of the app. Clones share its state.
@@ -296,11 +298,12 @@ fn calibration_store(settings: &Settings) -> anyhow::Result<Box<FolderStore>> {
 /// Opens the result store of the settings. It connects to a Redis in the background.
 fn open_results(
     settings: &ResultSettings,
+    own: OwnCameras,
     metrics: Arc<Metrics>,
 ) -> anyhow::Result<Arc<dyn ResultStore>> {
     Ok(match settings.redis.clone() {
         Some(redis) => Arc::new(RedisResults::start(redis, settings.limits, metrics)?),
-        None => Arc::new(MemoryResults::new(settings.limits, metrics)),
+        None => Arc::new(MemoryResults::new(settings.limits, metrics).with_own(own)),
     })
 }
 

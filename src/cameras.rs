@@ -11,7 +11,7 @@ use std::{
     time::Duration,
 };
 
-use lookdown_common::{ConfigError, Secret, StoredFile, plain_name};
+use lookdown_common::{ConfigError, OwnCameras, Secret, StoredFile, plain_name};
 use lookdown_watch::{CameraEntry, CameraState, Frame, Location, Metrics, first_frame};
 use parking_lot::{Mutex, RwLock};
 use secrecy::ExposeSecret;
@@ -87,19 +87,27 @@ pub struct Cameras {
     changing: Mutex<()>,
     /// The cameras of the settings file and the command line.
     configured: RwLock<BTreeMap<String, CameraEntry>>,
+    /// The names of all cameras.
+    own: OwnCameras,
     metrics: Arc<Metrics>,
 }
 
 impl Cameras {
     /// Creates the cameras of a state folder, which may be missing.
     #[must_use]
-    pub fn new(folder: PathBuf, metrics: Arc<Metrics>) -> Self {
+    pub fn new(folder: PathBuf, own: OwnCameras, metrics: Arc<Metrics>) -> Self {
         Self {
             folder: StateFolder::new(folder),
             changing: Mutex::default(),
             configured: RwLock::default(),
+            own,
             metrics,
         }
+    }
+
+    /// Returns the names of all cameras.
+    pub(crate) fn own(&self) -> &OwnCameras {
+        &self.own
     }
 
     /// Returns the states of the cameras that are watched: those of the settings and these stored
@@ -190,7 +198,10 @@ impl Cameras {
             let name = camera.name.as_ref().or(camera.calibration.as_ref());
             name.is_none_or(|name| !paused.contains(name))
         });
-        for (name, camera) in self.stored()? {
+        let stored = self.stored()?;
+        self.own
+            .set(configured.keys().chain(stored.keys()).cloned().collect());
+        for (name, camera) in stored {
             if !camera.paused && !configured.contains_key(&name) {
                 cameras.push(self.entry(&name, &camera));
             }

@@ -20,6 +20,7 @@ use std::{
     time::{Duration, Instant},
 };
 
+use lookdown_common::{Claim, OwnCameras, Place, makes_room};
 use lookdown_detect::{imaging::decode::DecodeLimits, pipeline::DetectedFrame};
 use lookdown_lens::{
     calibration::CalibrationId,
@@ -34,7 +35,8 @@ use worker::{Work, Worker};
 
 pub(crate) use {observed::FRAMES, shared::Suggestion};
 
-/// Most cameras that are observed. One that is silent makes room for a new one.
+/// Most cameras that are observed, beside those of this process. One that is silent makes room for
+/// a new one.
 const MAX_CAMERAS: usize = 32;
 /// A camera without a frame for so long is silent.
 const SILENCE: Duration = Duration::from_mins(10);
@@ -44,6 +46,7 @@ const MAX_WAITING: usize = 2;
 /// The observed cameras.
 pub(crate) struct Suggestions {
     shared: Arc<Shared>,
+    own: OwnCameras,
     /// The thread, started for the first frame. `None` if the operating system gives none.
     worker: OnceLock<Option<SyncSender<Work>>>,
 }
@@ -56,6 +59,7 @@ impl Suggestions {
         limits: DecodeLimits,
         lens: Option<IdealLens>,
         applies: bool,
+        own: OwnCameras,
     ) -> Self {
         let shared = Shared {
             cameras: Mutex::default(),
@@ -69,6 +73,7 @@ impl Suggestions {
         };
         Self {
             shared: Arc::new(shared),
+            own,
             worker: OnceLock::new(),
         }
     }
@@ -87,7 +92,7 @@ impl Suggestions {
         let boxes = report.persons.iter().map(|person| person.oriented_box);
         let mut cameras = self.shared.cameras.lock();
         let is_full = !cameras.contains_key(&camera) && cameras.len() >= MAX_CAMERAS;
-        if is_full && !forget_silent(&mut cameras, now) {
+        if is_full && !make_room(&mut cameras, &camera, &self.own, now) {
             return;
         }
         let observed = cameras.entry(camera.clone()).or_default();
@@ -145,13 +150,21 @@ impl Suggestions {
     }
 }
 
-/// Removes the camera that has been silent for longest. Returns false if none is silent.
-fn forget_silent(cameras: &mut BTreeMap<CalibrationId, Observed>, now: Instant) -> bool {
+/// Makes room for a camera. Returns false if it has no place.
+fn make_room(
+    cameras: &mut BTreeMap<CalibrationId, Observed>,
+    newcomer: &CalibrationId,
+    own: &OwnCameras,
+    now: Instant,
+) -> bool {
     let is_silent = |seen_at: Instant| now.saturating_duration_since(seen_at) >= SILENCE;
-    let silent = cameras
-        .iter()
-        .filter(|(_, observed)| observed.seen_at().is_none_or(is_silent))
-        .min_by_key(|(_, observed)| observed.seen_at());
-    let silent = silent.map(|(camera, _)| camera.clone());
-    silent.is_some_and(|camera| cameras.remove(&camera).is_some())
+    let places = cameras.iter().map(|(camera, observed)| Place {
+        camera: camera.clone(),
+        claim: own.claim(camera.as_str(), false),
+        last: observed.seen_at(),
+        is_silent: observed.seen_at().is_none_or(is_silent),
+    });
+    let claim = own.claim(newcomer.as_str(), false);
+    let displaced = makes_room(claim, places);
+    displaced.is_some_and(|camera| cameras.remove(&camera).is_some()) || claim == Claim::Own
 }

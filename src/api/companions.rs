@@ -3,13 +3,15 @@
 use std::{collections::BTreeMap, fmt, sync::Arc};
 
 use axum::Router;
-use lookdown_common::ServerClient;
+use lookdown_common::{OwnCameras, ServerClient};
 use parking_lot::RwLock;
 
 use crate::cameras::Cameras;
 
 /// Returns metrics in the text format of Prometheus.
 type MetricsText = Arc<dyn Fn() -> Vec<u8> + Send + Sync>;
+/// Returns the reason why the reports of a camera are not counted.
+type NotCounted = Arc<dyn Fn(&str) -> Option<String> + Send + Sync>;
 
 /// The parts of `lookdown run` beside the server, and the counts that a server forwards to. Clones
 /// share them.
@@ -19,7 +21,9 @@ pub struct Companions(Arc<RwLock<Parts>>);
 #[derive(Default)]
 struct Parts {
     counts: Counts,
+    not_counted: Option<NotCounted>,
     cameras: Option<Arc<Cameras>>,
+    own_cameras: OwnCameras,
     metrics: BTreeMap<&'static str, MetricsText>,
 }
 
@@ -44,8 +48,26 @@ impl Companions {
     }
 
     /// Answers requests to `/counts` and `/sites` with these routes.
-    pub fn set_counts(&self, routes: Router) {
-        self.0.write().counts = Counts::Here(routes);
+    pub fn set_counts(
+        &self,
+        routes: Router,
+        not_counted: impl Fn(&str) -> Option<String> + Send + Sync + 'static,
+    ) {
+        let mut parts = self.0.write();
+        parts.counts = Counts::Here(routes);
+        parts.not_counted = Some(Arc::new(not_counted));
+    }
+
+    /// Returns the reason why the reports of a camera are not counted here now.
+    pub(super) fn not_counted(&self, camera: &str) -> Option<String> {
+        let not_counted = self.0.read().not_counted.clone()?;
+        not_counted(camera)
+    }
+
+    /// Returns the cameras of this process.
+    #[must_use]
+    pub fn own_cameras(&self) -> OwnCameras {
+        self.0.read().own_cameras.clone()
     }
 
     /// Answers requests to `/cameras` with these cameras.

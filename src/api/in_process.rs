@@ -9,14 +9,14 @@ use std::{
 use axum::{Router, body::Body};
 use bytes::Bytes;
 use http_body::{Body as HttpBody, Frame, SizeHint};
-use lookdown_common::InProcess;
+use lookdown_common::{InProcess, OwnCameras};
 use parking_lot::Mutex;
 use tower::ServiceExt;
 
 /// Returns the connection of parts of this process to the server with these routes.
 #[must_use]
-pub fn in_process(router: Router) -> InProcess {
-    InProcess::new(move |request| {
+pub fn in_process(router: Router, own_cameras: OwnCameras) -> InProcess {
+    InProcess::new(own_cameras, move |request| {
         let answered = router.clone().oneshot(request.map(Body::new));
         async {
             let response = match answered.await {

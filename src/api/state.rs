@@ -187,6 +187,7 @@ impl ApiState {
             workers.engine().options().decode_limits,
             options.lens,
             options.apply_suggested_calibrations,
+            options.companions.own_cameras(),
         );
         Self(Arc::new(Shared {
             workers,

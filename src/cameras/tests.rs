@@ -4,7 +4,8 @@ use super::*;
 
 /// The cameras of a state folder within `folder`.
 pub(crate) fn cameras(folder: &Path) -> Cameras {
-    Cameras::new(folder.join("state"), Arc::new(Metrics::new().unwrap()))
+    let metrics = Arc::new(Metrics::new().unwrap());
+    Cameras::new(folder.join("state"), OwnCameras::default(), metrics)
 }
 
 /// Changes of the cameras wait until this is dropped, as for a folder that hangs.

@@ -152,7 +152,11 @@ impl Parts {
         let (mut app, sockets) = serve::open(settings, commit).await?;
         let (companions, readiness) = (app.companions(), app.readiness());
         let metrics = Arc::new(Metrics::new()?);
-        let stored = Arc::new(Cameras::new(state, Arc::clone(&metrics)));
+        let stored = Arc::new(Cameras::new(
+            state,
+            companions.own_cameras(),
+            Arc::clone(&metrics),
+        ));
         app.set_cameras(&stored);
         companions.expect_counts();
         let server = ServerOptions {
@@ -222,7 +226,7 @@ impl Parts {
     ) -> anyhow::Result<()> {
         let settings = counting(&self.settings, Some(server.clone()));
         let started = |started: Started| {
-            companions.set_counts(started.routes);
+            companions.set_counts(started.routes, started.not_counted);
             companions.set_metrics("counts", started.metrics);
         };
         let counts = run_counts(&settings, started, async || {

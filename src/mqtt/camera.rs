@@ -188,6 +188,11 @@ impl Camera {
         zones.chain(others).min()
     }
 
+    /// The time at which it becomes, or became, unavailable.
+    pub(super) fn expires_at(&self) -> Option<Instant> {
+        self.expires_at
+    }
+
     pub(super) fn name(&self) -> &str {
         &self.name
     }

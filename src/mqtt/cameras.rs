@@ -7,6 +7,7 @@ use std::{
 };
 
 use bytes::Bytes;
+use lookdown_common::{Claim, OwnCameras, Place, makes_room};
 use tokio::time::Instant;
 
 use super::{
@@ -26,12 +27,13 @@ pub(super) fn unknown_for(discovery: &Discovery) -> Duration {
     discovery.expire_after.unwrap_or(UNKNOWN_FOR)
 }
 
-/// The published cameras, a bounded number of them.
+/// The published cameras, a bounded number of them beside those of this process.
 pub(super) struct Cameras {
     topics: Topics,
     discovery: Discovery,
     delays: Delays,
     most: NonZeroUsize,
+    own: OwnCameras,
     /// By the level of their topics.
     known: BTreeMap<String, Camera>,
     retained: RetainedTopics,
@@ -47,6 +49,7 @@ impl Cameras {
         discovery: Discovery,
         hold: Duration,
         most: NonZeroUsize,
+        own: OwnCameras,
     ) -> Self {
         Self {
             delays: Delays {
@@ -56,6 +59,7 @@ impl Cameras {
             topics,
             discovery,
             most,
+            own,
             known: BTreeMap::new(),
             retained: RetainedTopics::default(),
             withdraw_at: None,
@@ -77,20 +81,25 @@ impl Cameras {
         let name = report.camera.as_str();
         let key = level(name);
         let is_known = self.known.contains_key(&key);
+        let mut messages = Vec::new();
         if !is_known && self.known.len() >= self.most.get() {
             if !self.has_warned {
                 tracing::warn!(
                     most = self.most,
-                    "more cameras than mqtt.max_cameras have sent frames: only the first are published"
+                    "more cameras than mqtt.max_cameras have sent frames: some are not published"
                 );
             }
             self.has_warned = true;
-            return Vec::new();
+            let claim = self.own.claim(name, false);
+            match self.displaced(claim) {
+                Some(camera) => messages.extend(camera.withdrawal(&self.topics)),
+                None if claim == Claim::Own => {}
+                None => return Vec::new(),
+            }
         }
         let camera = self.known.entry(key).or_insert_with(|| Camera::new(name));
         let changes = camera.update(report, persons, age, now, &self.delays);
         let topics = &self.topics;
-        let mut messages = Vec::new();
         for zone in changes.removed_zones {
             messages.extend(zone_withdrawal(topics, name, &zone));
         }
@@ -104,6 +113,18 @@ impl Cameras {
         let json = report.json.clone();
         messages.push(Message::passing(topics.report(name), json));
         messages
+    }
+
+    /// Removes the camera that makes room for one with this claim.
+    fn displaced(&mut self, claim: Claim) -> Option<Camera> {
+        let places = self.known.iter().map(|(key, camera)| Place {
+            camera: key.clone(),
+            claim: self.own.claim(camera.name(), false),
+            last: camera.expires_at(),
+            is_silent: !camera.is_available(),
+        });
+        let key = makes_room(claim, places)?;
+        self.known.remove(&key)
     }
 
     /// The message with the latest image of a camera: none for a camera that is not published.

@@ -150,11 +150,14 @@ impl Publication {
         mut queue: Queue,
         mut images: mpsc::Receiver<CameraImage>,
     ) {
+        let own = self.switched.as_ref().map(|cameras| cameras.own().clone());
+        let own = own.unwrap_or_default();
         let mut cameras = Cameras::new(
             self.topics.clone(),
             self.options.discovery.clone(),
             self.options.hold,
             self.options.max_cameras,
+            own,
         );
         // If the result store does not answer now, a camera is published with its next report.
         for report in self.results.latest_of_all().await.unwrap_or_default() {

@@ -7,6 +7,7 @@ use std::{collections::BTreeMap, num::NonZeroUsize, sync::Arc};
 
 use async_trait::async_trait;
 use jiff::Timestamp;
+use lookdown_common::OwnCameras;
 use lookdown_detect::fairness::Client;
 use parking_lot::{Mutex, MutexGuard};
 
@@ -38,6 +39,13 @@ impl MemoryResults {
             followed: Mutex::default(),
             metrics,
         }
+    }
+
+    /// Never removes these cameras for others.
+    #[must_use]
+    pub fn with_own(mut self, own: OwnCameras) -> Self {
+        self.kept.get_mut().own = own;
+        self
     }
 
     /// Keeps a report, possibly with its image, and publishes it to the listeners.

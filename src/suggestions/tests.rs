@@ -16,11 +16,13 @@ use lookdown_lens::{
 use tempfile::TempDir;
 
 use super::{
+    MAX_CAMERAS, SILENCE, make_room,
     observed::{FRAMES, Observed, Subject},
     shared::Shared,
     worker::Worker,
 };
 use crate::calibration_store::{Calibrations, FolderStore};
+use lookdown_common::OwnCameras;
 
 const SIZE: (u32, u32) = (1600, 1600);
 /// A calibration without a height.
@@ -168,4 +170,22 @@ fn an_existing_calibration_is_never_replaced() {
     Worker(Arc::clone(&shared)).apply(&hall());
     let content = std::fs::read_to_string(folder.path().join("hall.json")).unwrap();
     assert_eq!(content, HALL);
+}
+
+#[test]
+fn own_camera_is_observed_among_many_names() {
+    let now = Instant::now();
+    let own = OwnCameras::default();
+    own.set(["hall".to_owned()].into());
+    let mut observed = std::collections::BTreeMap::new();
+    for number in 0..MAX_CAMERAS {
+        let mut camera = Observed::default();
+        camera.see(Subject::Lens, SIZE, now);
+        observed.insert(format!("x{number}").parse().unwrap(), camera);
+    }
+    let other = "new".parse().unwrap();
+    assert!(!make_room(&mut observed, &other, &own, now));
+    assert!(make_room(&mut observed, &hall(), &own, now));
+    assert!(make_room(&mut observed, &other, &own, now + SILENCE));
+    assert_eq!(observed.len(), MAX_CAMERAS - 2);
 }

@@ -1,4 +1,4 @@
-//! The cameras of `lookdown run`, in a folder that hangs.
+//! The cameras of `lookdown run`.
 
 use std::{
     fs::{self, OpenOptions},
@@ -8,7 +8,7 @@ use std::{
     time::Duration,
 };
 
-use axum::http::StatusCode;
+use axum::{Router, http::StatusCode};
 use lookdown::{api::Companions, cameras::Cameras};
 use lookdown_watch::Metrics;
 use tokio::{
@@ -49,7 +49,11 @@ async fn a_folder_of_cameras_that_hangs_keeps_few_threads() {
     let hanging = HangingFile::plant(folder.path().join("cameras.part"));
     let companions = Companions::default();
     let metrics = Arc::new(Metrics::new().unwrap());
-    companions.set_cameras(Arc::new(Cameras::new(folder.path().into(), metrics)));
+    companions.set_cameras(Arc::new(Cameras::new(
+        folder.path().into(),
+        companions.own_cameras(),
+        metrics,
+    )));
     let service = Arc::new(Service::within(&Bounds {
         request_timeout: Duration::from_secs(3),
         companions,
@@ -84,4 +88,36 @@ async fn a_folder_of_cameras_that_hangs_keeps_few_threads() {
     };
     let stored = timeout(TIMEOUT, again).await.unwrap();
     assert_eq!(stored, StatusCode::CREATED);
+}
+
+/// A server with the cameras of a folder.
+fn service(folder: &std::path::Path, companions: &Companions) -> Service {
+    let metrics = Arc::new(Metrics::new().unwrap());
+    companions.set_cameras(Arc::new(Cameras::new(
+        folder.into(),
+        companions.own_cameras(),
+        metrics,
+    )));
+    Service::within(&Bounds {
+        companions: companions.clone(),
+        ..Bounds::default()
+    })
+}
+
+#[tokio::test]
+async fn a_camera_that_is_not_counted_has_a_warning() {
+    let folder = tempfile::tempdir().unwrap();
+    let companions = Companions::default();
+    let service = service(folder.path(), &companions);
+    companions.set_counts(Router::new(), |camera| {
+        (camera == "hall").then(|| "its reports are not counted".to_owned())
+    });
+    for (camera, warning) in [
+        ("hall", "its reports are not counted".into()),
+        ("gate", serde_json::Value::Null),
+    ] {
+        service.put(&format!("/cameras/{camera}"), CAMERA).await;
+        let row = service.get(&format!("/cameras/{camera}")).await;
+        assert_eq!(row.json()["warning"], warning);
+    }
 }

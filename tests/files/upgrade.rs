@@ -9,7 +9,7 @@ use std::{
 };
 
 use lookdown::{cameras::Cameras, settings::load};
-use lookdown_common::StoredFile;
+use lookdown_common::{OwnCameras, StoredFile};
 use lookdown_count::Recording;
 use lookdown_lens::calibration::Calibration;
 use lookdown_watch::Metrics;
@@ -58,7 +58,7 @@ fn later_versions_are_refused_with_file_and_remedy() {
         let content = format!(r#"{{"version": {version}, "cameras": {{"hall": 1}}}}"#);
         fs::write(file, content).unwrap();
         let metrics = Arc::new(Metrics::new().unwrap());
-        let cameras = Cameras::new(folder.to_owned(), metrics);
+        let cameras = Cameras::new(folder.to_owned(), OwnCameras::default(), metrics);
         cameras.stored().unwrap_err().to_string()
     };
     let calibration: Refusal = |folder, version| {
@@ -98,7 +98,7 @@ fn the_present_version_may_be_written_down() {
             fs::write(folder.path().join(file), text).unwrap();
         }
         let metrics = Arc::new(Metrics::new().unwrap());
-        let cameras = Cameras::new(folder.path().to_owned(), metrics);
+        let cameras = Cameras::new(folder.path().to_owned(), OwnCameras::default(), metrics);
         assert_eq!(cameras.stored().unwrap().len(), 2);
         assert!(load(Some(&folder.path().join("lookdown.toml")), HashMap::new()).is_ok());
         assert!(Calibration::read(&folder.path().join("calibration.json")).is_ok());
@@ -109,7 +109,9 @@ fn the_present_version_may_be_written_down() {
 fn cameras_and_settings_of_each_version_are_read() {
     for version in versions() {
         let metrics = Arc::new(Metrics::new().unwrap());
-        let cameras = Cameras::new(version.clone(), metrics).stored().unwrap();
+        let cameras = Cameras::new(version.clone(), OwnCameras::default(), metrics)
+            .stored()
+            .unwrap();
         assert_eq!(cameras["hall"].user.as_deref(), Some("viewer"));
         assert!(cameras["lobby"].paused);
         let settings = load(Some(&version.join("lookdown.toml")), HashMap::new()).unwrap();

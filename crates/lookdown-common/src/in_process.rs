@@ -5,29 +5,41 @@ use std::{fmt, future::Future, pin::Pin, sync::Arc};
 use http::{Request, Response};
 use reqwest::Body;
 
+use crate::OwnCameras;
+
 type Answer = Pin<Box<dyn Future<Output = Response<Body>> + Send>>;
 
 /// The requests to a server in the same process. They use no socket and no TLS.
 #[derive(Clone)]
-pub struct InProcess(Arc<dyn Fn(Request<Body>) -> Answer + Send + Sync>);
+pub struct InProcess {
+    answer: Arc<dyn Fn(Request<Body>) -> Answer + Send + Sync>,
+    /// The cameras of the process.
+    pub own_cameras: OwnCameras,
+}
 
 impl InProcess {
     /// Creates a connection to the server that answers with this function.
-    pub fn new<A>(answer: impl Fn(Request<Body>) -> A + Send + Sync + 'static) -> Self
+    pub fn new<A>(
+        own_cameras: OwnCameras,
+        answer: impl Fn(Request<Body>) -> A + Send + Sync + 'static,
+    ) -> Self
     where
         A: Future<Output = Response<Body>> + Send + 'static,
     {
-        Self(Arc::new(move |request| Box::pin(answer(request))))
+        Self {
+            answer: Arc::new(move |request| Box::pin(answer(request))),
+            own_cameras,
+        }
     }
 
     pub(crate) fn answer(&self, request: Request<Body>) -> Answer {
-        (self.0)(request)
+        (self.answer)(request)
     }
 }
 
 impl PartialEq for InProcess {
     fn eq(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.0, &other.0)
+        Arc::ptr_eq(&self.answer, &other.answer)
     }
 }
 

@@ -23,6 +23,7 @@ mod in_process;
 mod log_once;
 #[cfg(feature = "metrics")]
 pub mod metrics;
+mod own_cameras;
 pub mod plain_name;
 #[cfg(feature = "companion")]
 mod reload;
@@ -37,6 +38,7 @@ mod stored_file;
 pub mod text;
 
 pub use log_once::LogOnce;
+pub use own_cameras::{Claim, OwnCameras, Place, makes_room};
 pub use replacement::{Replacement, UNFINISHED, replace_file, sync_folder};
 pub use stored_file::StoredFile;
 

@@ -87,6 +87,7 @@ fn counter(store: &Store, definition: &Arc<CameraDefinition>) -> Counter {
     let options = CountingOptions {
         longest_gap_ms: 10_000,
         max_cameras: 64,
+        ..CountingOptions::default()
     };
     let resumed = store.resumed().unwrap();
     let mut counter = Counter::new(options, resumed.last_event, resumed.totals);

@@ -8,7 +8,7 @@ use std::{
     time::Duration,
 };
 
-use lookdown_common::text::one_line;
+use lookdown_common::{Claim, OwnCameras, Place, makes_room, text::one_line};
 use lookdown_tracking::MAX_CAMERAS;
 
 use crate::{
@@ -30,12 +30,14 @@ pub(crate) const MAX_AHEAD_MS: i64 = 300_000;
 const LOG_PAUSE: Duration = Duration::from_mins(10);
 
 /// The limits of counting.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct CountingOptions {
     /// Longest time between two reports of a camera that is known, milliseconds.
     pub(crate) longest_gap_ms: i64,
     /// Most cameras.
     pub(crate) max_cameras: usize,
+    /// Cameras that have a place beyond the limit, too.
+    pub(crate) own: OwnCameras,
 }
 
 /// The cameras and sites.
@@ -55,7 +57,10 @@ pub(crate) struct Counter {
     last_event: u64,
     /// Number of times that the IDs of the server went back.
     position_resets: u64,
+    /// Number of cameras that made room for others.
+    displaced_cameras: u64,
     drops: Drops,
+    room_log: LogPause,
     position_log: LogPause,
     tracks_log: LogPause,
     ahead_log: LogPause,
@@ -86,7 +91,9 @@ impl Counter {
             is_urgent: false,
             last_event,
             position_resets: 0,
+            displaced_cameras: 0,
             drops: Drops::default(),
+            room_log: LogPause::default(),
             position_log: LogPause::default(),
             tracks_log: LogPause::default(),
             ahead_log: LogPause::default(),
@@ -166,6 +173,11 @@ impl Counter {
         self.position_resets
     }
 
+    /// Returns the number of cameras that made room for others.
+    pub(crate) fn displaced_cameras(&self) -> u64 {
+        self.displaced_cameras
+    }
+
     /// Returns the reports that were not counted.
     pub(crate) fn drops(&self) -> &Drops {
         &self.drops
@@ -185,7 +197,9 @@ impl Counter {
         let counted = self.count(event, report, definition, now);
         match &counted {
             Ok(_) => self.drops.end(&report.camera),
-            Err(reason) => self.drops.add(&report.camera, *reason, now),
+            Err(reason) => self
+                .drops
+                .add(&report.camera, *reason, &self.options.own, now),
         }
         counted.map_or_else(Accepted::Dropped, Accepted::Counted)
     }
@@ -205,7 +219,7 @@ impl Counter {
         }
         self.warn_of_clock(event, report, now);
         self.advance_to(event, now);
-        let owner = self.place(&report.camera, definition);
+        let owner = self.place(&report.camera, definition, now);
         let owner = owner.ok_or(DropReason::TooManyCameras)?;
         self.changed.insert(owner.clone());
         let is_on_site = definition.site.is_some();
@@ -289,7 +303,12 @@ impl Counter {
     }
 
     /// Returns the scene of a camera with this definition. Creates or changes it first.
-    fn place(&mut self, camera: &str, definition: &Arc<CameraDefinition>) -> Option<Owner> {
+    fn place(
+        &mut self,
+        camera: &str,
+        definition: &Arc<CameraDefinition>,
+        now: Now,
+    ) -> Option<Owner> {
         let owner = match &definition.site {
             Some(site) => Owner::Site(site.clone()),
             None => Owner::Camera(camera.to_owned()),
@@ -307,9 +326,14 @@ impl Counter {
                 return Some(owner);
             }
         }
+        let claim = self.claim(camera, definition);
         let is_full = before.is_none() && self.owners.len() >= self.options.max_cameras;
-        let site = self.scenes.get(&owner);
-        if is_full || site.is_some_and(|site| site.cameras.len() >= MAX_CAMERAS) {
+        if is_full && !self.make_room(claim, None, now) && claim != Claim::Own {
+            return None;
+        }
+        let is_full = |site: &Scene| site.cameras.len() >= MAX_CAMERAS;
+        if self.scenes.get(&owner).is_some_and(is_full) && !self.make_room(claim, Some(&owner), now)
+        {
             return None;
         }
         let furniture = self.furniture_for(camera, definition);
@@ -322,6 +346,50 @@ impl Counter {
         self.owners.insert(camera.to_owned(), owner.clone());
         self.restore_furniture(camera, furniture);
         Some(owner)
+    }
+
+    fn claim(&self, camera: &str, definition: &CameraDefinition) -> Claim {
+        self.options
+            .own
+            .claim(camera, definition.geometry.is_some())
+    }
+
+    /// Removes the camera with the weakest claim, of a site or of all, for a camera with this claim.
+    /// Returns false if none makes room.
+    fn make_room(&mut self, claim: Claim, site: Option<&Owner>, now: Now) -> bool {
+        let longest_gap = Duration::from_millis(self.options.longest_gap_ms.unsigned_abs());
+        let is_there = |scene: &&Scene| site.is_none_or(|site| scene.owner == *site);
+        let places = self.scenes().filter(is_there).flat_map(|scene| {
+            scene.cameras.iter().map(|camera| {
+                let last = camera.arrived();
+                let age = last.map(|last| now.instant.saturating_duration_since(last));
+                Place {
+                    camera: (scene.owner.clone(), camera.name.clone()),
+                    claim: self.claim(&camera.name, &camera.definition),
+                    last,
+                    is_silent: age.is_none_or(|age| age > longest_gap),
+                }
+            })
+        });
+        let Some((owner, camera)) = makes_room(claim, places) else {
+            return false;
+        };
+        if self.room_log.is_over(LOG_PAUSE, now) {
+            let shown = one_line(&camera);
+            tracing::warn!(
+                "there are too many cameras: {shown} made room for another: raise counts.max_cameras, or see GET /counts for unknown names"
+            );
+        }
+        self.displaced_cameras += 1;
+        self.forget(&owner, &camera);
+        true
+    }
+
+    /// Stops following a camera. Its counts stay in the store.
+    fn forget(&mut self, owner: &Owner, camera: &str) {
+        self.owners.remove(camera);
+        self.rebuild(owner, |cameras| drop(cameras.remove(camera)));
+        self.has_news = true;
     }
 
     /// Removes cameras without a report in the day before the newest report, so that others have
@@ -345,9 +413,7 @@ impl Counter {
                 continue;
             }
             tracing::info!(camera, "no longer followed: it has had no report for a day");
-            self.owners.remove(&camera);
-            self.rebuild(&owner, |cameras| drop(cameras.remove(&camera)));
-            self.has_news = true;
+            self.forget(&owner, &camera);
         }
     }
 
@@ -396,3 +462,6 @@ impl Counter {
         })
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,12 +1,16 @@
 //! Reports that were not counted, by camera.
 
-use std::{collections::BTreeMap, fmt, time::Duration};
+use std::{
+    collections::BTreeMap,
+    fmt,
+    time::{Duration, Instant},
+};
 
-use lookdown_common::text::one_line;
+use lookdown_common::{OwnCameras, Place, makes_room, text::one_line};
 
 use crate::now::{LogPause, Now};
 
-/// Most cameras of which dropped reports are known.
+/// Most cameras of which dropped reports are known, beside those of this process.
 const MAX_CAMERAS: usize = 256;
 /// Pause between two log lines about one camera.
 const LOG_PAUSE: Duration = Duration::from_hours(1);
@@ -15,6 +19,8 @@ const LOG_PAUSE: Duration = Duration::from_hours(1);
 #[derive(Debug, Default)]
 pub(crate) struct Drops {
     cameras: BTreeMap<String, CameraDrops>,
+    /// The log lines about cameras beyond the limit, whose names clients choose.
+    limit_log: LogPause,
 }
 
 /// The dropped reports of a camera.
@@ -26,6 +32,7 @@ pub(crate) struct CameraDrops {
     pub(crate) since_ms: Option<i64>,
     /// The reason of the last one.
     pub(crate) reason: DropReason,
+    last: Instant,
     log: LogPause,
 }
 
@@ -65,22 +72,34 @@ impl fmt::Display for DropReason {
 
 impl Drops {
     /// Adds a dropped report. Logs the first one of a camera, and at most one per hour.
-    pub(crate) fn add(&mut self, camera: &str, reason: DropReason, now: Now) {
-        let is_full = self.cameras.len() >= MAX_CAMERAS && !self.cameras.contains_key(camera);
-        if is_full {
-            return;
+    pub(crate) fn add(&mut self, camera: &str, reason: DropReason, own: &OwnCameras, now: Now) {
+        if self.cameras.len() >= MAX_CAMERAS && !self.cameras.contains_key(camera) {
+            let places = self.cameras.iter().map(|(name, drops)| Place {
+                camera: name.clone(),
+                claim: own.claim(name, false),
+                last: drops.last,
+                is_silent: true,
+            });
+            if let Some(oldest) = makes_room(own.claim(camera, false), places) {
+                self.cameras.remove(&oldest);
+            }
         }
         let entry = self.cameras.entry(camera.to_owned());
         let drops = entry.or_insert_with(|| CameraDrops {
             reports: 0,
             since_ms: None,
             reason,
+            last: now.instant,
             log: LogPause::default(),
         });
         drops.reports += 1;
         drops.since_ms = drops.since_ms.or(Some(now.unix_ms));
-        drops.reason = reason;
-        if drops.log.is_over(LOG_PAUSE, now) {
+        (drops.reason, drops.last) = (reason, now.instant);
+        let log = match reason {
+            DropReason::TooManyCameras => &mut self.limit_log,
+            _ => &mut drops.log,
+        };
+        if log.is_over(LOG_PAUSE, now) {
             let camera = one_line(camera);
             tracing::warn!(camera, "a report is not counted: {reason}");
         }
@@ -97,6 +116,12 @@ impl Drops {
     pub(crate) fn iter(&self) -> impl Iterator<Item = (&str, &CameraDrops)> {
         let cameras = self.cameras.iter();
         cameras.map(|(name, drops)| (name.as_str(), drops))
+    }
+
+    /// Returns the reason why the reports of a camera are not counted now, as a sentence.
+    pub(crate) fn reason(&self, camera: &str) -> Option<String> {
+        let drops = self.of(camera).filter(|drops| drops.since_ms.is_some())?;
+        Some(format!("its reports are not counted: {}", drops.reason))
     }
 
     /// Returns the dropped reports of a camera.

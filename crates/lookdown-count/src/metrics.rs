@@ -22,6 +22,8 @@ metric_set! {
     reports_skipped: IntCounterVec = "reports_skipped_total" ["reason"];
     /// Times that the IDs of the server went back.
     position_resets: IntCounter = "position_resets_total" [];
+    /// Cameras that made room for others: there are more than `counts.max_cameras`.
+    displaced_cameras: IntCounter = "displaced_cameras_total" [];
     /// Failed transactions of the store.
     commits_failed: IntCounter = "commits_failed_total" [];
     /// Delivered messages.
@@ -53,8 +55,13 @@ impl Metrics {
     /// Returns all metrics in the text format of Prometheus.
     pub(crate) fn text(&self, counter: &Counter, now_ms: i64) -> Vec<u8> {
         let snapshot = counter.snapshot(now_ms);
-        self.position_resets.reset();
-        self.position_resets.inc_by(counter.position_resets());
+        for (metric, count) in [
+            (&self.position_resets, counter.position_resets()),
+            (&self.displaced_cameras, counter.displaced_cameras()),
+        ] {
+            metric.reset();
+            metric.inc_by(count);
+        }
         for counters in [
             &self.crossings,
             &self.zone_entries,

@@ -66,6 +66,7 @@ impl Recording {
         let counting = CountingOptions {
             longest_gap_ms: i64::try_from(longest_gap.as_millis()).unwrap_or(i64::MAX),
             max_cameras: MAX_CAMERAS,
+            ..CountingOptions::default()
         };
         // Other cameras of the store have other recordings. A store of an earlier version has no
         // state of its cameras.

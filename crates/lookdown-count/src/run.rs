@@ -4,7 +4,7 @@ use std::{future::Future, sync::Arc, time::Duration};
 
 use axum::Router;
 use jiff::Timestamp;
-use lookdown_common::{AbortOnDrop, ClientError, ConfigError, ServerClient};
+use lookdown_common::{AbortOnDrop, ClientError, ConfigError, OwnCameras, ServerClient};
 use lookdown_http::{
     protect::{self, Access, Routes},
     server::bind,
@@ -41,6 +41,8 @@ pub struct Started {
     pub routes: Router,
     /// Returns all metrics in the text format of Prometheus.
     pub metrics: Box<dyn Fn() -> Vec<u8> + Send + Sync>,
+    /// Returns the reason why the reports of a camera are not counted now.
+    pub not_counted: Box<dyn Fn(&str) -> Option<String> + Send + Sync>,
 }
 
 /// The reason why nothing is counted.
@@ -94,9 +96,11 @@ pub async fn count(
     });
     let (store, resumed) = opened.await.map_err(CountError::StoreTask)??;
     let calibrations = Calibrations::resumed(resumed.calibrations);
+    let in_process = options.server.in_process.as_ref();
     let counting = CountingOptions {
         longest_gap_ms: i64::try_from(options.longest_gap.as_millis()).unwrap_or(i64::MAX),
         max_cameras: options.max_cameras,
+        own: in_process.map_or_else(OwnCameras::default, |server| server.own_cameras.clone()),
     };
     let mut counter = Counter::new(counting, resumed.last_event, resumed.totals);
     for state in resumed.scenes {
@@ -118,7 +122,9 @@ pub async fn count(
         |listener| serve_alone(listener, options, counts.clone(), &counter, &metrics);
     let _serving = listener.map(own_listener);
     let (shown, shown_counter) = (Arc::clone(&metrics), Arc::clone(&counter));
+    let dropping = Arc::clone(&counter);
     started(Started {
+        not_counted: Box::new(move |camera| dropping.lock().drops().reason(camera)),
         routes: counts,
         metrics: Box::new(move || {
             shown.text(&shown_counter.lock(), Timestamp::now().as_millisecond())

@@ -131,6 +131,11 @@ impl SceneCamera {
         };
     }
 
+    /// Returns the arrival of the last counted report at this process.
+    pub(crate) fn arrived(&self) -> Option<Instant> {
+        self.arrived
+    }
+
     /// Returns true if a refused report shows that a clock was set back: no report of this camera
     /// was in order for [`LATE_LIMIT`].
     pub(crate) fn is_set_back(&mut self, now: Instant) -> bool {

@@ -88,8 +88,8 @@ pub(in crate::api) struct CameraInfo {
     reached_rate: Option<f64>,
     /// The profile and the rate in use, with the time of a search that they were chosen by.
     choice: Option<String>,
-    /// The reason and the remedies, if less than 80 % of the wanted rate is reached, or if the
-    /// machine is too slow for counts.
+    /// The reason and the remedies, if less than 80 % of the wanted rate is reached, if the machine
+    /// is too slow for counts, or if reports are not counted.
     warning: Option<String>,
     /// The reason why the source gives no frames.
     problem: Option<String>,
@@ -380,6 +380,8 @@ async fn rows(state: &ApiState, deadline: Deadline) -> Result<Vec<CameraInfo>, P
     }
     for row in &mut rows {
         row.suggestion = suggestion::state_of(state, &row.name);
+        let not_counted = || state.options.companions.not_counted(&row.name);
+        row.warning = row.warning.take().or_else(not_counted);
     }
     rows.sort_unstable_by(|one, other| one.name.cmp(&other.name));
     Ok(rows)

@@ -23,7 +23,9 @@ fn cameras(most: usize) -> Cameras {
 
 fn cameras_with(discovery: Discovery, most: usize) -> Cameras {
     let most = NonZeroUsize::new(most).unwrap();
-    Cameras::new(topics(), discovery, HOLD, most)
+    let own = OwnCameras::default();
+    own.set(["own".to_owned()].into());
+    Cameras::new(topics(), discovery, HOLD, most, own)
 }
 
 fn report(camera: &str, persons: usize, zones: &str) -> StoredReport {
@@ -271,4 +273,17 @@ fn headline_number_is_published_beside_that_of_the_frame() {
     let followed = published(&cameras.set_persons("lobby", 6, now)).0;
     assert_eq!(followed[0], expected(&[("lobby/persons", "6")])[0]);
     assert!(cameras.set_persons("unknown", 6, now).is_empty());
+}
+
+#[test]
+fn own_camera_is_published_beyond_the_limit() {
+    let mut cameras = cameras(1);
+    assert!(!update(&mut cameras, &report("x", 1, "")).is_empty());
+    assert!(update(&mut cameras, &report("y", 1, "")).is_empty());
+    let messages = update(&mut cameras, &report("own", 2, ""));
+    let forgotten = messages
+        .iter()
+        .any(|message| message.topic.ends_with("/x/persons") && message.payload.is_empty());
+    assert!(forgotten, "{messages:?}");
+    assert_eq!(cameras.available(), ["own"]);
 }

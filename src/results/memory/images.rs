@@ -2,12 +2,15 @@
 
 use std::{collections::HashMap, num::NonZeroUsize, sync::Arc};
 
+use lookdown_common::OwnCameras;
+
 use crate::{
     annotated_image::StoredFrame,
     results::{ReportId, StoredImage},
 };
 
-/// The images, at most `most`: the camera that was silent for longest is evicted first.
+/// The images, at most `most`: the camera that was silent for longest is evicted first, and those
+/// of this process last.
 #[derive(Debug)]
 pub(super) struct Images {
     most: NonZeroUsize,
@@ -24,14 +27,21 @@ impl Images {
 
     /// Replaces the camera's image by that of the report with this ID, or removes it if that report
     /// has none.
-    pub(super) fn replace(&mut self, camera: &str, id: ReportId, frame: Option<StoredFrame>) {
+    pub(super) fn replace(
+        &mut self,
+        camera: &str,
+        id: ReportId,
+        frame: Option<StoredFrame>,
+        own: &OwnCameras,
+    ) {
         let Some(frame) = frame else {
             return self.forget(camera);
         };
         let stored = Arc::new(StoredImage { id, frame });
         self.of_cameras.insert(camera.to_owned(), stored);
         while self.of_cameras.len() > self.most.get() {
-            let oldest = self.of_cameras.iter().min_by_key(|(_, stored)| stored.id);
+            let images = self.of_cameras.iter();
+            let oldest = images.min_by_key(|(camera, stored)| (own.contains(camera), stored.id));
             if let Some(camera) = oldest.map(|(camera, _)| camera.clone()) {
                 self.of_cameras.remove(&camera);
             }

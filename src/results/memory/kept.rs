@@ -7,6 +7,7 @@ use std::{
 };
 
 use jiff::{SignedDuration, Timestamp};
+use lookdown_common::OwnCameras;
 
 use super::images::Images;
 use crate::{
@@ -19,6 +20,8 @@ use crate::{
 #[derive(Debug)]
 pub(super) struct BoundedReports {
     limits: ResultLimits,
+    /// Cameras that others do not displace.
+    pub(super) own: OwnCameras,
     /// The reports of each camera, oldest first, at least one.
     cameras: HashMap<String, VecDeque<Arc<StoredReport>>>,
     /// The latest report of every camera.
@@ -37,6 +40,7 @@ impl BoundedReports {
         Self {
             images: Images::new(limits.max_images),
             limits,
+            own: OwnCameras::default(),
             cameras: HashMap::new(),
             latest: BTreeMap::new(),
             earlier: BTreeMap::new(),
@@ -58,7 +62,7 @@ impl BoundedReports {
         self.newest = id;
         self.bytes += stored.report.bytes();
         let camera = &stored.report.camera;
-        self.images.replace(camera, id, image);
+        self.images.replace(camera, id, image, &self.own);
         let reports = self.cameras.entry(camera.clone()).or_default();
         if let Some(before) = reports.back() {
             self.latest.remove(&before.id);
@@ -113,20 +117,28 @@ impl BoundedReports {
 
     fn keep_limits(&mut self) {
         while self.cameras.len() > self.limits.max_cameras.get()
-            && let Some((_, silent)) = self.latest.first_key_value()
+            && let Some(silent) = self.oldest_of_others()
         {
             let camera = silent.report.camera.clone();
             while self.forget_oldest_of(&camera) {}
         }
         while (self.count() > self.limits.max_reports.get() || self.bytes > self.limits.max_bytes)
-            && let Some((_, oldest)) = self
+            && let Some(oldest) = self
                 .earlier
-                .first_key_value()
-                .or_else(|| self.latest.first_key_value())
+                .values()
+                .next()
+                .or_else(|| self.oldest_of_others())
         {
             let camera = oldest.report.camera.clone();
             self.forget_oldest_of(&camera);
         }
+    }
+
+    /// Returns the oldest latest report of a camera that is not of this process, if there is one.
+    fn oldest_of_others(&self) -> Option<&Arc<StoredReport>> {
+        let mut latest = self.latest.values();
+        let other = latest.find(|stored| !self.own.contains(&stored.report.camera));
+        other.or_else(|| self.latest.values().next())
     }
 
     /// Removes the oldest report of the camera. Returns false if there was none.

@@ -195,3 +195,16 @@ fn a_deleted_camera_leaves_the_others() {
     assert_eq!(kept.cameras(), ["hall"]);
     assert_eq!((kept.usage().reports, kept.usage().images), (1, 1));
 }
+
+#[test]
+fn own_camera_stays_among_many_names() {
+    let mut kept = kept([2, 3, 1000, 1 << 20]);
+    kept.own.set(["hall".to_owned()].into());
+    let own = add_with_image(&mut kept, "hall");
+    for number in 0..5 {
+        add_with_image(&mut kept, &format!("x{number}"));
+    }
+    assert_eq!(kept.latest("hall").unwrap().id, own);
+    assert!(kept.image("hall").is_some());
+    assert_eq!(kept.usage().cameras, 2);
+}

@@ -18,14 +18,18 @@ use crate::{
     sums::Totals,
 };
 
-const OPTIONS: CountingOptions = CountingOptions {
-    longest_gap_ms: 10_000,
-    max_cameras: 4,
-};
 /// Time of the first report, seconds since the Unix epoch.
 const START_S: i64 = 1_795_262_400;
 
-/// An counter whose camera `hall` has a mannequin in each report, one a second.
+fn options() -> CountingOptions {
+    CountingOptions {
+        longest_gap_ms: 10_000,
+        max_cameras: 4,
+        ..CountingOptions::default()
+    }
+}
+
+/// A counter whose camera `hall` has a mannequin in each report, one a second.
 struct Hall {
     counter: Counter,
     definition: Arc<CameraDefinition>,
@@ -65,7 +69,7 @@ fn report(second: i64, revision: u8) -> ReceivedReport {
 impl Hall {
     fn new() -> Self {
         Self {
-            counter: Counter::new(OPTIONS, 0, Totals::default()),
+            counter: Counter::new(options(), 0, Totals::default()),
             definition: definition(&report(0, 1), ""),
             started: Instant::now(),
             second: 0,
@@ -143,7 +147,7 @@ fn furniture_and_decisions_survive_a_restart() {
         .commit(&batch, &[], None)
         .unwrap();
     let resumed = Store::open(&path).unwrap().resumed().unwrap();
-    hall.counter = Counter::new(OPTIONS, resumed.last_event, resumed.totals);
+    hall.counter = Counter::new(options(), resumed.last_event, resumed.totals);
     for scene in resumed.scenes {
         hall.counter.resume(scene, |_| Arc::clone(&hall.definition));
     }
