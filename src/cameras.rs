@@ -12,21 +12,26 @@ use std::{
 };
 
 use lookdown_common::{ConfigError, OwnCameras, Secret, StoredFile, plain_name};
-use lookdown_watch::{CameraEntry, CameraState, Frame, Location, Metrics, first_frame};
+use lookdown_watch::{
+    Camera, CameraEntry, CameraState, Frame, Location, MAX_CAMERAS, Metrics, first_frame,
+};
 use parking_lot::{Mutex, RwLock};
 use secrecy::ExposeSecret;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use state_folder::StateFolder;
+use tokio::sync::Semaphore;
 
 pub use error::CameraError;
 
 /// Longest wait for the frame of a test.
 const TEST_TIMEOUT: Duration = Duration::from_secs(15);
+/// The problem of a camera beyond the limit.
+const TOO_MANY: &str = "there are 256 cameras: delete one first";
+/// Most cameras that are tested at a time: each may start a decoder.
+const MAX_TESTS: usize = 4;
 /// The name in the path of a test, which no camera has.
 const TEST: &str = "test";
-/// Most stored cameras.
-const MAX_CAMERAS: usize = 256;
 /// The file of the cameras in the state folder.
 const FILE: &str = "cameras.json";
 /// The file with the names of the cameras of the settings that are paused, in the state folder.
@@ -59,14 +64,9 @@ impl StoredCamera {
     /// Returns the source without its query, which may hold a token.
     #[must_use]
     pub fn shown_source(&self) -> String {
-        shown_source(&self.url)
+        let location = Location::parse(&self.url);
+        location.map_or_else(|_| String::new(), |(location, _)| location.to_string())
     }
-}
-
-/// Returns a source without its credentials and its query, which may hold a token.
-fn shown_source(url: &str) -> String {
-    let location = Location::parse(url);
-    location.map_or_else(|_| String::new(), |(location, _)| location.to_string())
 }
 
 /// Stored cameras by name.
@@ -74,10 +74,13 @@ pub type Stored = BTreeMap<String, StoredCamera>;
 
 /// The content of the file of the cameras.
 #[derive(Serialize)]
-struct CameraFile<'a> {
+struct CameraFile {
     version: u8,
     #[serde(flatten)]
-    cameras: &'a Stored,
+    cameras: Stored,
+    /// Entries that are not cameras. They stay until they are replaced or deleted.
+    #[serde(flatten)]
+    invalid: Map<String, Value>,
 }
 
 /// The cameras of this process.
@@ -86,7 +89,13 @@ pub struct Cameras {
     /// Locked while the file is changed.
     changing: Mutex<()>,
     /// The cameras of the settings file and the command line.
-    configured: RwLock<BTreeMap<String, CameraEntry>>,
+    configured: RwLock<BTreeMap<String, Camera>>,
+    /// The values of keys that a stored camera does not have.
+    defaults: RwLock<CameraEntry>,
+    /// The stored cameras that cannot be watched, with the reasons.
+    problems: RwLock<BTreeMap<String, String>>,
+    /// The permits of tests.
+    tests: Semaphore,
     /// The names of all cameras.
     own: OwnCameras,
     metrics: Arc<Metrics>,
@@ -100,6 +109,9 @@ impl Cameras {
             folder: StateFolder::new(folder),
             changing: Mutex::default(),
             configured: RwLock::default(),
+            defaults: RwLock::default(),
+            problems: RwLock::default(),
+            tests: Semaphore::new(MAX_TESTS),
             own,
             metrics,
         }
@@ -130,11 +142,21 @@ impl Cameras {
         let paused = self.paused()?;
         let configured = self.configured.read();
         let of_settings = configured.iter().filter(|(name, _)| paused.contains(*name));
-        let with_source = of_settings.map(|(name, entry)| {
-            let url = entry.url.as_deref().unwrap_or_default();
-            (name.clone(), shown_source(url))
-        });
+        let with_source =
+            of_settings.map(|(name, camera)| (name.clone(), camera.location.to_string()));
         Ok(with_source.collect())
+    }
+
+    /// Returns the stored cameras that cannot be watched, with the reasons.
+    #[must_use]
+    pub fn problems(&self) -> BTreeMap<String, String> {
+        self.problems.read().clone()
+    }
+
+    /// Returns true while frames of the camera are read.
+    #[must_use]
+    pub fn is_watched(&self, name: &str) -> bool {
+        self.metrics.states().iter().any(|state| state.name == name)
     }
 
     /// Returns all cameras by name, and whether their frames are read. Blocks.
@@ -145,11 +167,15 @@ impl Cameras {
         let stored = self.stored()?;
         let mut states: BTreeMap<_, _> = stored
             .into_iter()
-            .map(|(name, camera)| (name, !camera.paused))
+            .map(|(name, camera)| {
+                let is_on = !camera.paused || self.is_watched(&name);
+                (name, is_on)
+            })
             .collect();
         let paused = self.paused()?;
         for name in self.configured.read().keys() {
-            states.insert(name.clone(), !paused.contains(name));
+            let is_on = !paused.contains(name) || self.is_watched(name);
+            states.insert(name.clone(), is_on);
         }
         Ok(states)
     }
@@ -173,40 +199,69 @@ impl Cameras {
             self.folder.write(&self.folder.file(PAUSED), &content)?;
             return Ok(true);
         }
-        let mut stored = self.stored()?;
-        let Some(camera) = stored.get_mut(name) else {
+        let mut file = self.file()?;
+        let Some(camera) = file.cameras.get_mut(name) else {
             return Ok(false);
         };
         camera.paused = !is_on;
-        self.store(&stored)?;
+        self.store(&file)?;
         Ok(true)
     }
 
     /// Adds the stored cameras that are not paused to those of the settings, which have precedence,
-    /// and removes those of the settings that are paused.
+    /// and removes those of the settings that are paused. `defaults` has the values of keys that a
+    /// stored camera does not have. A stored camera that cannot be watched gets a problem.
     ///
     /// # Errors
-    /// [`ConfigError`] if the file of the cameras cannot be used. Blocks.
-    pub fn add_to(&self, cameras: &mut Vec<CameraEntry>) -> Result<(), ConfigError> {
-        let named = cameras.iter().filter_map(|camera| {
-            let name = camera.name.clone().or_else(|| camera.calibration.clone())?;
-            Some((name, camera.clone()))
-        });
+    /// [`ConfigError`] if a file in the state folder is none of this program. Blocks.
+    pub fn add_to(
+        &self,
+        cameras: &mut Vec<Camera>,
+        defaults: &CameraEntry,
+    ) -> Result<(), ConfigError> {
+        self.defaults.write().clone_from(defaults);
+        let named = cameras
+            .iter()
+            .map(|camera| (camera.name.clone(), camera.clone()));
         let configured: BTreeMap<_, _> = named.collect();
         let paused = self.paused()?;
-        cameras.retain(|camera| {
-            let name = camera.name.as_ref().or(camera.calibration.as_ref());
-            name.is_none_or(|name| !paused.contains(name))
-        });
-        let stored = self.stored()?;
-        self.own
-            .set(configured.keys().chain(stored.keys()).cloned().collect());
-        for (name, camera) in stored {
-            if !camera.paused && !configured.contains_key(&name) {
-                cameras.push(self.entry(&name, &camera));
+        let file = self.file()?;
+        self.own.set(
+            configured
+                .keys()
+                .chain(file.cameras.keys())
+                .cloned()
+                .collect(),
+        );
+        cameras.retain(|camera| !paused.contains(&camera.name));
+        let malformed = |name| {
+            (
+                name,
+                "it is not a camera: delete it, or replace it".to_owned(),
+            )
+        };
+        let mut problems: BTreeMap<_, _> = file
+            .invalid
+            .into_iter()
+            .map(|(name, _)| malformed(name))
+            .collect();
+        let stored = file.cameras.into_iter();
+        for (name, camera) in stored.filter(|(name, _)| !configured.contains_key(name)) {
+            match self.loaded(&name, &camera) {
+                Ok(_) if camera.paused => {}
+                Ok(camera) if cameras.len() < MAX_CAMERAS => cameras.push(camera),
+                Ok(_) => drop(problems.insert(name, TOO_MANY.to_owned())),
+                Err(problem) => drop(problems.insert(name, problem.to_string())),
             }
         }
         *self.configured.write() = configured;
+        let mut known = self.problems.write();
+        for (camera, problem) in &problems {
+            if known.get(camera) != Some(problem) {
+                tracing::warn!(camera, "the camera is not watched: {problem}");
+            }
+        }
+        *known = problems;
         Ok(())
     }
 
@@ -215,13 +270,28 @@ impl Cameras {
     /// # Errors
     /// [`ConfigError`].
     pub fn stored(&self) -> Result<Stored, ConfigError> {
-        let mut cameras: Map<String, Value> = self.folder.read(FILE)?;
-        if let Some(version) = cameras.remove(StoredFile::KEY) {
+        Ok(self.file()?.cameras)
+    }
+
+    /// Reads the file of the cameras.
+    fn file(&self) -> Result<CameraFile, ConfigError> {
+        let mut entries: Map<String, Value> = self.folder.read(FILE)?;
+        if let Some(version) = entries.remove(StoredFile::KEY) {
             let checked = StoredFile::Cameras.check(&version.to_string());
             checked.map_err(|problem| self.folder.refused(FILE, &problem))?;
         }
-        Stored::deserialize(Value::Object(cameras))
-            .map_err(|error| self.folder.malformed(FILE, &error))
+        let (mut cameras, mut invalid) = (Stored::new(), Map::new());
+        for (name, entry) in entries {
+            match StoredCamera::deserialize(&entry) {
+                Ok(camera) => drop(cameras.insert(name, camera)),
+                Err(_) => drop(invalid.insert(name, entry)),
+            }
+        }
+        Ok(CameraFile {
+            version: StoredFile::Cameras.version(),
+            cameras,
+            invalid,
+        })
     }
 
     /// Returns the names of the paused cameras of the settings, possibly also of earlier settings.
@@ -241,15 +311,19 @@ impl Cameras {
         password: Option<&Secret>,
     ) -> Result<bool, CameraError> {
         let _changing = self.changing.lock();
-        let mut stored = self.stored()?;
-        let before = stored.get(name);
+        let mut file = self.file()?;
+        let before = file.cameras.get(name);
         if let (true, Some(before)) = (camera.url.is_empty(), before) {
             camera.url.clone_from(&before.url);
         }
-        self.check(name, &camera)?;
-        if before.is_none() && stored.len() >= MAX_CAMERAS {
-            let problem = "256 cameras are stored: delete one first";
-            return Err(ConfigError::problem("name", &problem).into());
+        check_name(name)?;
+        let configured = self.configured.read();
+        if configured.contains_key(name) {
+            return Err(CameraError::Configured(name.to_owned()));
+        }
+        self.checked(name, &camera)?;
+        if before.is_none() && file.cameras.len() + configured.len() >= MAX_CAMERAS {
+            return Err(ConfigError::problem("name", &TOO_MANY).into());
         }
         let is_same_login = before.is_some_and(|before| {
             before.user == camera.user && origin(&before.url) == origin(&camera.url)
@@ -261,8 +335,9 @@ impl Cameras {
             None if !is_same_login => StateFolder::remove(&self.folder.password(name))?,
             None => {}
         }
-        let is_new = stored.insert(name.to_owned(), camera).is_none();
-        self.store(&stored)?;
+        file.invalid.remove(name);
+        let is_new = file.cameras.insert(name.to_owned(), camera).is_none();
+        self.store(&file)?;
         Ok(is_new)
     }
 
@@ -272,14 +347,14 @@ impl Cameras {
     /// [`CameraError`].
     pub fn delete(&self, name: &str) -> Result<bool, CameraError> {
         let _changing = self.changing.lock();
-        let mut stored = self.stored()?;
-        if stored.remove(name).is_none() {
+        let mut file = self.file()?;
+        if file.cameras.remove(name).is_none() && file.invalid.remove(name).is_none() {
             if self.configured.read().contains_key(name) {
                 return Err(CameraError::Configured(name.to_owned()));
             }
             return Ok(false);
         }
-        self.store(&stored)?;
+        self.store(&file)?;
         StateFolder::remove(&self.folder.password(name))?;
         Ok(true)
     }
@@ -289,73 +364,95 @@ impl Cameras {
     /// # Errors
     /// [`CameraError`].
     pub async fn test(
+        &self,
         camera: &StoredCamera,
         password: Option<Secret>,
     ) -> Result<Frame, CameraError> {
-        let mut checked = checked("test", camera)?;
+        let mut checked = self.checked(TEST, camera)?;
         if let (Some(credentials), Some(password)) = (&mut checked.credentials, password) {
             credentials.password = password;
         }
-        Ok(first_frame(&checked, TEST_TIMEOUT).await?)
+        self.first_frame(&checked).await
+    }
+
+    async fn first_frame(&self, camera: &Camera) -> Result<Frame, CameraError> {
+        let permit = self.tests.try_acquire();
+        let _permit = permit.map_err(|_| CameraError::Busy)?;
+        Ok(first_frame(camera, TEST_TIMEOUT).await?)
     }
 
     /// Returns the camera with this name, paused or not. Blocks: reads the file of its password.
     ///
     /// # Errors
     /// [`ConfigError`].
-    pub fn get(&self, name: &str) -> Result<Option<lookdown_watch::Camera>, ConfigError> {
+    pub fn get(&self, name: &str) -> Result<Option<Camera>, ConfigError> {
         let configured = self.configured.read().get(name).cloned();
-        let entry = if configured.is_some() {
-            configured
-        } else {
-            let stored = self.stored()?;
-            stored.get(name).map(|camera| self.entry(name, camera))
-        };
-        entry.map(|entry| entry.check("")).transpose()
+        if configured.is_some() {
+            return Ok(configured);
+        }
+        let stored = self.stored()?;
+        let loaded = stored.get(name).map(|camera| self.loaded(name, camera));
+        loaded.transpose()
     }
 
     /// Returns the present frame of a camera.
     ///
     /// # Errors
     /// [`CameraError`].
-    pub async fn frame(camera: &lookdown_watch::Camera) -> Result<Frame, CameraError> {
+    pub async fn frame(&self, camera: &Camera) -> Result<Frame, CameraError> {
         if let Location::Http(_) | Location::Rtsp(_) = camera.location {
-            return Ok(first_frame(camera, TEST_TIMEOUT).await?);
+            return self.first_frame(camera).await;
         }
         let problem = "it is not a URL, so its frames cannot be read twice: set results.images to \
                        keep its latest image";
         Err(ConfigError::problem("url", &problem).into())
     }
 
-    fn check(&self, name: &str, camera: &StoredCamera) -> Result<(), CameraError> {
-        if !plain_name::is_plain(name) || [TEST, StoredFile::KEY].contains(&name) {
-            let remedy =
-                "is not a name of 1 to 64 of a-z, 0-9, '_' and '-', and not test or version";
-            return Err(ConfigError::value("name", name, remedy).into());
+    /// Returns the stored camera with its password.
+    fn loaded(&self, name: &str, camera: &StoredCamera) -> Result<Camera, ConfigError> {
+        check_name(name)?;
+        let mut loaded = self.checked(name, camera)?;
+        if let (Some(_), Some(credentials)) = (&camera.user, &mut loaded.credentials) {
+            credentials.password = self.folder.read_password(name)?;
         }
-        if self.configured.read().contains_key(name) {
-            return Err(CameraError::Configured(name.to_owned()));
-        }
-        checked(name, camera).map(drop)
+        Ok(loaded)
     }
 
-    /// Returns the entry of a stored camera with the file of its password.
-    fn entry(&self, name: &str, camera: &StoredCamera) -> CameraEntry {
-        let password = self.folder.password(name);
-        CameraEntry {
-            password_file: (camera.user.is_some() && password.exists()).then_some(password),
-            ..entry(name, camera)
+    /// Checks a camera, without its password: only URLs of cameras are permitted, without
+    /// credentials in them.
+    fn checked(&self, name: &str, camera: &StoredCamera) -> Result<Camera, ConfigError> {
+        let is_url = camera.url.contains("://");
+        let location = is_url.then(|| Location::parse(&camera.url));
+        let problem = match location {
+            Some(Ok((Location::Http(_) | Location::Rtsp(_), None))) => None,
+            Some(Ok((_, Some(_)))) => {
+                Some("it has a user name: give user and password as fields".to_owned())
+            }
+            Some(Err(error)) => Some(error.to_string()),
+            _ => Some("it is not the URL of a camera: use rtsp, rtsps, http or https".to_owned()),
+        };
+        if let Some(problem) = problem {
+            return Err(ConfigError::problem("url", &problem));
         }
+        let mut entry = entry(name, camera).or(&self.defaults.read());
+        if camera.user.is_some() {
+            entry.password_file = None;
+        }
+        entry.check("")
     }
 
-    fn store(&self, stored: &Stored) -> Result<(), CameraError> {
-        let content = serde_json::to_string_pretty(&CameraFile {
-            version: StoredFile::Cameras.version(),
-            cameras: stored,
-        });
-        self.folder
-            .write(&self.folder.file(FILE), &content.unwrap_or_default())
+    fn store(&self, file: &CameraFile) -> Result<(), CameraError> {
+        let content = serde_json::to_string_pretty(file).unwrap_or_default();
+        self.folder.write(&self.folder.file(FILE), &content)
     }
+}
+
+fn check_name(name: &str) -> Result<(), ConfigError> {
+    if plain_name::is_plain(name) && ![TEST, StoredFile::KEY].contains(&name) {
+        return Ok(());
+    }
+    let remedy = "is not a name of 1 to 64 of a-z, 0-9, '_' and '-', and not test or version";
+    Err(ConfigError::value("name", name, remedy))
 }
 
 fn entry(name: &str, camera: &StoredCamera) -> CameraEntry {
@@ -368,24 +465,6 @@ fn entry(name: &str, camera: &StoredCamera) -> CameraEntry {
         profile: camera.profile.clone(),
         ..CameraEntry::default()
     }
-}
-
-/// Checks a camera: only URLs of cameras are permitted, without credentials in them.
-fn checked(name: &str, camera: &StoredCamera) -> Result<lookdown_watch::Camera, CameraError> {
-    let is_url = camera.url.contains("://");
-    let location = is_url.then(|| Location::parse(&camera.url));
-    let problem = match location {
-        Some(Ok((Location::Http(_) | Location::Rtsp(_), None))) => None,
-        Some(Ok((_, Some(_)))) => {
-            Some("it has a user name: give user and password as fields".to_owned())
-        }
-        Some(Err(error)) => Some(error.to_string()),
-        _ => Some("it is not the URL of a camera: use rtsp, rtsps, http or https".to_owned()),
-    };
-    if let Some(problem) = problem {
-        return Err(ConfigError::problem("url", &problem).into());
-    }
-    Ok(entry(name, camera).check("")?)
 }
 
 /// Returns the scheme, host and port of a URL.

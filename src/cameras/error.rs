@@ -17,6 +17,9 @@ pub enum CameraError {
     /// The state folder cannot be used.
     #[error("state.path: {0} cannot be written: {1}")]
     Folder(PathBuf, #[source] io::Error),
+    /// Other cameras are being tested.
+    #[error("other cameras are being tested: retry")]
+    Busy,
     /// The camera gives no frame.
     #[error(transparent)]
     Source(#[from] SourceError),

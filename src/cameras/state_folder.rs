@@ -7,7 +7,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use lookdown_common::{ConfigError, Replacement, read_file};
+use lookdown_common::{ConfigError, Replacement, Secret, read_file};
 use serde::de::DeserializeOwned;
 
 use super::error::CameraError;
@@ -41,6 +41,17 @@ impl StateFolder {
         }
         let content = read_file("state.path", &path)?;
         serde_json::from_slice(&content).map_err(|error| self.malformed(name, &error))
+    }
+
+    /// Reads the password of a camera as it was given. Without a file, it is empty.
+    pub(super) fn read_password(&self, camera: &str) -> Result<Secret, ConfigError> {
+        let path = self.password(camera);
+        if !path.exists() {
+            return Ok(Secret::default());
+        }
+        let content = read_file("password", &path)?;
+        let password = String::from_utf8_lossy(&content);
+        Ok(password.strip_suffix('\n').unwrap_or(&password).into())
     }
 
     /// Returns the error of a file with another content.

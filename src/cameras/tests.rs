@@ -1,5 +1,8 @@
 use std::{fs, os::unix::fs::PermissionsExt, path::Path};
 
+use lookdown_common::{Reload, ServerEntry};
+use lookdown_watch::{Origin, WatchOptions, watch};
+
 use super::*;
 
 /// The cameras of a state folder within `folder`.
@@ -11,6 +14,20 @@ pub(crate) fn cameras(folder: &Path) -> Cameras {
 /// Changes of the cameras wait until this is dropped, as for a folder that hangs.
 pub(crate) fn hold(cameras: &Cameras) -> impl Drop + '_ {
     cameras.changing.lock()
+}
+
+/// A camera of the settings.
+fn configured(name: &str) -> Camera {
+    entry(name, &camera("rtsp://10.0.0.1/")).check("").unwrap()
+}
+
+/// The cameras that are watched beside these of the settings.
+fn watched(cameras: &Cameras, configured: &[Camera]) -> Vec<Camera> {
+    let mut watched = configured.to_vec();
+    cameras
+        .add_to(&mut watched, &CameraEntry::default())
+        .unwrap();
+    watched
 }
 
 /// A stored camera with this URL.
@@ -37,12 +54,12 @@ fn a_camera_is_stored_with_its_password_in_a_private_file() {
     );
     // After a restart.
     let cameras = cameras(folder.path());
-    let mut entries = Vec::new();
-    cameras.add_to(&mut entries).unwrap();
-    let [entry] = entries.as_slice() else {
+    let [watched] = &watched(&cameras, &[])[..] else {
         panic!("one camera")
     };
-    let file = entry.password_file.clone().unwrap();
+    let password = &watched.credentials.as_ref().unwrap().password;
+    assert_eq!(*password, Secret::from("geheim"));
+    let file = cameras.folder.password("hall");
     assert_eq!(fs::read_to_string(&file).unwrap(), "geheim\n");
     assert_eq!(
         fs::metadata(&file).unwrap().permissions().mode() & 0o777,
@@ -113,10 +130,8 @@ fn cameras_of_the_settings_file_have_precedence() {
     cameras
         .put("hall", camera("rtsp://10.0.0.8/s2"), None)
         .unwrap();
-    let own = entry("hall", &camera("rtsp://10.0.0.1/"));
-    let mut entries = vec![own.clone()];
-    cameras.add_to(&mut entries).unwrap();
-    assert_eq!(entries, [own]);
+    let own = configured("hall");
+    assert_eq!(watched(&cameras, std::slice::from_ref(&own)), [own]);
     let refused = cameras.put("hall", camera("rtsp://10.0.0.8/s2"), None);
     assert!(refused.unwrap_err().to_string().contains("settings file"));
 }
@@ -125,9 +140,8 @@ fn cameras_of_the_settings_file_have_precedence() {
 fn detection_is_switched_off_until_it_is_switched_on() {
     let folder = tempfile::tempdir().unwrap();
     let add = |cameras: &Cameras| {
-        let mut entries = vec![entry("gate", &camera("rtsp://10.0.0.1/"))];
-        cameras.add_to(&mut entries).unwrap();
-        let names = entries.into_iter().filter_map(|entry| entry.name);
+        let watched = watched(cameras, &[configured("gate")]);
+        let names = watched.into_iter().map(|camera| camera.name);
         names.collect::<Vec<_>>()
     };
     let first = cameras(folder.path());
@@ -170,4 +184,118 @@ fn a_camera_without_a_url_keeps_the_stored_one() {
     let refused = cameras.put("gate", camera(""), None).unwrap_err();
     assert!(refused.to_string().starts_with("url: it is"), "{refused}");
     assert!(cameras.get("gate").unwrap().is_none());
+}
+
+#[test]
+fn every_accepted_password_is_loaded_as_it_was_given() {
+    let folder = tempfile::tempdir().unwrap();
+    let cameras = cameras(folder.path());
+    for password in ["", " ", "\r", "\n", "\nb", "a\nb", "a ", " a", "ä\u{0}"] {
+        let given = Secret::from(password);
+        cameras
+            .put("hall", camera("rtsp://10.0.0.8/s2"), Some(&given))
+            .unwrap();
+        let loaded = watched(&cameras, &[]).remove(0).credentials.unwrap();
+        assert_eq!(loaded.password, given, "{password:?}");
+    }
+}
+
+#[test]
+fn a_camera_that_cannot_be_watched_leaves_the_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let cameras = cameras(folder.path());
+    let password = Secret::from("geheim");
+    for name in ["broken", "good"] {
+        cameras
+            .put(name, camera("rtsp://10.0.0.8/s2"), Some(&password))
+            .unwrap();
+    }
+    let file = cameras.folder.file(FILE);
+    let mut json: Value = serde_json::from_slice(&fs::read(&file).unwrap()).unwrap();
+    json["malformed"] = Value::from(1);
+    json["Bad Name"] = json["good"].clone();
+    json["late"] = serde_json::json!({ "url": "rtsp://10.0.0.8/", "every": "never" });
+    fs::write(&file, json.to_string()).unwrap();
+    fs::remove_file(cameras.folder.password("broken")).unwrap();
+    fs::create_dir(cameras.folder.password("broken")).unwrap();
+    let names = |cameras: &Cameras| {
+        let watched = watched(cameras, &[]).into_iter();
+        watched.map(|camera| camera.name).collect::<Vec<_>>()
+    };
+    assert_eq!(names(&cameras), ["good"]);
+    let problems = cameras.problems();
+    let with_problems: Vec<_> = problems.keys().map(String::as_str).collect();
+    assert_eq!(with_problems, ["Bad Name", "broken", "late", "malformed"]);
+    // A pause still applies, and the malformed entry is kept until it is deleted.
+    assert!(cameras.set_detection("good", false).unwrap());
+    assert_eq!(names(&cameras), [""; 0]);
+    assert!(cameras.problems().contains_key("malformed"));
+    assert!(cameras.delete("malformed").unwrap());
+    names(&cameras);
+    assert!(!cameras.problems().contains_key("malformed"));
+}
+
+#[test]
+fn a_camera_is_checked_with_the_defaults_with_which_it_is_loaded() {
+    let folder = tempfile::tempdir().unwrap();
+    let cameras = cameras(folder.path());
+    let defaults = CameraEntry {
+        stall_after: Some("5s".to_owned()),
+        ..CameraEntry::default()
+    };
+    cameras.add_to(&mut Vec::new(), &defaults).unwrap();
+    let mut slow = camera("rtsp://10.0.0.8/s2");
+    slow.every = Some("10s".to_owned());
+    let refused = cameras.put("hall", slow, None).unwrap_err().to_string();
+    assert!(refused.starts_with("stall_after: "), "{refused}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_camera_is_paused_once_it_is_not_watched() {
+    let until = async |is_reached: &dyn Fn() -> bool| {
+        while !is_reached() {
+            tokio::time::sleep(Duration::from_millis(100)).await;
+        }
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let cameras = Arc::new(cameras(folder.path()));
+    cameras
+        .put("hall", camera("http://127.0.0.1:9/"), None)
+        .unwrap();
+    let (read, metrics) = (Arc::clone(&cameras), Arc::clone(&cameras.metrics));
+    let settings = Reload::new(move || {
+        let server = ServerEntry::default().check()?;
+        let mut options = WatchOptions::new(server, Vec::new())?;
+        read.add_to(&mut options.cameras, &CameraEntry::default())?;
+        Ok::<_, ConfigError>(options)
+    });
+    let watching = watch(Origin::Reload(settings), metrics, std::future::pending());
+    let watching = tokio::spawn(watching);
+    until(&|| cameras.is_watched("hall")).await;
+    cameras.set_detection("hall", false).unwrap();
+    assert!(cameras.detection().unwrap()["hall"]);
+    until(&|| !cameras.is_watched("hall")).await;
+    assert!(!cameras.detection().unwrap()["hall"]);
+    watching.abort();
+}
+
+#[tokio::test]
+async fn a_few_cameras_are_tested_at_a_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let cameras = Arc::new(cameras(folder.path()));
+    // A camera that accepts connections and sends nothing.
+    let silent = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let url = format!("http://{}/", silent.local_addr().unwrap());
+    let mut tests = tokio::task::JoinSet::new();
+    for _ in 0..MAX_TESTS {
+        let (cameras, camera) = (Arc::clone(&cameras), camera(&url));
+        tests.spawn(async move { cameras.test(&camera, None).await });
+    }
+    while cameras.tests.available_permits() > 0 {
+        tokio::task::yield_now().await;
+    }
+    let refused = cameras.test(&camera(&url), None).await;
+    assert!(matches!(refused, Err(CameraError::Busy)));
+    tests.shutdown().await;
+    assert_eq!(cameras.tests.available_permits(), MAX_TESTS);
 }

@@ -4,11 +4,12 @@ use std::{net::SocketAddr, path::Path, process::ExitCode, sync::Arc};
 
 use anyhow::{Context, bail};
 use clap::Args;
-use lookdown_common::{AbortOnDrop, ConfigError, Reload, ServerEntry, ServerOptions};
+use lookdown_common::{AbortOnDrop, ConfigError, LogOnce, Reload, ServerEntry, ServerOptions};
 use lookdown_http::{Shutdown, server::bind};
 use lookdown_watch::{
     CameraEntry, Metrics, Origin, WatchEntry, WatchOptions, serve_metrics, watch,
 };
+use parking_lot::Mutex;
 
 use super::{
     SettingsFile,
@@ -118,21 +119,39 @@ pub(super) fn cameras(
     run: Option<(Arc<Cameras>, ServerOptions)>,
 ) -> Reload<WatchOptions> {
     let settings = settings.clone();
-    Reload::new(move || {
+    let is_run = run.is_some();
+    let read = move || {
         let mut entry = entry(settings.again()?, camera.clone());
+        if is_run {
+            entry.server = ServerEntry::default();
+        }
+        let defaults = entry.defaults.clone();
+        Ok::<_, ConfigError>((entry.check()?, defaults))
+    };
+    let last = Mutex::new((None, LogOnce::default()));
+    Reload::new(move || {
         let Some((stored, server)) = &run else {
-            return entry.check();
+            return Ok(read()?.0);
         };
-        entry.cameras = entry
-            .cameras
-            .into_iter()
-            .map(|camera| camera.or(&entry.defaults))
-            .collect();
-        stored.add_to(&mut entry.cameras)?;
-        entry.server = ServerEntry::default();
-        let mut options = entry.check()?;
+        // A pause in the page applies while the settings file cannot be used.
+        let (last, log) = &mut *last.lock();
+        let (mut options, defaults) = match (read(), last.take()) {
+            (Ok(settings), _) => {
+                log.clear();
+                settings
+            }
+            (Err(problem), Some(settings)) => {
+                if log.should_log(&problem.to_string()) {
+                    tracing::warn!("{problem}; the last valid settings stay in use");
+                }
+                settings
+            }
+            (Err(problem), None) => return Err(problem),
+        };
+        *last = Some((options.clone(), defaults.clone()));
         options.server = server.clone();
-        Ok::<_, ConfigError>(options)
+        stored.add_to(&mut options.cameras, &defaults)?;
+        Ok(options)
     })
 }
 

@@ -11,7 +11,7 @@ use lookdown_common::{ConfigError, ServerOptions};
 use crate::Camera;
 
 /// Most cameras of a process.
-const MAX_CAMERAS: usize = 256;
+pub const MAX_CAMERAS: usize = 256;
 
 /// The cameras to watch, and the server that receives their frames.
 #[derive(Debug, Clone, PartialEq)]

@@ -29,7 +29,7 @@ mod video;
 mod watcher;
 
 pub use camera::{Camera, Transport, VideoOptions};
-pub use config::{CameraEntry, WatchEntry, WatchOptions};
+pub use config::{CameraEntry, MAX_CAMERAS, WatchEntry, WatchOptions};
 pub use credentials::Credentials;
 pub use frame::{Frame, FrameError, ImageFormat, MAX_FRAME_BYTES};
 pub use location::{InvalidLocation, Location};

@@ -70,7 +70,7 @@ pub(in crate::api) struct CameraInfo {
     source: String,
     /// `true` if the camera can be changed and deleted here, `false` if it is one of the settings.
     stored: bool,
-    /// `true` if no frames are read.
+    /// `true` if no frames are read. A change takes about two seconds.
     paused: bool,
     /// The user name of a stored camera.
     user: Option<String>,
@@ -91,7 +91,7 @@ pub(in crate::api) struct CameraInfo {
     /// The reason and the remedies, if less than 80 % of the wanted rate is reached, if the machine
     /// is too slow for counts, or if reports are not counted.
     warning: Option<String>,
-    /// The reason why the source gives no frames.
+    /// The reason why there are no frames.
     problem: Option<String>,
     /// `GET /cameras/{camera}/suggested-calibration`; `null` if it needs none or had no frame.
     suggestion: Option<suggestion::SuggestionState>,
@@ -278,9 +278,10 @@ pub(in crate::api) async fn test(
     _admin: RequireAdmin,
     CameraBody(camera): CameraBody<NewCamera>,
 ) -> Result<Response, Problem> {
-    cameras(&state)?;
+    let cameras = cameras(&state)?;
     let (camera, password) = camera.separate();
-    let frame = Cameras::test(&camera, password).await.map_err(refused)?;
+    let tested = cameras.test(&camera, password).await;
+    let frame = tested.map_err(refused)?;
     Ok(answer(frame.format.media_type(), frame.image))
 }
 
@@ -301,7 +302,7 @@ pub(in crate::api) async fn get_frame(
 ) -> Result<Response, Problem> {
     let camera = using_files(&state, deadline, move |cameras| Ok(cameras.get(&name)?)).await?;
     let camera = camera.ok_or_else(unknown)?;
-    let frame = Cameras::frame(&camera).await.map_err(refused)?;
+    let frame = cameras(&state)?.frame(&camera).await.map_err(refused)?;
     Ok(answer(frame.format.media_type(), frame.image))
 }
 
@@ -334,12 +335,12 @@ async fn rows(state: &ApiState, deadline: Deadline) -> Result<Vec<CameraInfo>, P
     let read = move || {
         let stored = cameras.stored()?;
         let paused = cameras.paused_of_settings()?;
-        Ok((cameras.states(&stored), stored, paused))
+        Ok((cameras.states(&stored), stored, paused, cameras.problems()))
     };
     let read = deadline.using(&CAMERAS, move || {
         read().map_err(|error: ConfigError| Problem::internal(error))
     });
-    let (states, stored, paused) = read.await?;
+    let (states, stored, paused, problems) = read.await?;
     let mut rows: Vec<_> = states
         .into_iter()
         .map(|state| CameraInfo {
@@ -354,29 +355,25 @@ async fn rows(state: &ApiState, deadline: Deadline) -> Result<Vec<CameraInfo>, P
             ..CameraInfo::default()
         })
         .collect();
-    // A camera that has just been paused may still be watched.
-    rows.retain(|row| !paused.contains_key(&row.name));
-    rows.extend(paused.into_iter().map(|(name, source)| CameraInfo {
-        name,
-        source,
-        paused: true,
-        ..CameraInfo::default()
-    }));
+    for (name, source) in paused {
+        // A camera that has just been paused may still be watched.
+        let row = row_of(&mut rows, &name);
+        row.paused = row.last_frame_age_seconds.is_none();
+        row.source = source;
+    }
+    for (name, problem) in problems {
+        let row = row_of(&mut rows, &name);
+        (row.stored, row.problem) = (true, Some(problem));
+    }
     for (name, camera) in stored {
-        let index = rows.iter().position(|row| row.name == name);
-        let index = index.unwrap_or_else(|| {
-            rows.push(CameraInfo::default());
-            rows.len() - 1
-        });
-        let row = &mut rows[index];
+        let row = row_of(&mut rows, &name);
         row.source = camera.shown_source();
         row.stored = true;
-        row.paused = camera.paused;
+        row.paused = camera.paused && row.last_frame_age_seconds.is_none();
         row.user = camera.user;
         row.every = camera.every;
         row.calibration = camera.calibration;
         row.profile = camera.profile;
-        row.name = name;
     }
     for row in &mut rows {
         row.suggestion = suggestion::state_of(state, &row.name);
@@ -385,6 +382,19 @@ async fn rows(state: &ApiState, deadline: Deadline) -> Result<Vec<CameraInfo>, P
     }
     rows.sort_unstable_by(|one, other| one.name.cmp(&other.name));
     Ok(rows)
+}
+
+/// Returns the row of a camera, a new one if there is none.
+fn row_of<'a>(rows: &'a mut Vec<CameraInfo>, name: &str) -> &'a mut CameraInfo {
+    let index = rows.iter().position(|row| row.name == name);
+    let index = index.unwrap_or(rows.len());
+    if index == rows.len() {
+        rows.push(CameraInfo {
+            name: name.to_owned(),
+            ..CameraInfo::default()
+        });
+    }
+    &mut rows[index]
 }
 
 fn unknown() -> Problem {
@@ -397,6 +407,7 @@ fn unknown() -> Problem {
 fn refused(error: CameraError) -> Problem {
     match error {
         CameraError::Folder(..) => Problem::internal(error),
+        CameraError::Busy => Problem::new(ProblemKind::Overloaded, error.to_string()),
         CameraError::Configured(_) => Problem::new(ProblemKind::CameraConflict, error.to_string()),
         CameraError::Invalid(_) | CameraError::Source(_) => {
             Problem::new(ProblemKind::InvalidParameter, error.to_string())
