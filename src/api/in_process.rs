@@ -13,11 +13,17 @@ use lookdown_common::{InProcess, OwnCameras};
 use parking_lot::Mutex;
 use tower::ServiceExt;
 
+/// The mark of a request of this process.
+#[derive(Clone, Copy)]
+pub(super) struct OwnRequest;
+
 /// Returns the connection of parts of this process to the server with these routes.
 #[must_use]
 pub fn in_process(router: Router, own_cameras: OwnCameras) -> InProcess {
     InProcess::new(own_cameras, move |request| {
-        let answered = router.clone().oneshot(request.map(Body::new));
+        let mut request = request.map(Body::new);
+        request.extensions_mut().insert(OwnRequest);
+        let answered = router.clone().oneshot(request);
         async {
             let response = match answered.await {
                 Ok(response) => response,

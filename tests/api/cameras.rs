@@ -16,7 +16,7 @@ use tokio::{
     time::{sleep, timeout},
 };
 
-use crate::service::{Bounds, Service};
+use crate::service::{Bounds, Service, frame};
 
 const CAMERA: &str = r#"{ "url": "rtsp://127.0.0.1:9/" }"#;
 const TIMEOUT: Duration = Duration::from_mins(1);
@@ -120,4 +120,21 @@ async fn a_camera_that_is_not_counted_has_a_warning() {
         let row = service.get(&format!("/cameras/{camera}")).await;
         assert_eq!(row.json()["warning"], warning);
     }
+}
+
+#[tokio::test]
+async fn frames_of_others_do_not_replace_an_own_camera() {
+    let companions = Companions::default();
+    companions.own_cameras().set(["hall".to_owned()].into());
+    let service = Service::within(&Bounds {
+        companions,
+        ..Bounds::default()
+    });
+    let status = async |query: &str| {
+        let answer = service.post_raw(query, frame()).await;
+        answer.status.as_u16()
+    };
+    assert_eq!(status("camera=hall").await, 403);
+    assert_eq!(status("camera=hall&store=false").await, 200);
+    assert_eq!(status("camera=gate").await, 200);
 }

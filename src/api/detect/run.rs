@@ -10,15 +10,21 @@ use bytes::Bytes;
 use lookdown_common::report::Report;
 use lookdown_detect::{
     imaging::annotate::Concealment,
+    parameters::DetectParameters,
     pipeline::{DetectJob, DetectedFrame, DetectionReport, PipelineError, Timeline},
 };
+
+use lookdown_lens::calibration::CalibrationId;
 
 use crate::{
     annotated_image::StoredFrame,
     api::{
         ApiState,
         detect::report::to_report,
-        http::{context::RequestContext, problem::Problem},
+        http::{
+            context::RequestContext,
+            problem::{Problem, ProblemKind},
+        },
     },
     metrics::Metrics,
     results::NewReport,
@@ -64,6 +70,7 @@ pub(in crate::api) async fn run_detection<T: Send + 'static>(
     job: DetectJob,
     write: impl FnOnce(AnswerInput<'_>) -> Result<T, Problem> + Send + 'static,
 ) -> Result<Answered<T>, Problem> {
+    require_other_camera(state, context, &job.parameters)?;
     let timeout = job.parameters.timeout;
     let timeline = job.ticket.timeline.clone();
     let is_stored = job.parameters.store;
@@ -100,6 +107,28 @@ pub(in crate::api) async fn run_detection<T: Send + 'static>(
         record_zones(state, &report);
     }
     Ok(Answered { report, answer })
+}
+
+/// Refuses a frame that would replace the results of a camera of this process.
+fn require_other_camera(
+    state: &ApiState,
+    context: &RequestContext,
+    parameters: &DetectParameters,
+) -> Result<(), Problem> {
+    let of_calibration = parameters.calibration.as_ref().map(CalibrationId::as_str);
+    let camera = parameters.camera.as_deref().or(of_calibration);
+    let own = state.options.companions.own_cameras();
+    let Some(camera) = camera.filter(|camera| own.contains(camera)) else {
+        return Ok(());
+    };
+    if context.is_own || !parameters.store {
+        return Ok(());
+    }
+    let detail = format!(
+        "camera: {camera:?} is a camera that this server reads itself: give another name, or \
+         store=false"
+    );
+    Err(Problem::new(ProblemKind::Forbidden, detail).with_parameter("camera"))
 }
 
 /// Waits for work of the worker threads until the deadline, or until the timeout of the request

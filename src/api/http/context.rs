@@ -19,7 +19,10 @@ use super::{
     incoming_trace,
     problem::Problem,
 };
-use crate::telemetry::{RequestTrace, Tracer};
+use crate::{
+    api::in_process::OwnRequest,
+    telemetry::{RequestTrace, Tracer},
+};
 
 /// The settings of the contexts.
 #[derive(Clone)]
@@ -39,6 +42,8 @@ pub(in crate::api) struct RequestContext {
     /// The holder of the key in the headers: keys are compared here, once for each request.
     pub(in crate::api) identity: Identity,
     pub(in crate::api) caller: Caller,
+    /// True if a part of this process sent the request.
+    pub(in crate::api) is_own: bool,
 }
 
 impl ContextSource {
@@ -54,6 +59,7 @@ impl ContextSource {
             trace: incoming_trace::begin(&self.tracer, name, &parts.headers),
             deadline: Deadline::begin(self.request_timeout),
             caller: Caller::of(&self.access, &identity, &id, parts),
+            is_own: parts.extensions.get::<OwnRequest>().is_some(),
             identity,
             id,
         });
