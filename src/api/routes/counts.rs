@@ -15,6 +15,7 @@ use axum::{
     routing::{get, put},
 };
 use lookdown_common::ServerClient;
+use percent_encoding::percent_decode_str;
 use reqwest::RequestBuilder;
 use serde::Deserialize;
 use tower::ServiceExt;
@@ -29,6 +30,16 @@ use crate::api::{
 
 /// Longest time for an answer of another host.
 const TIMEOUT: Duration = Duration::from_secs(20);
+/// The detail of an unknown path.
+const NO_RESOURCE: &str = "there is no such resource: docs/count.md lists all paths";
+/// The media types of counts.
+const MEDIA_TYPES: [&str; 5] = [
+    "application/json",
+    "application/problem+json",
+    "image/png",
+    "image/svg+xml",
+    "text/csv",
+];
 /// Largest problem document that is read.
 const MAX_PROBLEM_BYTES: usize = 64 << 10;
 
@@ -74,7 +85,7 @@ async fn answer(state: &ApiState, request: Request) -> Result<Response, Problem>
             Err(never) => match never {},
         },
         Counts::Elsewhere(client) => {
-            let outgoing = outgoing(&client, &request);
+            let outgoing = outgoing(&client, &request)?;
             forward(&client, outgoing).await?
         }
         Counts::Starting => return Err(unavailable("the counts are being started: retry")),
@@ -102,18 +113,18 @@ fn without_extensions(request: Request) -> Request {
 }
 
 /// Returns the request to another host.
-fn outgoing(client: &ServerClient, request: &Request) -> RequestBuilder {
-    let url = url(client, request.uri());
+fn outgoing(client: &ServerClient, request: &Request) -> Result<RequestBuilder, Problem> {
+    let url = url(client, request.uri())?;
     let outgoing = match *request.method() {
         Method::PUT => client.put(url),
         Method::DELETE => client.delete(url),
         _ => client.get(url),
     };
     let outgoing = outgoing.timeout(TIMEOUT);
-    match request.headers().get(ACCEPT) {
+    Ok(match request.headers().get(ACCEPT) {
         Some(accept) => outgoing.header(ACCEPT, accept),
         None => outgoing,
-    }
+    })
 }
 
 /// Requests the counts of another host with the key of that host: the key of the caller was checked
@@ -123,6 +134,18 @@ async fn forward(client: &ServerClient, outgoing: RequestBuilder) -> Result<Resp
         tracing::warn!("counts.url: {}", client.failure(&error));
         unavailable("the counts do not respond: the log of the server has the reason; retry")
     })?;
+    let media_type = answered.headers().get(CONTENT_TYPE);
+    let media_type = media_type.map(|value| value.to_str().unwrap_or_default());
+    let is_known = |value: &str| {
+        let essence = value.split(';').next().unwrap_or_default().trim();
+        MEDIA_TYPES.contains(&essence)
+    };
+    if answered.status().is_success() && !media_type.is_none_or(is_known) {
+        tracing::warn!("counts.url: it answers with another media type than `lookdown count`");
+        return Err(unavailable(
+            "counts.url is not a `lookdown count`: correct it",
+        ));
+    }
     let mut response = Response::new(Body::empty());
     *response.status_mut() = answered.status();
     for name in [CONTENT_TYPE, CACHE_CONTROL] {
@@ -136,12 +159,21 @@ async fn forward(client: &ServerClient, outgoing: RequestBuilder) -> Result<Resp
 }
 
 /// Returns the URL of a path and a query on the other host.
-fn url(client: &ServerClient, uri: &Uri) -> Url {
-    let mut url = client.route([]);
-    let path = format!("{}{}", url.path().trim_end_matches('/'), uri.path());
-    url.set_path(&path);
+///
+/// # Errors
+/// [`Problem`] if the path leaves its place.
+fn url(client: &ServerClient, uri: &Uri) -> Result<Url, Problem> {
+    let segments = uri.path().split('/').skip(1);
+    let segments = segments.map(|segment| percent_decode_str(segment).decode_utf8());
+    let segments = segments.collect::<Result<Vec<_>, _>>().ok();
+    let segments =
+        segments.filter(|segments| !segments.iter().any(|name| name == "." || name == ".."));
+    let Some(segments) = segments else {
+        return Err(Problem::new(ProblemKind::NotFound, NO_RESOURCE));
+    };
+    let mut url = client.route(segments.iter().map(AsRef::as_ref));
     url.set_query(uri.query());
-    url
+    Ok(url)
 }
 
 fn unavailable(detail: &str) -> Problem {
@@ -169,10 +201,64 @@ async fn problem(status: StatusCode, response: Response) -> Problem {
     let body = to_bytes(response.into_body(), MAX_PROBLEM_BYTES).await;
     let failure: Failure = serde_json::from_slice(&body.unwrap_or_default()).unwrap_or_default();
     if failure.detail.is_empty() {
-        return Problem::new(
-            kind,
-            "there is no such resource: docs/count.md lists all paths",
-        );
+        return Problem::new(kind, NO_RESOURCE);
     }
     Problem::new(kind, failure.detail)
+}
+
+#[cfg(test)]
+mod tests {
+    use lookdown_common::{OwnCameras, ServerOptions};
+
+    use super::*;
+    use crate::api::in_process;
+
+    fn client(routes: Router) -> ServerClient {
+        ServerClient::new(&ServerOptions {
+            url: Url::parse("http://counts.example/prefix/").unwrap(),
+            api_key: None,
+            authorities: None,
+            in_process: Some(in_process(routes, OwnCameras::default())),
+        })
+        .unwrap()
+    }
+
+    #[test]
+    fn a_forwarded_path_stays_in_its_place() {
+        let client = client(Router::new());
+        let forwarded = |path: &str| Some(url(&client, &path.parse().unwrap()).ok()?.to_string());
+        for path in [
+            "/counts/../results",
+            "/counts/%2e%2e/%2E%2e/metrics?a=b",
+            "/cameras/.%2e/furniture",
+            "/cameras/./furniture/x",
+            "/counts/%ff",
+        ] {
+            assert_eq!(forwarded(path), None, "{path}");
+        }
+        for (path, expected) in [
+            ("/counts/hall?step=hour", "counts/hall?step=hour"),
+            ("/counts/a%2F..%2fb%5C..%5cc", "counts/a%2F..%2Fb%5C..%5Cc"),
+            ("/counts/a%20%C3%A4%3F%23", "counts/a%20%C3%A4%3F%23"),
+            ("/counts//x", "counts//x"),
+        ] {
+            let expected = format!("http://counts.example/prefix/{expected}");
+            assert_eq!(forwarded(path), Some(expected));
+        }
+    }
+
+    #[tokio::test]
+    async fn only_media_types_of_counts_are_forwarded() {
+        let html = get(|| async { ([(CONTENT_TYPE, "text/html")], "<script>") });
+        let routes = Router::new()
+            .route("/prefix/counts/html", html)
+            .route("/prefix/counts/json", get(|| async { axum::Json(1) }));
+        let client = client(routes);
+        for (name, is_forwarded) in [("html", false), ("json", true)] {
+            let path = format!("/counts/{name}");
+            let request = Request::get(path).body(Body::empty()).unwrap();
+            let answer = forward(&client, outgoing(&client, &request).unwrap()).await;
+            assert_eq!(answer.is_ok(), is_forwarded, "{name}");
+        }
+    }
 }
