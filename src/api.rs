@@ -131,8 +131,7 @@ pub fn in_process_router(state: ApiState) -> Router {
 
 fn limited_router(state: ApiState, limiter: Option<RateLimiter>) -> Router {
     let options = &state.options;
-    let access = &options.access;
-    let own_pages = access.allowed_origins(&options.cors_origins, &options.hosts);
+    let own_pages = options.allowed_origins();
     let own_pages = own_pages.map(|own| from_fn_with_state(own, csrf::refuse));
     let limiter = limiter.map(|all| from_fn_with_state(all, rate_limit::apply));
     let responses = from_fn_with_state(state.clone(), response_memory::bound);

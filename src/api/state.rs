@@ -14,7 +14,7 @@ use lookdown_detect::{
     parameters::DetectDefaults,
     pipeline::{PipelineError, WorkerPool},
 };
-use lookdown_http::header_limits::HeaderLimits;
+use lookdown_http::{csrf::AllowedOrigins, header_limits::HeaderLimits};
 use lookdown_lens::self_calibration::IdealLens;
 
 use super::{
@@ -102,6 +102,11 @@ impl ApiOptions {
             max_headers: self.max_headers,
             max_header_bytes: self.max_header_bytes,
         }
+    }
+
+    /// The origins that may make changes; `None` if there are keys.
+    pub(super) fn allowed_origins(&self) -> Option<AllowedOrigins> {
+        self.access.allowed_origins(&self.cors_origins, &self.hosts)
     }
 
     /// Returns the time without progress of the workers after which the server is not ready. Each

@@ -4,7 +4,7 @@ use std::{collections::HashMap, fs, path::Path, sync::Arc};
 
 use lookdown::{
     access::{AccessKeys, KeyDigest},
-    api::Access,
+    api::{Access, Companions},
     settings,
 };
 
@@ -93,6 +93,43 @@ async fn probes_metrics_and_pages_never_need_a_key() {
     let metrics = service.get("/metrics").await.text();
     for word in ["reader", "finder", READER] {
         assert!(!metrics.contains(word), "a key's name became a label");
+    }
+}
+
+#[tokio::test]
+async fn lines_of_cameras_in_metrics_need_the_scope_read() {
+    let labels = ["camera", "line", "site", "zone"];
+    let lines = labels.map(|label| format!("persons{{x=\"y\",{label}=\"hall\"}} 6\n"));
+    let companions = Companions::default();
+    companions.set_metrics("counts", move || {
+        [&lines.concat(), "connected 1\n"].concat().into_bytes()
+    });
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("keys.toml");
+    write_keys(&file);
+    let keys = AccessKeys::open("".parse().unwrap(), Some(&file)).unwrap();
+    let with_keys = Access::Keys(Arc::new(keys));
+    let open = Access::Open {
+        own_machine_only: true,
+    };
+    let [guarded, open] = [with_keys, open].map(|access| {
+        Service::within(&Bounds {
+            access,
+            companions: companions.clone(),
+            ..Bounds::default()
+        })
+    });
+    for (service, header, is_shown) in [
+        (&guarded, ("x-api-key", READER), true),
+        (&guarded, ("x-api-key", FINDER), false),
+        (&guarded, ("accept", "*/*"), false),
+        (&open, ("host", "localhost"), true),
+        (&open, ("host", "evil.example"), false),
+    ] {
+        let metrics = service.ask("GET", "/metrics", &[header]).await.text();
+        assert!(metrics.contains("connected 1\n"), "{header:?}");
+        let shown = metrics.matches("hall").count();
+        assert_eq!(shown, if is_shown { 4 } else { 0 }, "{header:?}");
     }
 }
 

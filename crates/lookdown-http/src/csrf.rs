@@ -102,6 +102,14 @@ pub struct Remedies {
     pub origins: &'static str,
 }
 
+impl AllowedOrigins {
+    /// Returns true if the request is not refused.
+    #[must_use]
+    pub fn admits(&self, request: &Request) -> bool {
+        check(request, self).is_ok()
+    }
+}
+
 /// Refuses requests of other origins.
 pub async fn refuse(
     State(own_pages): State<AllowedOrigins>,

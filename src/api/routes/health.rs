@@ -2,7 +2,12 @@
 
 use std::time::Instant;
 
-use axum::{Json, extract::State, http::header::CONTENT_TYPE, response::IntoResponse};
+use axum::{
+    Json,
+    extract::{Request, State},
+    http::header::CONTENT_TYPE,
+    response::IntoResponse,
+};
 use lookdown_detect::metrics::gauge_value;
 use utoipa::ToSchema;
 
@@ -134,7 +139,8 @@ pub(in crate::api) async fn readyz(
 
 /// Get metrics
 ///
-/// Returns the Prometheus text format.
+/// Returns the Prometheus text format. Lines with a camera, a line, a zone or a site are for clients
+/// that may read.
 #[utoipa::path(
     get, path = "/metrics", tag = "operation", operation_id = "get_metrics",
     responses(
@@ -143,12 +149,28 @@ pub(in crate::api) async fn readyz(
 )]
 pub(in crate::api) async fn metrics(
     State(state): State<ApiState>,
+    reader: Result<RequireRead, Problem>,
+    request: Request,
 ) -> Result<impl IntoResponse, Problem> {
     read_gauges(&state).await;
     read_cameras(&state).await;
     let mut text = state.metrics.render().map_err(Problem::internal)?;
     state.options.companions.add_metrics(&mut text);
+    let own_pages = state.options.allowed_origins();
+    if reader.is_err() || own_pages.is_some_and(|own| !own.admits(&request)) {
+        text = without_cameras(&text);
+    }
     Ok(([(CONTENT_TYPE, "text/plain; version=0.0.4")], text))
+}
+
+/// The labels that only clients that may read see. A value has no quotation mark before which there
+/// is no backslash.
+const READERS_LABELS: [&str; 4] = ["camera=\"", "line=\"", "site=\"", "zone=\""];
+
+/// Returns the metrics without the lines of cameras.
+fn without_cameras(text: &str) -> String {
+    let is_open = |line: &&str| !READERS_LABELS.iter().any(|label| line.contains(label));
+    text.split_inclusive('\n').filter(is_open).collect()
 }
 
 /// Sets the gauges that are read and not counted: an age, lengths of queues, and the use of a
