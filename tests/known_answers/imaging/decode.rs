@@ -94,6 +94,52 @@ fn all_eight_exif_orientations_are_turned_upright() {
 }
 
 #[test]
+fn an_orientation_may_be_any_integer() {
+    let bytes = fixture("orientation_6.jpg");
+    let tag = [0x01, 0x12, 0x00, 0x03, 0, 0, 0, 1];
+    let little = [0x12, 0x01, 0x03, 0x00, 1, 0, 0, 0];
+    let find = |tag: [u8; 8]| bytes.windows(8).position(|window| window == tag);
+    let (at, is_little) = match (find(tag), find(little)) {
+        (Some(at), _) => (at, false),
+        (None, at) => (at.unwrap(), true),
+    };
+    for (kind, value) in [
+        (1_u16, [6, 0, 0, 0]),
+        (6, [6, 0, 0, 0]),
+        (3, [0, 6, 0, 0]),
+        (8, [0, 6, 0, 0]),
+        (4, [0, 0, 0, 6]),
+        (9, [0, 0, 0, 6]),
+    ] {
+        let mut bytes = bytes.clone();
+        let kind_bytes = if is_little {
+            kind.to_le_bytes()
+        } else {
+            kind.to_be_bytes()
+        };
+        bytes[at + 2..at + 4].copy_from_slice(&kind_bytes);
+        let value = if is_little { [6, 0, 0, 0] } else { value };
+        bytes[at + 8..at + 12].copy_from_slice(&value);
+        let image = decode(&bytes, &DecodeLimits::default()).unwrap();
+        assert!(image.orientation_applied, "type {kind}");
+    }
+}
+
+#[test]
+fn memory_for_a_png_follows_its_pixels() {
+    let mut bytes = fixture("rgb.png");
+    // Chunks with a wrong checksum: the decoder would refuse those that it reads.
+    for name in [b"iCCP", b"zTXt", b"iTXt", b"tEXt"] {
+        let mut chunk = vec![0, 0, 0, 2];
+        chunk.extend_from_slice(name);
+        chunk.extend_from_slice(&[b'x', 0, 1, 2, 3, 4]);
+        bytes.splice(33..33, chunk);
+    }
+    let image = decode(&bytes, &DecodeLimits::default()).unwrap();
+    assert_eq!(image, decoded("rgb.png"));
+}
+
+#[test]
 fn png_and_webp_orientations_are_honoured_too() {
     for name in ["orientation_6.png", "orientation_6.webp"] {
         let image = decoded(name);
@@ -225,7 +271,7 @@ fn the_format_is_detected_from_content_and_others_are_named() {
     );
     assert_eq!(
         found(b"{\"img\": \"frame.jpg\"}"),
-        "not in a known image format"
+        "JSON and not the bytes of a file"
     );
     assert_eq!(
         refused(b"<html>").to_string(),
@@ -312,5 +358,62 @@ proptest! {
     ) {
         let bytes = [signature, &noise[..]].concat();
         let _ = decode(&bytes, &DecodeLimits { max_pixels: 1 << 20, ..DecodeLimits::default() });
+    }
+}
+
+/// The position of the first segment with this marker in a JPEG.
+fn segment(bytes: &[u8], marker: u8) -> Option<usize> {
+    let mut at = 2;
+    while bytes[at + 1] != 0xDA {
+        if bytes[at + 1] == marker {
+            return Some(at);
+        }
+        at += 2 + usize::from(u16::from_be_bytes([bytes[at + 2], bytes[at + 3]]));
+    }
+    None
+}
+
+#[test]
+fn a_jpeg_without_huffman_tables_has_the_standard_ones() {
+    let mut bytes = fixture("orientation_1.jpg");
+    while let Some(at) = segment(&bytes, 0xC4) {
+        let length = usize::from(u16::from_be_bytes([bytes[at + 2], bytes[at + 3]]));
+        bytes.drain(at..at + 2 + length);
+    }
+    let image = decode(&bytes, &DecodeLimits::default()).unwrap();
+    assert_eq!(image, decoded("orientation_1.jpg"));
+}
+
+#[test]
+fn kinds_of_jpeg_that_are_not_read_are_named() {
+    let whole = fixture("orientation_1.jpg");
+    let at = segment(&whole, 0xC0).unwrap();
+    for (offset, value, expected) in [
+        (1, 0xC3, "a lossless JPEG"),
+        (1, 0xC6, "a hierarchical JPEG"),
+        (1, 0xC9, "an arithmetic coded JPEG"),
+        (4, 12, "a JPEG with 12 bits per sample"),
+    ] {
+        let mut bytes = whole.clone();
+        bytes[at + offset] = value;
+        let expected = DecodeError::UnsupportedFormat {
+            found: expected.to_owned(),
+        };
+        assert_eq!(refused(&bytes), expected);
+    }
+}
+
+#[test]
+fn text_instead_of_an_image_is_named() {
+    for (text, expected) in [
+        (&b"data:image/jpeg;base64,/9j/4AAQ"[..], "base64 text"),
+        (b"/9j/4AAQSkZJRg", "base64 text"),
+        (b"\n iVBORw0KGgo", "base64 text"),
+        (b"{\"image\": \"/9j/\"}", "JSON"),
+        (b"\x1f\x8b\x08\0", "compressed with gzip"),
+        (b"hello", "not in a known image format"),
+    ] {
+        let refused = refused(text).to_string();
+        assert!(refused.contains(expected), "{refused}");
     }
 }

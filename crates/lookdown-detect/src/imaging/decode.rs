@@ -5,6 +5,7 @@
 
 mod container;
 mod error;
+mod jpeg_head;
 
 use std::io::Cursor;
 
@@ -15,6 +16,12 @@ use image::{ColorType, DynamicImage, ImageDecoder, ImageError, ImageFormat, Limi
 
 use super::{buffer_pool, frame::Frame};
 pub use error::{DecodeError, ExceededLimit};
+use jpeg_head::JpegHead;
+
+/// Memory of the PNG decoder that does not depend on the size of the image.
+const PNG_OVERHEAD_BYTES: u64 = 1 << 20;
+/// Most bytes of a pixel: RGBA with 16 bits a sample.
+const MAX_PIXEL_BYTES: u64 = 8;
 
 /// Size limits of an image. All of them hold at once and are checked against the image's header,
 /// before its pixels are decoded.
@@ -107,7 +114,7 @@ pub fn decode(bytes: &[u8], limits: &DecodeLimits) -> Result<DecodedFrame, Decod
             )))
         }
         Err(_) if container::is_heif(bytes) => Err(unsupported("in the format HEIF")),
-        Err(_) => Err(unsupported("not in a known image format")),
+        Err(_) => Err(unsupported(container::name_of_text(bytes))),
     }
 }
 
@@ -125,6 +132,11 @@ pub fn declared_size(bytes: &[u8]) -> Option<(u32, u32)> {
 
 fn decode_jpeg(bytes: &[u8], limits: &DecodeLimits) -> Result<DecodedFrame, DecodeError> {
     let task = Task::new("JPEG", limits);
+    let head = JpegHead::new(bytes);
+    if let Some(kind) = head.unsupported_kind() {
+        return Err(unsupported(kind));
+    }
+    let bytes = &*head.with_huffman_tables(bytes);
     let decoder = JpegDecoder::new(Cursor::new(bytes)).map_err(|e| task.refusal(e))?;
     limits.check(decoder.dimensions())?;
     task.require(container::jpeg_is_whole(bytes), "the file ends early")?;
@@ -134,13 +146,15 @@ fn decode_jpeg(bytes: &[u8], limits: &DecodeLimits) -> Result<DecodedFrame, Deco
 fn decode_png(bytes: &[u8], limits: &DecodeLimits) -> Result<DecodedFrame, DecodeError> {
     let task = Task::new("PNG", limits);
     let size = container::png_size(bytes);
-    limits.check(size.ok_or_else(|| task.corrupt("its header is incomplete"))?)?;
-    task.require(container::png_is_whole(bytes), "the file ends early")?;
+    let (width, height) = size.ok_or_else(|| task.corrupt("its header is incomplete"))?;
+    limits.check((width, height))?;
+    let essence = container::png_essence(bytes);
+    let essence = essence.ok_or_else(|| task.corrupt("the file ends early"))?;
     let mut memory = Limits::no_limits();
-    memory.max_alloc = Some(limits.max_alloc_bytes);
-    let decoder =
-        PngDecoder::with_limits(Cursor::new(bytes), memory).map_err(|e| task.refusal(e))?;
-    task.read(decoder)
+    let pixels = u64::from(width) * u64::from(height);
+    memory.max_alloc = Some(PNG_OVERHEAD_BYTES + pixels * MAX_PIXEL_BYTES);
+    let decoder = PngDecoder::with_limits(Cursor::new(essence.as_slice()), memory);
+    task.read(decoder.map_err(|e| task.refusal(e))?)
 }
 
 fn decode_webp(bytes: &[u8], limits: &DecodeLimits) -> Result<DecodedFrame, DecodeError> {
@@ -187,7 +201,9 @@ impl<'a> Task<'a> {
                 },
             });
         }
-        let orientation = decoder.orientation().map_err(|e| self.refusal(e))?;
+        let exif = decoder.exif_metadata().map_err(|e| self.refusal(e))?;
+        let orientation = exif.as_deref().and_then(container::exif_orientation);
+        let orientation = orientation.unwrap_or(Orientation::NoTransforms);
         let image = read(decoder).map_err(|e| self.refusal(e))?;
         let mut upright = DynamicImage::ImageRgb8(rgb_over_black(image));
         upright.apply_orientation(orientation);

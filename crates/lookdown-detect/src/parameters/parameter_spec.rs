@@ -114,7 +114,11 @@ impl ParameterSpec {
     /// # Errors
     /// [`ParameterError`] with the accepted values.
     pub fn parse<T: FromStr>(&self, value: &str) -> Result<T, ParameterError> {
-        let parsed = self.kind.accepts(value).then(|| value.parse().ok());
+        // Python and .NET write True.
+        let is_switch = matches!(self.kind, ParameterKind::Switch);
+        let lower = is_switch.then(|| value.to_ascii_lowercase());
+        let read = lower.as_deref().unwrap_or(value);
+        let parsed = self.kind.accepts(value).then(|| read.parse().ok());
         let refused = || ParameterError::is_not(self.name, value, &self.kind.rule());
         parsed.flatten().ok_or_else(refused)
     }

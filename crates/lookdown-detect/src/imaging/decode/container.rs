@@ -6,6 +6,8 @@
 //! The functions here close those gaps. They only skip over lengths and never read outside the
 //! bytes.
 
+use image::metadata::Orientation;
+
 /// Returns true if the bytes begin like HEIF/HEIC, a format of telephones.
 pub(super) fn is_heif(bytes: &[u8]) -> bool {
     bytes.get(4..8) == Some(b"ftyp")
@@ -13,6 +15,21 @@ pub(super) fn is_heif(bytes: &[u8]) -> bool {
             bytes.get(8..12),
             Some(b"heic" | b"heix" | b"hevc" | b"mif1" | b"msf1")
         )
+}
+
+/// Returns what clients send instead of the bytes of an image, as the end of a sentence.
+pub(super) fn name_of_text(bytes: &[u8]) -> &'static str {
+    const BASE64: [&[u8]; 4] = [b"data:image/", b"/9j/", b"iVBORw0", b"UklGR"];
+    let text = bytes.trim_ascii_start();
+    if BASE64.iter().any(|start| text.starts_with(start)) {
+        "base64 text and not its bytes"
+    } else if text.starts_with(b"{") || text.starts_with(b"[") {
+        "JSON and not the bytes of a file"
+    } else if bytes.starts_with(&[0x1F, 0x8B]) {
+        "compressed with gzip"
+    } else {
+        "not in a known image format"
+    }
 }
 
 /// Width and height from a PNG's header chunk, which always comes first (PNG specification, section
@@ -25,22 +42,58 @@ pub(super) fn png_size(bytes: &[u8]) -> Option<(u32, u32)> {
     Some((side(16)?, side(20)?))
 }
 
-/// Returns true if a PNG reaches its end chunk.
-pub(super) fn png_is_whole(bytes: &[u8]) -> bool {
-    let mut rest = bytes.get(8..);
-    while let Some([l0, l1, l2, l3, kind @ ..]) = rest {
+/// Returns a PNG without the chunks that its pixels do not need, `None` if it has no end chunk.
+///
+/// Profiles and texts are compressed a thousandfold, and the decoder would keep each. The frames of
+/// an animation after the first one are left out, too.
+pub(super) fn png_essence(bytes: &[u8]) -> Option<Vec<u8>> {
+    let (signature, mut rest) = bytes.split_at_checked(8)?;
+    let mut essence = signature.to_vec();
+    while let [l0, l1, l2, l3, kind @ ..] = rest {
         let payload = u32::from_be_bytes([*l0, *l1, *l2, *l3]) as usize;
-        // Name, payload and checksum.
-        let (Some(name), Some(next)) = (kind.get(..4), kind.get(payload.saturating_add(8)..))
-        else {
-            return false;
-        };
-        if name == b"IEND" {
-            return true;
+        // Length, name, payload and checksum.
+        let (chunk, next) = rest.split_at_checked(payload.saturating_add(12))?;
+        let name = kind.get(..4)?;
+        // The name of a chunk that is needed to show the image begins with a capital letter.
+        if name[0].is_ascii_uppercase() || name == b"tRNS" || name == b"eXIf" {
+            essence.extend_from_slice(chunk);
         }
-        rest = Some(next);
+        if name == b"IEND" {
+            return Some(essence);
+        }
+        rest = next;
     }
-    false
+    None
+}
+
+/// Returns the orientation of an EXIF block (TIFF 6.0, section 2; Exif 2.32, tag 0x0112), whatever
+/// the type of the integer.
+pub(super) fn exif_orientation(exif: &[u8]) -> Option<Orientation> {
+    const ORIENTATION: u32 = 0x0112;
+    let is_little = match exif.get(..4)? {
+        b"II*\0" => true,
+        b"MM\0*" => false,
+        _ => return None,
+    };
+    let number = |at: usize, length: usize| {
+        let bytes = exif.get(at..at.checked_add(length)?)?.iter();
+        let add = |sum: u32, byte: &u8| sum << 8 | u32::from(*byte);
+        Some(match is_little {
+            true => bytes.rev().fold(0, add),
+            false => bytes.fold(0, add),
+        })
+    };
+    let first = number(4, 4)? as usize;
+    let mut entries = (0..number(first, 2)? as usize).map(|index| first + 2 + 12 * index);
+    let entry = entries.find(|entry| number(*entry, 2) == Some(ORIENTATION))?;
+    // Unsigned and signed integers of 1, 2 and 4 bytes.
+    let length = match number(entry + 2, 2)? {
+        1 | 6 => 1,
+        3 | 8 => 2,
+        4 | 9 => 4,
+        _ => return None,
+    };
+    Orientation::from_exif(number(entry + 8, length)?.try_into().ok()?)
 }
 
 /// Returns true if a JPEG reaches its end-of-image marker (ITU-T T.81, annex B).

@@ -33,8 +33,8 @@ fn every_parameter_is_parsed() {
         ("sigma", "0.7"),
         ("max_detections", "5"),
         ("captured_at", "2026-11-21T09:30:00+01:00"),
-        ("motion", "true"),
-        ("follow", "true"),
+        ("motion", "True"),
+        ("follow", "TRUE"),
         ("priority", "2"),
         ("timeout_millis", "1500"),
     ])
