@@ -1,6 +1,6 @@
 //! The user name and the password of a camera, and the header that carries them.
 
-use http_auth::{PasswordClient, PasswordParams};
+use http_auth::{PasswordClient, PasswordParams, digest::Qop};
 use lookdown_common::Secret;
 use reqwest::{
     Url,
@@ -72,8 +72,13 @@ impl Login {
         let challenge = builder
             .build()
             .map_err(|_| SourceError::UnknownAuthentication)?;
-        match challenge {
-            PasswordClient::Digest(_) => self.has_digest = true,
+        match &challenge {
+            PasswordClient::Digest(digest) => {
+                self.has_digest = true;
+                if !(digest.qop() & Qop::Auth) {
+                    return Err(SourceError::UnknownAuthentication);
+                }
+            }
             _ if self.has_digest => return Err(SourceError::BasicAfterDigest),
             _ => {}
         }
@@ -100,7 +105,8 @@ impl Login {
             password: credentials.password.expose_secret(),
             uri,
             method,
-            body: Some(&[]),
+            // A body would select auth-int, which http-auth computes wrongly.
+            body: None,
         });
         value.ok()
     }
@@ -148,6 +154,23 @@ mod tests {
         assert!(text.starts_with("Digest "), "{text}");
         assert!(text.contains("uri=\"/snap.jpg?size=1\""), "{text}");
         assert!(!text.contains("Circle"), "{text}");
+    }
+
+    #[test]
+    fn auth_is_chosen_where_auth_int_is_offered() {
+        for qop in ["auth,auth-int", "auth-int, auth", "auth"] {
+            let mut login = login();
+            let digest = format!("Digest realm=\"onvif\", qop=\"{qop}\", nonce=\"abc\"");
+            login
+                .accept_challenges([digest.as_str()].into_iter())
+                .unwrap();
+            let header = login.respond("GET", "/snap.jpg").unwrap();
+            assert!(header.contains("qop=auth,"), "{qop}: {header}");
+            assert!(header.contains("nc=00000001"), "{header}");
+        }
+        let only = "Digest realm=\"onvif\", qop=\"auth-int\", nonce=\"abc\"";
+        let refused = login().accept_challenges([only].into_iter());
+        assert!(matches!(refused, Err(SourceError::UnknownAuthentication)));
     }
 
     #[test]

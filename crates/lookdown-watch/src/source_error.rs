@@ -18,7 +18,7 @@ pub enum SourceError {
     CredentialsMissing,
     /// The camera requires an unknown authentication scheme.
     #[error(
-        "the camera requires an authentication other than Basic and Digest: select one of them in the camera"
+        "the camera requires an authentication other than Basic, and Digest with qop=auth: select one of them in the camera"
     )]
     UnknownAuthentication,
     /// A challenge for the password in plain text, after one for its digest.
@@ -26,6 +26,9 @@ pub enum SourceError {
         "the camera asks for the password in plain text (Basic), although it asked for its digest before: check that it is the camera, and restart this program"
     )]
     BasicAfterDigest,
+    /// The camera serves too many clients.
+    #[error("the camera is busy (status {0}): reduce the number of its clients, or raise every")]
+    Busy(u16),
     /// Another status than 200.
     #[error(
         "the camera answered with the status {0}: check the path of the URL in the camera's manual"
@@ -118,6 +121,7 @@ mod tests {
             SourceError::CredentialsMissing,
             SourceError::UnknownAuthentication,
             SourceError::BasicAfterDigest,
+            SourceError::Busy(503),
             SourceError::Status(404),
             SourceError::Redirect,
             SourceError::ContentType(text()),

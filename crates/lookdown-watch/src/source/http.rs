@@ -4,7 +4,10 @@
 use std::convert::Infallible;
 
 use bytes::{Bytes, BytesMut};
-use lookdown_common::{HttpClient, HttpError, text::with_causes};
+use lookdown_common::{
+    HttpClient, HttpError,
+    text::{one_line, with_causes},
+};
 use reqwest::{
     Response, StatusCode, Url,
     header::{AUTHORIZATION, CONTENT_TYPE, ETAG, HeaderValue, IF_NONE_MATCH},
@@ -14,6 +17,8 @@ use tokio::time::{MissedTickBehavior, interval};
 use super::{multipart::PartReader, sink::Sink};
 use crate::{Camera, MAX_FRAME_BYTES, SourceError, credentials::Login, memory_budget::Reservation};
 
+/// Most characters of a camera's text in an error.
+const SHOWN_CHARS: usize = 60;
 /// Requests for one answer: the second one answers the challenge of the first.
 const ATTEMPTS: usize = 2;
 
@@ -41,7 +46,9 @@ pub(super) async fn run(
         }
         let is_image = content_type.is_empty() || content_type.starts_with("image/");
         if !is_image && !content_type.starts_with("application/octet-stream") {
-            return Err(SourceError::ContentType(content_type));
+            return Err(SourceError::ContentType(
+                shown(response, content_type).await,
+            ));
         }
         let tag = response.headers().get(ETAG).cloned();
         sink.accept(read_image(response).await?)?;
@@ -56,7 +63,7 @@ async fn get(
     login: &mut Login,
     entity_tag: Option<&HeaderValue>,
 ) -> Result<Response, SourceError> {
-    for _ in 0..ATTEMPTS {
+    let request = |login: &mut Login| {
         let mut request = client.get(url.clone());
         if let Some(tag) = entity_tag {
             request = request.header(IF_NONE_MATCH, tag);
@@ -64,7 +71,15 @@ async fn get(
         if let Some(authorization) = login.authorization(url) {
             request = request.header(AUTHORIZATION, authorization);
         }
-        let response = client.send(request).await.map_err(unreachable)?;
+        request
+    };
+    for attempt in 0..ATTEMPTS {
+        let response = match client.send(request(login)).await {
+            // Cameras close the connection of a 401 without an announcement.
+            Err(_) if attempt > 0 => client.send(request(login)).await,
+            sent => sent,
+        };
+        let response = response.map_err(unreachable)?;
         match response.status() {
             StatusCode::UNAUTHORIZED => {
                 login.accept_challenge(response.headers())?;
@@ -72,11 +87,26 @@ async fn get(
             StatusCode::NOT_MODIFIED => return Ok(response),
             status if status.is_success() => return Ok(response),
             status if status.is_redirection() => return Err(SourceError::Redirect),
+            status @ (StatusCode::SERVICE_UNAVAILABLE | StatusCode::TOO_MANY_REQUESTS) => {
+                return Err(SourceError::Busy(status.as_u16()));
+            }
             status => return Err(SourceError::Status(status.as_u16())),
         }
     }
     let user = login.user().unwrap_or_default().to_owned();
     Err(SourceError::CredentialsRefused { user })
+}
+
+/// Describes a response without an image: its media type, and the first words of a text.
+async fn shown(mut response: Response, content_type: String) -> String {
+    let is_text = content_type.starts_with("text/") || content_type.contains("json");
+    let chunk = response.chunk().await.ok().flatten().filter(|_| is_text);
+    let text = String::from_utf8_lossy(&chunk.unwrap_or_default()).into_owned();
+    let words: String = one_line(text.trim()).chars().take(SHOWN_CHARS).collect();
+    if words.is_empty() {
+        return content_type;
+    }
+    format!("{content_type}: {words}")
 }
 
 /// Reads the whole image of a snapshot.
@@ -128,4 +158,64 @@ fn content_type(response: &Response) -> String {
 
 fn unreachable(error: impl Into<HttpError>) -> SourceError {
     SourceError::Unreachable(with_causes(&error.into()))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{
+        io::{BufRead, BufReader, Write},
+        net::TcpListener,
+        thread,
+    };
+
+    use super::*;
+    use crate::Credentials;
+
+    const CHALLENGE: &str = "HTTP/1.1 401 Unauthorized\r\nContent-Length: 0\r\n\
+        WWW-Authenticate: Digest realm=\"cam\", qop=\"auth\", nonce=\"abc\"\r\n\r\n";
+
+    /// Requests the image of a camera that closes its connection after each of these answers.
+    async fn answer(answers: &'static [&'static str]) -> Result<Response, SourceError> {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let url = format!("http://{}/snap.jpg", listener.local_addr().unwrap());
+        thread::spawn(move || {
+            for answer in answers {
+                let (stream, _) = listener.accept().unwrap();
+                let mut lines = BufReader::new(&stream).lines();
+                while lines.next().is_some_and(|line| !line.unwrap().is_empty()) {}
+                (&stream).write_all(answer.as_bytes()).unwrap();
+            }
+        });
+        let mut login = Login::new(Some(Credentials {
+            user: "viewer".to_owned(),
+            password: "geheim".into(),
+        }));
+        let client = HttpClient::new(None).unwrap();
+        get(&client, &url.parse().unwrap(), &mut login, None).await
+    }
+
+    #[tokio::test]
+    async fn a_connection_that_ends_with_the_challenge_is_replaced() {
+        for _ in 0..20 {
+            let image = "HTTP/1.1 200 OK\r\nContent-Length: 0\r\n\r\n";
+            let answers: &'static [&'static str] = Box::leak(Box::new([CHALLENGE, image]));
+            let answer = answer(answers).await;
+            assert_eq!(answer.unwrap().status(), StatusCode::OK);
+        }
+    }
+
+    #[tokio::test]
+    async fn a_busy_camera_and_its_own_words_are_shown() {
+        let busy = answer(&["HTTP/1.1 503 Busy\r\nContent-Length: 0\r\n\r\n"]).await;
+        assert!(
+            busy.unwrap_err()
+                .to_string()
+                .starts_with("the camera is busy (status 503)")
+        );
+        let text = "HTTP/1.1 200 OK\r\nContent-Length: 20\r\n\r\nplease\nlogin first!!";
+        let response = answer(Box::leak(Box::new([text]))).await.unwrap();
+        let shown = shown(response, "text/html".to_owned()).await;
+        assert!(shown.starts_with("text/html: please"), "{shown}");
+        assert!(shown.ends_with("login first!!"), "{shown}");
+    }
 }
