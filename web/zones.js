@@ -162,8 +162,10 @@ async function save() {
   }
   Object.assign(saving, { file: withAreas(file, sent), tag: answer.headers.get("ETag") });
   editor.saved(sent);
-  const { warnings = [] } = await answer.json();
-  find("#zones-saved").textContent = [`${id} is saved and in use.`, ...warnings.map(({ message }) => message)].join(" ");
+  const { warnings = [], coverage = [] } = await answer.json();
+  const shares = coverage.map(({ field, percent }) => `${field} covers ${percent.toFixed(1)} % of the frame.`);
+  const texts = [`${id} is saved and in use.`, ...shares, ...warnings.map(({ message }) => message)];
+  find("#zones-saved").textContent = texts.join(" ");
   await loadCalibrations();
   find("#parameters").dispatchEvent(new Event("input"));
 }

@@ -12,7 +12,7 @@ mod plausibility;
 mod site;
 mod warnings;
 
-pub use areas::Areas;
+pub use areas::{AreaShare, Areas};
 pub use calibrated_camera::{Calibration, CameraGeometry, FrameSizeMismatch};
 pub use error::CalibrationError;
 pub use file::{content as read_content, read_camera};

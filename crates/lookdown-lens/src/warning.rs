@@ -54,6 +54,8 @@ warnings! {
     FocalLengthsDiffer = "focal-lengths-differ";
     /// The field of view of the calibration is small for a ceiling fisheye.
     FieldOfViewNarrow = "field-of-view-narrow";
+    /// A privacy mask of the calibration hides less than 0.1 % of the frame.
+    MaskSmall = "mask-small";
 }
 
 /// A circumstance that a reader of a report or of a calibration should consider.

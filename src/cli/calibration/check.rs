@@ -15,7 +15,7 @@ use lookdown_detect::imaging::{
 };
 use lookdown_lens::{
     calibration::{
-        Areas, Calibration, CameraGeometry,
+        AreaShare, Areas, Calibration, CameraGeometry,
         native::{NativeSource, SourcedValue},
     },
     geometry::{Lens, Pixel, Ray, ViewPlan, VirtualView, ZoneArea, view_plan::Coverage},
@@ -237,7 +237,12 @@ fn areas(calibration: &Calibration) -> impl Iterator<Item = (&'static str, Strin
     };
     let areas = counted("  areas", &foot_filter.areas);
     let ignore = counted("  ignore", &foot_filter.ignore);
-    let places = areas.into_iter().chain(ignore);
+    let (width, height) = calibration.image_size();
+    let shares = calibration.areas().shares(width, height).into_iter();
+    let shares = shares.map(|AreaShare { field, percent }| format!("{field} {percent:.1} %"));
+    let shares: Vec<_> = shares.collect();
+    let shares = (!shares.is_empty()).then(|| ("  of the frame", shares.join(", ")));
+    let places = areas.into_iter().chain(ignore).chain(shares);
     zones.into_iter().chain(lines).chain(masks).chain(places)
 }
 

@@ -18,6 +18,11 @@ use area_name::check_name;
 /// Most zones of a calibration, most lines, most masks, most areas and most ignored places.
 const MAX_AREAS: usize = 32;
 
+/// Least extent of an area in the frame, pixels: a smaller one is in fractions of the frame.
+const LEAST_PX: f64 = 4.0;
+/// Least extent of an area on the floor, meters.
+const LEAST_M: f64 = 0.05;
+
 /// Areas that are drawn into the frames or onto the floor of a camera.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Areas {
@@ -29,6 +34,15 @@ pub struct Areas {
     pub masks: Vec<Polygon>,
     /// The places of people who count.
     pub foot_filter: FootFilter,
+}
+
+/// The share of the frame that an area covers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AreaShare {
+    /// The field, such as `masks[0]`.
+    pub field: String,
+    /// The share, percent.
+    pub percent: f64,
 }
 
 impl Areas {
@@ -80,6 +94,41 @@ impl Areas {
                 margin_px: MARGIN_OF_FRAME * f64::from(image.width),
             },
         })
+    }
+
+    /// Returns the zones, masks, areas and ignored places in the frame with the share of a frame of
+    /// `width` × `height` pixels that each covers.
+    #[must_use]
+    pub fn shares(&self, width: u32, height: u32) -> Vec<AreaShare> {
+        fn in_frame(area: &ZoneArea) -> Option<&Polygon> {
+            match area {
+                ZoneArea::Frame(polygon) => Some(polygon),
+                ZoneArea::Floor(_) => None,
+            }
+        }
+        let zones = self.zones.iter().map(|zone| in_frame(&zone.area));
+        let lists: [(&str, Vec<_>); 4] = [
+            ("zones", zones.collect()),
+            ("masks", self.masks.iter().map(Some).collect()),
+            (
+                "areas",
+                self.foot_filter.areas.iter().map(in_frame).collect(),
+            ),
+            (
+                "ignore",
+                self.foot_filter.ignore.iter().map(in_frame).collect(),
+            ),
+        ];
+        let shares = lists.into_iter().flat_map(|(of, polygons)| {
+            let polygons = polygons.into_iter().enumerate();
+            polygons.filter_map(move |(index, polygon)| {
+                Some(AreaShare {
+                    field: format!("{of}[{index}]"),
+                    percent: 100.0 * polygon?.share_of_frame(width, height),
+                })
+            })
+        });
+        shares.collect()
     }
 
     /// The same areas in frames `scale_x`, `scale_y` times as large.
@@ -141,7 +190,13 @@ fn area(
                                mount.height_m, or draw the area in the frame with frame_px";
                 return Err(FormatError::invalid(field, problem));
             }
-            Ok(ZoneArea::Floor(polygon(&field, corners)?))
+            let area = polygon(&field, corners)?;
+            let size = area.extent();
+            if size.max() < LEAST_M {
+                let problem = format!("it is {} × {} m small: give meters", size.x, size.y);
+                return Err(FormatError::invalid(field, problem));
+            }
+            Ok(ZoneArea::Floor(area))
         }
         (Some(_), Some(_)) => Err(FormatError::invalid(
             field,
@@ -162,6 +217,9 @@ fn frame_polygon(
 ) -> Result<Polygon, FormatError> {
     let NativeImage { width, height } = image;
     let polygon = polygon(field, corners)?;
+    if polygon.extent().max() < LEAST_PX {
+        return Err(FormatError::invalid(field, too_small(&polygon, image)));
+    }
     if polygon.meets(&Polygon::of_frame(width, height)) {
         return Ok(polygon);
     }
@@ -170,6 +228,28 @@ fn frame_polygon(
          size"
     );
     Err(FormatError::invalid(field, problem))
+}
+
+/// The problem of a polygon that covers nothing.
+fn too_small(polygon: &Polygon, NativeImage { width, height }: NativeImage) -> String {
+    let numbers = polygon
+        .corners()
+        .iter()
+        .flat_map(|corner| [corner.x, corner.y]);
+    let least = numbers.clone().fold(f64::INFINITY, f64::min);
+    let most = numbers.fold(f64::NEG_INFINITY, f64::max);
+    if least < 0.0 || most > 1.0 {
+        let size = polygon.extent();
+        return format!(
+            "it is {} × {} pixels small: give pixels of frames of {width}×{height}",
+            size.x, size.y
+        );
+    }
+    let [from, to] = [least, most].map(|number| (number * f64::from(width)).round());
+    format!(
+        "its corners are {least} to {most}, which look like fractions of the frame: give pixels, \
+         here {from} to {to}"
+    )
 }
 
 fn polygon(field: &str, corners: &[[f64; 2]]) -> Result<Polygon, FormatError> {

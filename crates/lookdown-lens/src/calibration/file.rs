@@ -16,6 +16,8 @@ use crate::geometry::{Lens, Mount};
 
 /// Image sides accepted, pixels.
 const IMAGE_SIDE: std::ops::RangeInclusive<u32> = 16..=65_536;
+/// The height of a camera above the floor, meters.
+const HEIGHT_M: std::ops::RangeInclusive<f64> = 0.01..=1000.0;
 /// The largest deviation of `world_up` from unit length.
 const UNIT_TOLERANCE: f64 = 1e-3;
 
@@ -163,10 +165,12 @@ fn mount(raw: &NativeMount) -> Result<Mount, String> {
         ));
     }
     if let Some(height) = raw.height_m
-        && !(height.is_finite() && height > 0.0)
+        && !HEIGHT_M.contains(&height)
     {
         return Err(format!(
-            "height_m is {height}: give meters above 0, or leave it out"
+            "height_m is {height}: give {} to {} meters, or leave it out",
+            HEIGHT_M.start(),
+            HEIGHT_M.end()
         ));
     }
     Ok(Mount::new(Unit::new_normalize(up), raw.height_m))

@@ -1,6 +1,6 @@
 //! Warnings about calibrations that can be used, but are implausible.
 
-use super::Calibration;
+use super::{AreaShare, Calibration};
 use crate::{
     geometry::{Lens, Ray},
     warning::{Warning, WarningCode},
@@ -12,6 +12,8 @@ const OFF_CENTER: f64 = 0.1;
 const SQUARE_PIXELS: f64 = 0.05;
 /// A lens that sees no farther than this off its axis (radians) is not a fisheye.
 const NARROW: f64 = 1.0;
+/// A mask that hides less than this (percent of the frame) is rare.
+const SMALL: f64 = 0.1;
 /// Far enough from the axis to measure the scale there, radians.
 const NEAR_AXIS: f64 = 0.01;
 
@@ -38,6 +40,17 @@ impl Calibration {
             );
             warnings.push(Warning::new(WarningCode::FieldOfViewNarrow, message));
         }
+        let (width, height) = self.image_size();
+        let shares = self.areas().shares(width, height).into_iter();
+        let small =
+            shares.filter(|share| share.field.starts_with("masks") && share.percent < SMALL);
+        warnings.extend(small.map(|AreaShare { field, percent }| {
+            let message = format!(
+                "{field} hides {percent:.3} % of the frame: give its corners in pixels of frames of \
+                 {width}×{height}"
+            );
+            Warning::new(WarningCode::MaskSmall, message)
+        }));
         warnings
     }
 

@@ -1,6 +1,6 @@
 //! Simple polygons: areas whose outline neither crosses nor touches itself.
 
-use nalgebra::Point2;
+use nalgebra::{Point2, Vector2};
 
 /// Most corners of a polygon: every edge is compared with every other.
 pub const MAX_CORNERS: usize = 64;
@@ -119,6 +119,50 @@ impl Polygon {
     pub fn meets(&self, other: &Self) -> bool {
         let crosses = |edge: Edge| other.edges().any(|another| meet(edge, another));
         self.edges().any(crosses) || self.holds(other.corners[0]) || other.holds(self.corners[0])
+    }
+
+    /// Returns the width and the height of the bounding box.
+    #[must_use]
+    pub fn extent(&self) -> Vector2<f64> {
+        let corners = self.corners.iter();
+        let (least, most) = corners.fold(
+            (self.corners[0], self.corners[0]),
+            |(least, most), corner| (least.inf(corner), most.sup(corner)),
+        );
+        most - least
+    }
+
+    /// Returns the share of a frame of `width` × `height` pixels that the area covers, 0 to 1. The
+    /// outline is cut at each side of the frame (Sutherland and Hodgman, 1974).
+    #[must_use]
+    pub fn share_of_frame(&self, width: u32, height: u32) -> f64 {
+        let mut corners = self.corners.clone();
+        for [from, to] in Self::of_frame(width, height).edges() {
+            let inside = |point: Point2<f64>| (to - from).perp(&(point - from));
+            let following: Vec<_> = corners
+                .iter()
+                .copied()
+                .cycle()
+                .skip(1)
+                .take(corners.len())
+                .collect();
+            let edges = corners.into_iter().zip(following);
+            corners = edges
+                .flat_map(|(a, b)| {
+                    let (of_a, of_b) = (inside(a), inside(b));
+                    let is_cut = (of_a < 0.0) != (of_b < 0.0);
+                    let cut = is_cut.then(|| a + (b - a) * (of_a / (of_a - of_b)));
+                    (of_a >= 0.0).then_some(a).into_iter().chain(cut)
+                })
+                .collect();
+        }
+        let following = corners.iter().cycle().skip(1);
+        let twice: f64 = corners
+            .iter()
+            .zip(following)
+            .map(|(a, b)| a.coords.perp(&b.coords))
+            .sum();
+        twice.abs() / 2.0 / (f64::from(width) * f64::from(height))
     }
 
     /// The same area with its coordinates multiplied by two factors above 0.

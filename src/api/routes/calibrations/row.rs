@@ -1,6 +1,7 @@
 //! A calibration in the list of calibrations.
 
 use lookdown_common::report::ReportWarning;
+use lookdown_lens::calibration::AreaShare;
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -32,9 +33,21 @@ pub(in crate::api) struct CalibrationInfo {
     /// The reason why the newest version of the file is not used.
     #[serde(skip_serializing_if = "Option::is_none")]
     problem: Option<String>,
+    /// The shares of the frame that zones, masks, areas and ignored places in the frame cover.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    coverage: Vec<Coverage>,
     /// Assumptions made when the file was read, and implausible properties.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     warnings: Vec<ReportWarning>,
+}
+
+/// The share of the frame that an area covers.
+#[derive(Serialize, ToSchema)]
+pub(in crate::api) struct Coverage {
+    /// The field of the area, such as `masks[0]`.
+    field: String,
+    /// The share, percent.
+    percent: f64,
 }
 
 /// A frame size.
@@ -52,6 +65,11 @@ impl From<&CalibrationEntry> for CalibrationInfo {
         let (width, height) = calibration.image_size();
         let mut warnings: Vec<_> = entry.notes.iter().map(to_warning).collect();
         warnings.extend(calibration.warnings().iter().map(to_warning));
+        let shares = calibration.areas().shares(width, height).into_iter();
+        let coverage = shares.map(|AreaShare { field, percent }| Coverage {
+            field,
+            percent: (percent * 1000.0).round() / 1000.0,
+        });
         Self {
             id: calibration.id().to_string(),
             revision: Some(calibration.revision().to_owned()),
@@ -59,6 +77,7 @@ impl From<&CalibrationEntry> for CalibrationInfo {
             image: Some(ImageSize { width, height }),
             lens: Some(calibration.lens().model()),
             problem: None,
+            coverage: coverage.collect(),
             warnings,
         }
     }
@@ -76,6 +95,7 @@ impl From<CalibrationRow> for CalibrationInfo {
                 image: None,
                 lens: None,
                 problem: None,
+                coverage: Vec::new(),
                 warnings: Vec::new(),
             })
         }

@@ -208,3 +208,49 @@ fn invalid_areas_and_ignored_places_are_refused() {
         assert!(refusal.starts_with(expected), "{refusal}");
     }
 }
+
+#[test]
+fn fractions_of_the_frame_are_refused_as_such() {
+    let corners = "[[0.05, 0.05], [0.95, 0.05], [0.95, 0.95], [0.05, 0.95]]";
+    for (list, name) in [
+        ("zones", r#""name": "a", "#),
+        ("masks", ""),
+        ("areas", ""),
+        ("ignore", ""),
+    ] {
+        let refused = refusal(&format!(r#""{list}": [{{{name}"frame_px": {corners}}}]"#));
+        let expected = format!("{list}[0].frame_px: its corners are 0.05 to 0.95, which look like");
+        assert!(refused.contains(&expected), "{refused}");
+    }
+    let refused = refusal(r#""masks": [{"frame_px": [[10, 10], [13, 10], [13, 12]]}]"#);
+    assert!(refused.contains("it is 3 × 2 pixels small"), "{refused}");
+}
+
+#[test]
+fn an_area_on_the_floor_has_an_extent() {
+    let content = file(
+        r#", "height_m": 3"#,
+        r#""areas": [{"floor_m": [[0, 0], [1e-308, 0], [1e-308, 1e-308]]}]"#,
+    );
+    let refused = read(&content).unwrap_err();
+    assert!(refused.contains("areas[0].floor_m: it is"), "{refused}");
+}
+
+#[test]
+fn a_mask_that_hides_little_has_a_warning() {
+    let masks = r#""masks": [{"frame_px": [[0, 0], [5, 0], [5, 5], [0, 5]]},
+                             {"frame_px": [[-100, 0], [100, 0], [100, 100], [-100, 100]]}]"#;
+    let calibration = read(&file("", masks)).unwrap();
+    let (width, height) = calibration.image_size();
+    let pixels = f64::from(width) * f64::from(height);
+    let percent = [25.0, 10_000.0].map(|covered| 100.0 * covered / pixels);
+    let shares = calibration.areas().shares(width, height);
+    for (share, percent) in shares.iter().zip(percent) {
+        assert!((share.percent - percent).abs() < 1e-9, "{share:?}");
+    }
+    let warnings = calibration.warnings();
+    let small = warnings
+        .iter()
+        .filter(|warning| warning.code.name() == "mask-small");
+    assert_eq!(small.count(), 1, "{warnings:?}");
+}

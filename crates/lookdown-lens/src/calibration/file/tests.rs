@@ -221,7 +221,7 @@ fn what_makes_no_camera_is_refused_with_field_value_and_remedy() {
             "[0, 0, -2]",
             "mount: world_up is [0, 0, -2], of length 2.000: give a unit",
         ),
-        ("2.8", "0", "mount: height_m is 0: give meters above 0"),
+        ("2.8", "0", "mount: height_m is 0: give 0.01 to 1000 meters"),
         (
             "equidistant",
             "equidistance",

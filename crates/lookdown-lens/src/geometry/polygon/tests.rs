@@ -161,3 +161,43 @@ proptest! {
         prop_assert!(Polygon::new(&crossed).is_err());
     }
 }
+
+#[test]
+fn the_share_of_a_frame_ends_at_its_sides() {
+    for (corners, expected) in [
+        (
+            &[[0.0, 0.0], [50.0, 0.0], [50.0, 40.0], [0.0, 40.0]][..],
+            0.5,
+        ),
+        (
+            &[[-50.0, -10.0], [50.0, -10.0], [50.0, 50.0], [-50.0, 50.0]],
+            0.5,
+        ),
+        (&[[0.0, 0.0], [100.0, 0.0], [0.0, 40.0]], 0.5),
+        // A fork around the frame, whose tines are outside.
+        (
+            &[
+                [-9.0, -9.0],
+                [109.0, -9.0],
+                [109.0, 49.0],
+                [105.0, 49.0],
+                [105.0, -5.0],
+                [-9.0, -5.0],
+            ],
+            0.0,
+        ),
+        (
+            &[[-9.0, -9.0], [999.0, -9.0], [999.0, 999.0], [-9.0, 999.0]],
+            1.0,
+        ),
+    ] {
+        for reverse in [false, true] {
+            let mut corners = corners.to_vec();
+            if reverse {
+                corners.reverse();
+            }
+            let share = Polygon::new(&corners).unwrap().share_of_frame(100, 40);
+            assert!((share - expected).abs() < 1e-9, "{share}");
+        }
+    }
+}
