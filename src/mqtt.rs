@@ -15,6 +15,7 @@ mod entity;
 mod images;
 mod message;
 mod occupancy;
+mod packet_codec;
 mod publisher;
 mod retained;
 mod session;

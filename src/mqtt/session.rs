@@ -5,8 +5,7 @@ use std::{future::Future, io, time::Duration};
 
 use futures_util::{SinkExt, StreamExt};
 use rumqttc::{
-    Codec, ConnAck, Connect, ConnectReturnCode, LastWill, Packet, Publish, QoS, Subscribe,
-    SubscribeFilter,
+    ConnAck, Connect, ConnectReturnCode, LastWill, Packet, Publish, QoS, Subscribe, SubscribeFilter,
 };
 use tokio::time::{Instant, Interval, MissedTickBehavior, interval, timeout};
 use tokio_util::codec::Framed;
@@ -15,6 +14,7 @@ use super::{
     Broker,
     connection::{Stream, connect},
     message::Message,
+    packet_codec::PacketCodec,
 };
 use crate::tls::ClientTls;
 
@@ -25,10 +25,6 @@ const KEEP_ALIVE_SECONDS: u16 = 30;
 const KEEP_ALIVE: Duration = Duration::from_secs(KEEP_ALIVE_SECONDS as u64);
 /// Longest time for connecting, or for sending a message to the broker.
 const BROKER_TIMEOUT: Duration = Duration::from_secs(10);
-/// Most bytes of an incoming packet: only statuses are expected.
-const MAX_INCOMING: usize = 64 * 1024;
-/// Most bytes of an outgoing packet: much more than the largest report.
-const MAX_OUTGOING: usize = 16 * 1024 * 1024;
 
 /// The reason why a connection has ended or could not be opened.
 #[derive(Debug, thiserror::Error)]
@@ -49,7 +45,7 @@ pub(super) enum SessionError {
 
 /// A connection that the broker has accepted.
 pub(super) struct Session {
-    packets: Framed<Box<dyn Stream>, Codec>,
+    packets: Framed<Box<dyn Stream>, PacketCodec>,
     ping: Interval,
     last_heard: Instant,
 }
@@ -76,11 +72,7 @@ impl Session {
         }
         in_time(async {
             let stream = connect(broker, tls).await?;
-            let codec = Codec {
-                max_incoming_size: MAX_INCOMING,
-                max_outgoing_size: MAX_OUTGOING,
-            };
-            let mut packets = Framed::new(stream, codec);
+            let mut packets = Framed::new(stream, PacketCodec::default());
             packets.send(Packet::Connect(hello)).await?;
             match packets.next().await {
                 Some(Ok(Packet::ConnAck(ConnAck {
@@ -181,6 +173,8 @@ mod tests {
         time::sleep,
     };
 
+    use tokio_util::codec::Decoder;
+
     use super::*;
 
     /// The answer to CONNECT.
@@ -216,8 +210,8 @@ mod tests {
 
     #[tokio::test]
     async fn packets_of_a_broker_are_bounded() {
-        // PUBLISH with a declared length of 256 MiB, without end.
-        let endless = [0x30, 0xFF, 0xFF, 0xFF, 0x7F];
+        // SUBACK with a declared length of 256 MiB, without end.
+        let endless = [0x90, 0xFF, 0xFF, 0xFF, 0x7F];
         let accepted = [&CONN_ACK[..], &endless].concat();
         let filler = [b'x'; 4096];
         for start in [
@@ -230,6 +224,30 @@ mod tests {
             let is_refused = matches!(error, SessionError::Protocol(_) | SessionError::Closed);
             assert!(is_refused, "{error:?}");
         }
+    }
+
+    #[test]
+    fn a_large_message_is_skipped_and_the_next_one_is_read() {
+        let mut codec = PacketCodec::default();
+        let large = 200_000;
+        let small = [0x30, 5, 0, 1, b't', b'4', b'2'];
+        // A length of 200,000 in bits of seven.
+        let mut sent = vec![0x31, 0xC0, 0x9A, 0x0C];
+        sent.resize(4 + large, b'x');
+        sent.extend_from_slice(&small);
+        let mut received = bytes::BytesMut::new();
+        let mut packets = Vec::new();
+        for chunk in sent.chunks(1000) {
+            received.extend_from_slice(chunk);
+            while let Some(packet) = codec.decode(&mut received).unwrap() {
+                packets.push(packet);
+            }
+            assert!(received.len() < 1100, "it is not kept");
+        }
+        let [Packet::Publish(message)] = &packets[..] else {
+            panic!("{packets:?}")
+        };
+        assert_eq!((&*message.topic, &*message.payload), ("t", &b"42"[..]));
     }
 
     #[tokio::test(start_paused = true)]
