@@ -1,12 +1,17 @@
 """The examples of the folder `examples` that need no further programs, as users run them."""
 
+import base64
 import csv
+import hashlib
+import hmac
 import http.client
 import json
 import re
+import socket
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 from pathlib import Path
 
@@ -90,6 +95,30 @@ class Counts(CountedCamera):
                 wait_until(lambda: b'" 204 ' in log.read_bytes(), "a right signature is accepted")
         messages = [json.loads(line) for line in printed.read_text(encoding="utf-8").splitlines()]
         self.assertEqual({message["type"] for message in messages}, {"occupancy.reached"})
+
+    def test_the_receiver_takes_a_message_with_an_image(self) -> None:
+        (port,) = free_ports(1)
+        secret, printed = self.folder / "hook.secret", self.folder / "printed"
+        secret.write_text(SECRET + "\n", encoding="utf-8")
+        key = base64.b64decode(SECRET.removeprefix("whsec_"))
+        body, sent = b"x" * 200_000, str(int(time.time()))
+        right = base64.b64encode(hmac.digest(key, f"id.{sent}.".encode() + body, hashlib.sha256)).decode()
+        command = [sys.executable, EXAMPLES / "webhook_receiver.py", secret, str(port)]
+        with printed.open("wb") as output, subprocess.Popen(command, stdout=output) as receiver:
+            self.addCleanup(receiver.kill)
+            for signature, status in ((f"v1,{right}", 204), ("v1,\u00e9", 401)):
+                headers = {"webhook-id": "id", "webhook-timestamp": sent, "webhook-signature": signature}
+                wait_until(lambda: is_open(port), "the receiver listens")
+                connection = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
+                connection.request("POST", "/", body, headers)
+                self.assertEqual(connection.getresponse().status, status)
+                connection.close()
+            receiver.kill()
+
+
+def is_open(port: int) -> bool:
+    with socket.socket() as probe:
+        return probe.connect_ex(("127.0.0.1", port)) == 0
 
 
 if __name__ == "__main__":
