@@ -27,7 +27,8 @@ settings! {
         /// unknown.
         longest_gap: Duration = Duration::from_secs(10)
             => duration(Duration::from_secs(1)..=Duration::from_mins(10));
-        /// The most cameras that are counted. A camera without a report for a day frees its place.
+        /// The most cameras that are counted, beside those that this process reads. A silent camera
+        /// without a calibration makes room for a new one.
         max_cameras: usize = 64 => whole(1..=1024);
         /// The address of `lookdown count`. `lookdown run` serves the counts on `server.listen`.
         listen: SocketAddr = SocketAddr::from(([127, 0, 0, 1], 8090)) => address();

@@ -42,8 +42,8 @@ settings! {
         /// The prefix of the topics on which Home Assistant discovers entities. Empty: nothing is
         /// announced.
         discovery_prefix: Option<String> = Some("homeassistant".to_owned()) => optional(topic());
-        /// The most cameras that are published: the first that send frames. Each is a device in
-        /// Home Assistant.
+        /// The most cameras that are published, beside those that this process reads. Each is a
+        /// device in Home Assistant.
         max_cameras: NonZeroUsize = NonZeroUsize::new(100).unwrap_or(NonZeroUsize::MIN) => count();
         /// The time without a person after which occupancy is off: single frames that miss a person
         /// change nothing. 0: each frame counts.
