@@ -4,7 +4,7 @@ use std::{net::SocketAddr, path::Path, process::ExitCode, sync::Arc};
 
 use anyhow::{Context, bail};
 use clap::Args;
-use lookdown_common::{AbortOnDrop, ConfigError, LogOnce, Reload, ServerEntry, ServerOptions};
+use lookdown_common::{ConfigError, LogOnce, Reload, ServerEntry, ServerOptions};
 use lookdown_http::{Shutdown, server::bind};
 use lookdown_watch::{
     CameraEntry, Metrics, Origin, WatchEntry, WatchOptions, serve_metrics, watch,
@@ -19,6 +19,7 @@ use super::{
     settings_file::{SettingsSource, is_settings_file},
 };
 use crate::{cameras::Cameras, settings::Settings};
+use tokio_util::task::AbortOnDropHandle;
 
 /// Arguments of `lookdown watch`.
 #[derive(Debug, Args)]
@@ -101,14 +102,17 @@ fn is_of_another_format(argument: &str) -> bool {
 }
 
 /// Serves the metrics until the value is dropped.
-async fn listen(address: SocketAddr, metrics: &Arc<Metrics>) -> anyhow::Result<AbortOnDrop> {
+async fn listen(
+    address: SocketAddr,
+    metrics: &Arc<Metrics>,
+) -> anyhow::Result<AbortOnDropHandle<()>> {
     let listener = bind("--metrics-listen", address).await;
     let listener = listener.map_err(anyhow::Error::msg)?;
     if let Ok(address) = listener.local_addr() {
         tracing::info!("metrics at http://{address}/metrics");
     }
     let serving = tokio::spawn(serve_metrics(listener, Arc::clone(metrics)));
-    Ok(AbortOnDrop(serving.abort_handle()))
+    Ok(AbortOnDropHandle::new(serving))
 }
 
 /// Returns the cameras of the settings and of the command line. In `lookdown run`, the stored

@@ -6,8 +6,6 @@
 //! frame, which the server writes. With `metrics`, the declaration of metrics.
 
 #[cfg(feature = "companion")]
-mod abort_on_drop;
-#[cfg(feature = "companion")]
 mod backoff;
 #[cfg(feature = "companion")]
 mod config;
@@ -44,7 +42,6 @@ pub use stored_file::StoredFile;
 
 #[cfg(feature = "companion")]
 pub use {
-    abort_on_drop::AbortOnDrop,
     backoff::Backoff,
     config::{ConfigError, parse_toml, read_file, read_secret},
     duration::{optional_duration, parse_duration},

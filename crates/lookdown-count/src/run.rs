@@ -4,7 +4,7 @@ use std::{future::Future, sync::Arc, time::Duration};
 
 use axum::Router;
 use jiff::Timestamp;
-use lookdown_common::{AbortOnDrop, ClientError, ConfigError, OwnCameras, ServerClient};
+use lookdown_common::{ClientError, ConfigError, OwnCameras, ServerClient};
 use lookdown_http::{
     protect::{self, Access, Routes},
     server::bind,
@@ -17,6 +17,7 @@ use tokio::{
     task::{JoinError, spawn_blocking},
     time::{Instant, timeout},
 };
+use tokio_util::task::AbortOnDropHandle;
 
 use crate::{
     calibrations::Calibrations,
@@ -131,7 +132,7 @@ pub async fn count(
         }),
     });
     let handing_back = tokio::spawn(hand_back(client.clone(), snapshots.subscribe()));
-    let _handing_back = AbortOnDrop(handing_back.abort_handle());
+    let _handing_back = AbortOnDropHandle::new(handing_back);
     let (stop_sender, stop_receiver) = watch::channel(false);
     let mut follower = Follower {
         deliveries: Deliveries::start(
@@ -181,7 +182,7 @@ fn serve_alone(
     counts: Router,
     counter: &Arc<Mutex<Counter>>,
     metrics: &Arc<Metrics>,
-) -> AbortOnDrop {
+) -> AbortOnDropHandle<()> {
     let address = listener.local_addr().ok();
     if let Some(address) = address {
         tracing::info!("counts at http://{address}/counts");
@@ -200,5 +201,5 @@ fn serve_alone(
     let serving = tokio::spawn(async move {
         protect::serve(listener, routes, access, "counts.api_key_file", &open).await;
     });
-    AbortOnDrop(serving.abort_handle())
+    AbortOnDropHandle::new(serving)
 }

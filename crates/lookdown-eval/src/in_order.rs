@@ -1,4 +1,5 @@
-//! Processes several images concurrently, with results in the order of the images.
+//! Processes several images concurrently, with results in the order of the images. Not by rayon: a
+//! thread of its pool that waits for the engine's pool would begin a further image meanwhile.
 
 use std::{
     num::NonZeroUsize,

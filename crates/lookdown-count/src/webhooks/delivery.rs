@@ -8,9 +8,7 @@ use std::{
 
 use base64::{Engine as _, engine::general_purpose::STANDARD};
 use jiff::Timestamp;
-use lookdown_common::{
-    AbortOnDrop, ClientError, HttpClient, LogOnce, ServerClient, text::with_causes,
-};
+use lookdown_common::{ClientError, HttpClient, LogOnce, ServerClient, text::with_causes};
 use reqwest::{StatusCode, Url, header::CONTENT_TYPE};
 use serde_json::{Value, json};
 use tokio::{
@@ -18,6 +16,7 @@ use tokio::{
     task::spawn_blocking,
     time::sleep,
 };
+use tokio_util::task::AbortOnDropHandle;
 
 use super::{Webhook, signature::SigningKey};
 use crate::{event_image::latest_image, message::Message, metrics::Metrics, store::Store};
@@ -43,7 +42,7 @@ pub(crate) struct Deliveries {
     receivers: BTreeMap<String, mpsc::Sender<Message>>,
     store: Store,
     metrics: Arc<Metrics>,
-    _tasks: Vec<AbortOnDrop>,
+    _tasks: Vec<AbortOnDropHandle<()>>,
 }
 
 /// A receiver of messages.
@@ -107,7 +106,7 @@ impl Deliveries {
             };
             let (store, metrics) = (store.clone(), Arc::clone(metrics));
             let task = tokio::spawn(receiver.run(queue, store, metrics));
-            tasks.push(AbortOnDrop(task.abort_handle()));
+            tasks.push(AbortOnDropHandle::new(task));
             of_urls.insert(&webhook.url, sender.clone());
             receivers.insert(webhook.digest(), sender);
         }
