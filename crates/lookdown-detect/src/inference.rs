@@ -1,5 +1,6 @@
 //! Person detectors: boxes with scores from rendered views.
 
+mod description;
 mod detector;
 mod device;
 mod error;
@@ -15,7 +16,9 @@ mod remote;
 mod repository;
 mod signature;
 mod staging;
+mod stamp;
 
+pub use description::{ModelDescription, OnnxTensor};
 pub use detector::Detector;
 pub use device::{Device, OpenVinoDevice, UnknownDevice};
 pub use error::InferenceError;
@@ -24,7 +27,7 @@ pub use head_output::{HeadOutput, ViewDetection};
 pub use heads::CandidateOptions;
 pub use manifest::{FILE_NAME as MANIFEST, Layout, ManifestInput, ModelManifest, name_from};
 pub use model::Model;
-pub use onnx::{ModelDescription, OnnxDetector, OnnxOptions, OnnxTensor, onnx_loader};
+pub use onnx::{OnnxDetector, OnnxOptions, onnx_loader};
 pub use registry::{ModelRegistry, RegistryFull};
 pub use remote::{BearerToken, InvalidToken, RemoteDetector, RemoteOptions, RemoteServer};
 pub use repository::{

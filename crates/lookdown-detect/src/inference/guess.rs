@@ -1,8 +1,8 @@
 //! Guesses of the tables of a manifest, from the inputs and outputs of a network.
 
 use super::{
+    description::{OnnxTensor, float_shapes},
     heads::{Head, OutputShape},
-    onnx::{OnnxTensor, float_shapes},
 };
 
 /// Side of the input if the network leaves it open, pixels.

@@ -4,7 +4,7 @@ use std::{num::NonZeroUsize, path::PathBuf};
 
 use parking_lot::Mutex;
 
-use super::{Detector, HeadOutput, InferenceError, repository::Stamp};
+use super::{detector::Detector, error::InferenceError, head_output::HeadOutput, stamp::Stamp};
 use crate::imaging::{NetworkInput, ViewBatch};
 
 /// A loaded model. A frame keeps a reference to its model, so a replaced model is dropped when its

@@ -1,6 +1,5 @@
-//! Detectors run by ONNX Runtime. The only module that uses `ort`.
+//! Detectors run by ONNX Runtime. Only this module and `description` use `ort`.
 
-mod description;
 mod environment;
 mod first_line;
 mod loader;
@@ -13,16 +12,18 @@ use lookdown_lens::revision::{revision_of, sha256_of};
 use ort::{session::Session, value::TensorRef};
 
 use super::{
-    Detector, HeadOutput, InferenceError, ModelManifest,
+    description::{self, ModelDescription, OnnxTensor},
+    detector::Detector,
+    error::InferenceError,
+    head_output::HeadOutput,
     heads::{Head, TensorView},
+    manifest::ModelManifest,
     onnx_file,
     signature::Signature,
     staging::{Staged, Staging},
 };
 use crate::imaging::{NetworkInput, ViewBatch};
 
-pub(super) use description::{FLOAT, Metadata, float_shapes};
-pub use description::{ModelDescription, OnnxTensor};
 use first_line::first_line;
 pub use loader::onnx_loader;
 pub use options::OnnxOptions;

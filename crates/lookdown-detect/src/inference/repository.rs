@@ -6,19 +6,22 @@
 
 mod error;
 mod folder;
-mod stamp;
 
 use std::{collections::BTreeMap, num::NonZeroUsize, path::Path, sync::Arc};
 
 use parking_lot::{Mutex, MutexGuard};
 
-use self::stamp::{files_of, stamp};
-use super::{InferenceError, Model, ModelRegistry, RemoteServer, model::ModelFiles};
+use super::{
+    error::InferenceError,
+    model::{Model, ModelFiles},
+    registry::ModelRegistry,
+    remote::RemoteServer,
+    stamp::{Stamp, files_of, stamp},
+};
 use crate::metrics::{DetectMetrics, replace_info, start_at_zero};
 
 pub use error::RepositoryError;
 pub use folder::{ModelFolder, is_fetched, model_names};
-pub(super) use stamp::Stamp;
 
 /// Loads a model from its folder or ONNX file.
 pub type ModelLoader = Box<dyn Fn(&Path) -> Result<Model, InferenceError> + Send + Sync>;

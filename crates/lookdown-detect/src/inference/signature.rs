@@ -6,8 +6,8 @@ use std::{
 };
 
 use super::{
-    Layout, ManifestInput, OnnxTensor,
-    onnx::{FLOAT, Metadata},
+    description::{FLOAT, Metadata, OnnxTensor},
+    manifest::{Layout, ManifestInput},
 };
 
 /// Network input sides accepted, pixels.

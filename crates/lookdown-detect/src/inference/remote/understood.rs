@@ -9,7 +9,7 @@ use crate::{
     imaging::NetworkInput,
     inference::{
         InferenceError, ModelManifest, OnnxTensor,
-        onnx::{FLOAT, Metadata, float_shapes},
+        description::{FLOAT, Metadata, float_shapes},
         signature::Signature,
     },
     open_inference::{

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::inference::{InferenceError, RegistryFull};
+use crate::inference::{error::InferenceError, registry::RegistryFull};
 
 /// A model that was not loaded. Every message is one sentence that includes the remedy.
 #[derive(Debug, thiserror::Error)]

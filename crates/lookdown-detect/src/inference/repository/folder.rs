@@ -5,11 +5,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::RepositoryError;
-use crate::inference::{
-    ModelManifest,
-    manifest::{FILE_NAME, is_name},
-};
+use super::error::RepositoryError;
+use crate::inference::manifest::{FILE_NAME, ModelManifest, is_name};
 
 /// Most entries of the folder that are read for a listing.
 const MAX_ENTRIES: usize = 1000;

@@ -7,10 +7,11 @@ use ort::{
     value::{Outlet, TensorElementType, ValueType},
 };
 
-use crate::{
-    imaging::NetworkInput,
-    inference::{Layout, ModelManifest, heads::OutputShape},
+use super::{
+    heads::OutputShape,
+    manifest::{Layout, ModelManifest},
 };
+use crate::imaging::NetworkInput;
 
 /// Properties of a model.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,15 +50,15 @@ pub struct OnnxTensor {
 }
 
 /// The supported element type of tensors.
-pub(in crate::inference) const FLOAT: &str = "f32";
+pub(super) const FLOAT: &str = "f32";
 
 /// Metadata of the ONNX file, as far as exporters write it.
 #[derive(Debug, Default)]
-pub(in crate::inference) struct Metadata {
-    pub(in crate::inference) licence: Option<String>,
+pub(super) struct Metadata {
+    pub(super) licence: Option<String>,
     /// Height and width.
-    pub(in crate::inference) size: Option<[u32; 2]>,
-    pub(in crate::inference) stride: Option<u32>,
+    pub(super) size: Option<[u32; 2]>,
+    pub(super) stride: Option<u32>,
 }
 
 /// Reads the metadata keys of Ultralytics' exporter. Other exporters write none.
@@ -103,9 +104,7 @@ fn tensor(outlet: &Outlet) -> OnnxTensor {
 }
 
 /// The shapes of the outputs that heads can read.
-pub(in crate::inference) fn float_shapes(
-    outputs: &[OnnxTensor],
-) -> impl Iterator<Item = OutputShape<'_>> {
+pub(super) fn float_shapes(outputs: &[OnnxTensor]) -> impl Iterator<Item = OutputShape<'_>> {
     let floats = outputs.iter().filter(|output| output.element == FLOAT);
     floats.map(|output| OutputShape {
         name: &output.name,

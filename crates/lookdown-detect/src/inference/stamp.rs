@@ -6,11 +6,11 @@ use std::{
     time::SystemTime,
 };
 
-use crate::inference::{ModelManifest, manifest::FILE_NAME};
+use super::manifest::{FILE_NAME, ModelManifest};
 
 /// Fingerprint of files: inode, length and time of modification, with symbolic links followed.
 /// `None` when a file is missing, for example while it is being replaced.
-pub(in crate::inference) type Stamp = Option<Vec<(u64, u64, SystemTime)>>;
+pub(super) type Stamp = Option<Vec<(u64, u64, SystemTime)>>;
 
 /// The files that make a model.
 pub(super) fn files_of(model: &Path) -> Vec<PathBuf> {
