@@ -131,13 +131,15 @@ pub fn in_process_router(state: ApiState) -> Router {
 
 fn limited_router(state: ApiState, limiter: Option<RateLimiter>) -> Router {
     let options = &state.options;
-    let own_pages = options.allowed_origins();
-    let own_pages = own_pages.map(|own| from_fn_with_state(own, csrf::refuse));
+    let origins = options.allowed_origins();
+    let csrf = origins.as_ref().map(csrf::layer);
+    let hosts = origins.map(|origins| from_fn_with_state(origins, csrf::require_host));
     let limiter = limiter.map(|all| from_fn_with_state(all, rate_limit::apply));
     let responses = from_fn_with_state(state.clone(), response_memory::bound);
     let guards = ServiceBuilder::new()
         .layer(responses)
-        .layer(option_layer(own_pages))
+        .layer(option_layer(hosts))
+        .layer(option_layer(csrf))
         .layer(option_layer(limiter));
     // Some clients ask for the metadata with a slash at the end.
     let description = Router::from(description())

@@ -1,81 +1,36 @@
 //! CSRF and DNS rebinding protection for servers without API keys. A browser on the server's
 //! machine can reach a server that listens only there, and runs web pages of any origin. CORS
-//! prevents such a page from reading responses, but not from sending requests. With DNS rebinding,
-//! an attacker's host name resolves to this machine, and its page has the same origin as the
-//! server.
+//! prevents such a page from reading responses, but not from sending requests: the layer of
+//! tower-http refuses those that may make changes. With DNS rebinding, an attacker's host name
+//! resolves to this machine, and its page has the same origin as the server. So requests for a
+//! public host name are refused unless the settings list it.
 //!
-//! So a request that may make changes is refused unless its `Origin` is the server itself or one of
-//! the allowed ones. Requests for a public host name are refused unless the settings list it, and
-//! images for pages of other sites unless their origin is allowed. A server that only its own
-//! machine reaches also refuses requests that a proxy forwarded: the clients of a proxy are on
-//! other machines. API keys make these checks unnecessary: browsers do not add them on their own.
+//! A server that only its own machine reaches also refuses requests with the usual headers of a
+//! proxy, whose clients are on other machines. API keys make these checks unnecessary: browsers do
+//! not add them on their own.
 
 use std::{net::IpAddr, sync::Arc};
 
 use axum::{
     extract::{Request, State},
-    http::{
-        HeaderMap, HeaderName, Uri,
-        header::{ORIGIN, REFERER},
-        uri::Authority,
-    },
+    http::{HeaderMap, HeaderName, Uri, uri::Authority},
     middleware::Next,
     response::{IntoResponse, Response},
 };
+use tower_http::csrf::{CsrfLayer, ProtectionError};
 
 use crate::{
     host::host_of,
     problem::{Kind, Problem},
 };
 
-/// The headers that forwarding proxies add (RFC 7239; RFC 9110, section 7.6.3; `X-Real-IP` by
-/// convention; RFC 8586; the names of content networks, load balancers and tunnels).
-const FORWARDING_HEADERS: [&str; 16] = [
-    "ali-cdn-real-ip",
-    "cdn-loop",
-    "fastly-client-ip",
-    "fly-client-ip",
-    "fly-forwarded-port",
-    "forwarded",
-    "proxy-client-ip",
-    "true-client-ip",
-    "via",
-    "wl-proxy-client-ip",
-    "x-client-ip",
-    "x-cluster-client-ip",
-    "x-forwarded",
-    "x-original-host",
-    "x-proxyuser-ip",
-    "x-real-ip",
-];
-/// The beginnings of the names of such headers: by convention, and of Cloudflare, Envoy, Azure,
-/// AWS, Google Cloud, Akamai, ngrok and Tailscale.
-const FORWARDING_PREFIXES: [&str; 14] = [
-    "akamai-",
-    "cf-",
-    "cloudfront-",
-    "ngrok-",
-    "tailscale-",
-    "x-akamai-",
-    "x-amzn-",
-    "x-appengine-",
-    "x-arr-",
-    "x-azure-",
-    "x-cloud-trace-",
-    "x-envoy-",
-    "x-forwarded-",
-    "x-original-forwarded-",
-];
-/// The relation of the page that caused a request to the server, which browsers add (Fetch
-/// Metadata).
-const SEC_FETCH_SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
-/// The use of the response in the browser, such as `image`. A `document` is a link that was
-/// followed.
-const SEC_FETCH_DEST: HeaderName = HeaderName::from_static("sec-fetch-dest");
+/// The headers that forwarding proxies usually add (RFC 7239; RFC 9110, section 7.6.3; by
+/// convention).
+const FORWARDING_HEADERS: [&str; 4] = ["forwarded", "via", "x-forwarded-for", "x-real-ip"];
 /// The names that the public DNS does not delegate (RFC 6761, 6762, 8375; the private-use name of
 /// ICANN).
 const LOCAL_SUFFIXES: [&str; 4] = [".localhost", ".local", ".internal", ".home.arpa"];
-/// Largest number of characters of a header that an error message repeats.
+/// Largest number of characters of a host name that an error message repeats.
 const MAX_SHOWN_CHARS: usize = 128;
 
 /// The origins that may make changes, and the names of a listener without keys.
@@ -103,33 +58,54 @@ pub struct Remedies {
 }
 
 impl AllowedOrigins {
-    /// Returns true if the request is not refused.
+    /// Returns true if the host of the request is not refused.
     #[must_use]
     pub fn admits(&self, request: &Request) -> bool {
         check(request, self).is_ok()
     }
 }
 
-/// Refuses requests of other origins.
-pub async fn refuse(
-    State(own_pages): State<AllowedOrigins>,
+/// Returns the layer that refuses requests of other origins which may make changes.
+pub fn layer(
+    origins: &AllowedOrigins,
+) -> CsrfLayer<impl FnMut(ProtectionError) -> Response + Clone + Send + Sync + 'static> {
+    let Remedies {
+        keys,
+        origins: remedy,
+        ..
+    } = origins.remedies;
+    let mut csrf = CsrfLayer::new();
+    for origin in &*origins.allowed {
+        // An origin that no browser sends matches none.
+        csrf = csrf.clone().add_trusted_origin(origin).unwrap_or(csrf);
+    }
+    csrf.with_rejection_response(move |_: ProtectionError| {
+        let detail =
+            format!("without keys ({keys}), web pages of other origins may only read: {remedy}");
+        Problem::new(Kind::Forbidden, detail).into_response()
+    })
+}
+
+/// Refuses requests for public host names, and those that a proxy has forwarded.
+pub async fn require_host(
+    State(origins): State<AllowedOrigins>,
     request: Request,
     next: Next,
 ) -> Response {
-    match check(&request, &own_pages) {
+    match check(&request, &origins) {
         Ok(()) => next.run(request).await,
         Err(problem) => problem.into_response(),
     }
 }
 
-fn check(request: &Request, own_pages: &AllowedOrigins) -> Result<(), Problem> {
+fn check(request: &Request, origins: &AllowedOrigins) -> Result<(), Problem> {
     let forbidden = |detail| Err(Problem::new(Kind::Forbidden, detail));
     let AllowedOrigins {
         own_machine_only,
         allowed,
         hosts,
         remedies,
-    } = own_pages;
+    } = origins;
     let keys = remedies.keys;
     let headers = request.headers();
     if *own_machine_only && let Some(header) = forwarding_header(headers) {
@@ -151,43 +127,7 @@ fn check(request: &Request, own_pages: &AllowedOrigins) -> Result<(), Problem> {
              owner of {host} can make it resolve to any machine: use an address, or {remedy}"
         ));
     }
-    let is_allowed = |origin: &str| {
-        let is_own = host.as_ref().is_some_and(|host| names(origin, host));
-        is_own || allowed.iter().any(|allowed| allowed == origin)
-    };
-    if let Some(origin) = headers.get(ORIGIN) {
-        let origin = origin.to_str().unwrap_or("null");
-        if request.method().is_safe() || is_allowed(origin) {
-            return Ok(());
-        }
-        let (origin, remedy) = (shown(origin), remedies.origins);
-        return forbidden(format!(
-            "without keys ({keys}), web pages of other origins may only read, and this request is \
-             from a page of {origin}: {remedy}"
-        ));
-    }
-    // Browsers send no origin with the request of an image or a script.
-    let is = |name, value: &str| headers.get(name).is_some_and(|given| given == value);
-    let referrer = headers.get(REFERER).and_then(|value| value.to_str().ok());
-    if is(SEC_FETCH_SITE, "cross-site")
-        && !is(SEC_FETCH_DEST, "document")
-        && !referrer
-            .and_then(origin_of)
-            .is_some_and(|origin| is_allowed(&origin))
-    {
-        let remedy = remedies.origins;
-        return forbidden(format!(
-            "without keys ({keys}), this server sends nothing to pages of other sites: open its \
-             address directly, or {remedy}"
-        ));
-    }
     Ok(())
-}
-
-/// Returns the origin of an address.
-fn origin_of(url: &str) -> Option<String> {
-    let url: Uri = url.parse().ok()?;
-    Some(format!("{}://{}", url.scheme_str()?, url.authority()?))
 }
 
 /// Returns `true` if a host name is that of a pattern in the settings.
@@ -199,12 +139,10 @@ fn matches(pattern: &str, host: &str) -> bool {
     }
 }
 
-/// Returns the first header that a forwarding proxy adds.
+/// Returns the first of [`FORWARDING_HEADERS`] that a request has.
 fn forwarding_header(headers: &HeaderMap) -> Option<&str> {
-    headers.keys().map(HeaderName::as_str).find(|name| {
-        let begins = |prefix: &&str| name.starts_with(prefix);
-        FORWARDING_HEADERS.contains(name) || FORWARDING_PREFIXES.iter().any(begins)
-    })
+    let mut names = headers.keys().map(HeaderName::as_str);
+    names.find(|name| FORWARDING_HEADERS.contains(name))
 }
 
 /// Returns `true` if an origin has this host.

@@ -91,7 +91,8 @@ pub async fn serve(
             .layer(from_fn_with_state(Arc::new(key), check_key)),
         Access::OwnMachine | Access::Everyone(_) => routes
             .protected
-            .layer(from_fn_with_state(origins, csrf::refuse)),
+            .layer(csrf::layer(&origins))
+            .layer(from_fn_with_state(origins, csrf::require_host)),
     };
     let unread = from_fn_with_state(UnreadResponses::new(UNREAD_KIB), unread_responses::bound);
     let services = Services {
