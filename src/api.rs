@@ -31,7 +31,6 @@ use utoipa_swagger_ui::{Config, SwaggerUi};
 use self::{
     detect::headers::{PERSON_COUNT, SERVER_TIMING},
     http::{
-        connection_limit,
         context::ContextSource,
         cors, drain_body,
         envelope::{self, Envelope},
@@ -158,13 +157,6 @@ fn limited_router(state: ApiState, limiter: Option<RateLimiter>) -> Router {
 /// The router of the metrics port: metrics and health checks for operators.
 pub fn operation_router(state: ApiState) -> Router {
     with_common_layers(operation(false), state)
-}
-
-/// The router for connections beyond the limit: health checks, and metrics unless they have a port
-/// of their own. All other requests are refused.
-pub fn overload_router(state: ApiState) -> Router {
-    let router = operation(state.options.metrics_elsewhere);
-    with_common_layers(router.fallback(connection_limit::refuse), state)
 }
 
 fn operation(metrics_elsewhere: bool) -> Router<ApiState> {

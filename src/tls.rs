@@ -9,7 +9,7 @@ mod identity;
 mod options;
 mod validity;
 
-use std::{num::NonZeroU64, sync::Arc, time::Duration};
+use std::{num::NonZeroU64, sync::Arc};
 
 use jiff::Timestamp;
 use lookdown_http::server::Handshake;
@@ -120,16 +120,11 @@ impl Handshake for Tls {
     type Stream = TlsStream<TcpStream>;
 
     /// Performs the TLS handshake of a connection. Returns `None` if it fails, is refused, or takes
-    /// longer than the handshake timeout or `max_duration`.
-    async fn accept(
-        &self,
-        connection: TcpStream,
-        max_duration: Duration,
-    ) -> Option<TlsStream<TcpStream>> {
-        let max_duration = max_duration.min(self.options.handshake_timeout);
+    /// longer than the handshake timeout.
+    async fn accept(&self, connection: TcpStream) -> Option<TlsStream<TcpStream>> {
         let config = Arc::clone(&self.serving().config);
         let handshake = shake_hands(connection, config);
-        let (result, encrypted) = match timeout(max_duration, handshake).await {
+        let (result, encrypted) = match timeout(self.options.handshake_timeout, handshake).await {
             Ok(Ok(encrypted)) => ("success", Some(encrypted)),
             Ok(Err(error)) => {
                 tracing::debug!("a TLS handshake failed: {error}");

@@ -4,7 +4,6 @@
 pub(super) mod accept;
 pub(super) mod access;
 pub(super) mod caller;
-pub(super) mod connection_limit;
 pub(super) mod context;
 pub(super) mod cors;
 pub(super) mod deadline;

@@ -9,7 +9,7 @@ use std::{
 
 use lookdown_http::{
     Shutdown,
-    server::{self, Plain, Services},
+    server::{self, Plain},
 };
 use tokio::{
     join,
@@ -51,16 +51,13 @@ impl App {
             .publisher
             .take()
             .map(|publisher| spawn(publisher.run()));
-        let services = Services {
-            regular: api::router(self.state.clone()),
-            beyond_limit: api::overload_router(self.state.clone()),
-        };
+        let router = api::router(self.state.clone());
         let limits = &self.settings.connections;
         let tls = self.tls.as_ref();
         let connections = server::serve(
             sockets.main,
             tls,
-            services,
+            router,
             limits,
             &self.metrics.connections,
             &shutdown,
@@ -126,15 +123,11 @@ impl App {
     /// Serves metrics and probes on their own port until the process ends.
     async fn serve_operation(&self, listener: TcpListener) {
         let router = api::operation_router(self.state.clone());
-        let services = Services {
-            regular: router.clone(),
-            beyond_limit: router,
-        };
         let limits = &self.settings.connections;
         server::serve::<Plain, _, _>(
             listener,
             None,
-            services,
+            router,
             limits,
             &self.metrics.connections,
             &Shutdown::default(),

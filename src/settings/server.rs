@@ -31,8 +31,8 @@ settings! {
 
 settings! {
     in "server" fill ConnectionLimits {
-        /// The largest number of open connections. On further ones health checks are answered, and
-        /// all else is refused with 503.
+        /// The largest number of open connections. Further ones wait until one is closed. Health
+        /// checks that must not wait need `metrics_listen`.
         max_connections => count();
         /// The longest time for the path and the headers of a request to arrive.
         header_timeout as "header_timeout_millis" => millis(1..=MAX_TIMEOUT_MILLIS);

@@ -52,7 +52,7 @@ class ComposeFile(unittest.TestCase):
 
     def test_prometheus_scrapes_lookdown_and_grafana_queries_it(self):
         (job,) = read_yaml(DOCKER / "prometheus.yaml")["scrape_configs"]
-        self.assertEqual((job["job_name"], job["static_configs"]), ("lookdown", [{"targets": ["lookdown:8080"]}]))
+        self.assertEqual((job["job_name"], job["static_configs"]), ("lookdown", [{"targets": ["lookdown:9090"]}]))
         (source,) = read_yaml(DOCKER / "grafana" / "datasource.yaml")["datasources"]
         self.assertEqual(source["url"], "http://prometheus:9090")
         (provider,) = read_yaml(DOCKER / "grafana" / "dashboards.yaml")["providers"]

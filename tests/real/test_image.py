@@ -40,7 +40,7 @@ class ContainerImage(unittest.TestCase):
         self.assertEqual((config["User"], config["WorkingDir"]), ("65532:65532", "/opt/lookdown"))
         self.assertEqual((config["Entrypoint"], config["Cmd"]), ([PROGRAM], ["serve"]))
         self.assertEqual(config["Healthcheck"]["Test"], ["CMD", PROGRAM, "health"])
-        self.assertEqual({*config["ExposedPorts"]}, {"8080/tcp"})
+        self.assertEqual({*config["ExposedPorts"]}, {"8080/tcp", "9090/tcp"})
 
     def test_its_labels_describe_where_it_comes_from(self):
         prefix = "org.opencontainers.image."

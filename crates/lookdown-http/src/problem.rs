@@ -47,13 +47,11 @@ pub enum Kind {
     HeadersTooLarge,
     /// The request failed for a reason that only the log has.
     Internal,
-    /// Too many connections are open.
-    TooManyConnections,
 }
 
 impl Kind {
     /// All kinds.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 9] = [
         Self::MalformedRequest,
         Self::KeyRequired,
         Self::Forbidden,
@@ -63,7 +61,6 @@ impl Kind {
         Self::Overloaded,
         Self::HeadersTooLarge,
         Self::Internal,
-        Self::TooManyConnections,
     ];
 
     fn entry(self) -> (StatusCode, &'static str, &'static str) {
@@ -104,11 +101,6 @@ impl Kind {
                 StatusCode::INTERNAL_SERVER_ERROR,
                 "internal",
                 "Internal server error",
-            ),
-            Self::TooManyConnections => (
-                StatusCode::SERVICE_UNAVAILABLE,
-                "too-many-connections",
-                "Too many connections",
             ),
         }
     }
@@ -218,7 +210,7 @@ impl IntoResponse for Problem {
             Kind::KeyRequired => {
                 headers.insert(WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
             }
-            Kind::Overloaded | Kind::TooManyConnections => {
+            Kind::Overloaded => {
                 headers.insert(RETRY_AFTER, HeaderValue::from_static("1"));
             }
             _ => {}

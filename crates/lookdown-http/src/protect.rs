@@ -19,12 +19,12 @@ use crate::{
     csrf::{self, AllowedOrigins, Remedies},
     header_limits::{self, HeaderLimits},
     host, keys,
-    problem::{self, Kind, Problem},
-    server::{self, ConnectionLimits, Plain, Services},
+    problem::{self, Problem},
+    server::{self, ConnectionLimits, Plain},
     unread_responses::{self, UnreadResponses},
 };
 
-/// Most connections of a companion at a time, without those that only get probes.
+/// Most connections of a companion at a time.
 const MAX_CONNECTIONS: usize = 64;
 /// Memory of responses that clients have not read, KiB.
 const UNREAD_KIB: u32 = 64 << 10;
@@ -56,7 +56,7 @@ impl Access {
 pub struct Routes {
     /// Routes for clients with access.
     pub protected: Router,
-    /// Health checks, also on connections beyond the limit.
+    /// Health checks, which need no key.
     pub probes: Router,
 }
 
@@ -95,16 +95,9 @@ pub async fn serve(
             .layer(from_fn_with_state(origins, csrf::require_host)),
     };
     let unread = from_fn_with_state(UnreadResponses::new(UNREAD_KIB), unread_responses::bound);
-    let services = Services {
-        regular: protected.layer(unread).merge(routes.probes.clone()),
-        beyond_limit: routes.probes.fallback(refuse),
-    };
-    let services = Services {
-        regular: surrounded(services.regular, &limits),
-        beyond_limit: surrounded(services.beyond_limit, &limits),
-    };
+    let service = surrounded(protected.layer(unread).merge(routes.probes), &limits);
     let shutdown = Shutdown::default();
-    server::serve::<Plain, _, _>(listener, None, services, &limits, open, &shutdown).await;
+    server::serve::<Plain, _, _>(listener, None, service, &limits, open, &shutdown).await;
 }
 
 /// Adds the layers of every route, the outermost first.
@@ -131,9 +124,4 @@ async fn check_key(State(key): State<Arc<SecretString>>, request: Request, next:
         Ok(()) => next.run(request).await,
         Err(problem) => problem.into_response(),
     }
-}
-
-async fn refuse() -> Problem {
-    let detail = "too many connections are open: close those that are not needed, or retry";
-    Problem::new(Kind::TooManyConnections, detail)
 }

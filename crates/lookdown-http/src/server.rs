@@ -4,11 +4,10 @@
 mod accept;
 mod connection;
 mod connection_limits;
-mod connection_permits;
 mod connection_timeouts;
 mod instrumented_io;
 
-use std::{convert::Infallible, future::Future, net::SocketAddr, sync::Arc, time::Duration};
+use std::{convert::Infallible, future::Future, net::SocketAddr, sync::Arc};
 
 use hyper::{
     Request, Response,
@@ -18,44 +17,22 @@ use prometheus::IntGauge;
 use tokio::{
     io::{AsyncRead, AsyncWrite},
     net::{TcpListener, TcpStream},
+    sync::{OwnedSemaphorePermit, Semaphore},
     task::JoinSet,
 };
 use tower::{BoxError, Service};
 
 pub use self::connection_limits::ConnectionLimits;
-use self::{
-    accept::Acceptor,
-    connection::Rules,
-    connection_permits::{ConnectionPermit, ConnectionPermits},
-};
+use self::{accept::Acceptor, connection::Rules};
 use crate::Shutdown;
-
-/// Longest time for the handshake, and for the head, on a connection beyond the limit. A probe
-/// needs milliseconds of CPU time, which it may wait for beside a flood of handshakes.
-const TIMEOUT_BEYOND_LIMIT: Duration = Duration::from_secs(2);
-
-/// The services that answer. Each request carries the address of its client, a
-/// [`SocketAddr`], among its extensions.
-#[derive(Debug, Clone)]
-pub struct Services<S> {
-    /// The service for connections within the limit.
-    pub regular: S,
-    /// The service for the single request of a connection beyond the limit.
-    pub beyond_limit: S,
-}
 
 /// The handshake at the beginning of each connection.
 pub trait Handshake: Send + Sync + 'static {
     /// The encrypted connection.
     type Stream: AsyncRead + AsyncWrite + Send + Unpin;
 
-    /// Returns the connection, or `None` if the handshake fails or takes longer than
-    /// `max_duration`.
-    fn accept(
-        &self,
-        connection: TcpStream,
-        max_duration: Duration,
-    ) -> impl Future<Output = Option<Self::Stream>> + Send;
+    /// Returns the connection, or `None` if the handshake fails or takes too long.
+    fn accept(&self, connection: TcpStream) -> impl Future<Output = Option<Self::Stream>> + Send;
 }
 
 /// Connections without a handshake.
@@ -65,7 +42,7 @@ pub enum Plain {}
 impl Handshake for Plain {
     type Stream = TcpStream;
 
-    async fn accept(&self, connection: TcpStream, _: Duration) -> Option<TcpStream> {
+    async fn accept(&self, connection: TcpStream) -> Option<TcpStream> {
         Some(connection)
     }
 }
@@ -80,15 +57,37 @@ pub async fn bind(setting: &str, address: SocketAddr) -> Result<TcpListener, Str
     })
 }
 
+/// An open connection: it counts as one until this is dropped, and holds a permit until then.
+struct OpenConnection {
+    _permit: Option<OwnedSemaphorePermit>,
+    open: IntGauge,
+}
+
+impl OpenConnection {
+    fn new(permit: Option<OwnedSemaphorePermit>, open: &IntGauge) -> Self {
+        open.inc();
+        Self {
+            _permit: permit,
+            open: open.clone(),
+        }
+    }
+}
+
+impl Drop for OpenConnection {
+    fn drop(&mut self) {
+        self.open.dec();
+    }
+}
+
 /// Serves until `shutdown` reaches draining. Then connections in the backlog are accepted, idle
 /// ones are closed, and those with a request in flight are closed after its response. The function
 /// returns when none is left. Dropping it closes all connections at once. With `tls`, every
-/// connection begins with a handshake.
-/// `open` counts the open connections.
+/// connection begins with a handshake. Each request carries the address of its client, a
+/// [`SocketAddr`], among its extensions. `open` counts the open connections.
 pub async fn serve<H, S, B>(
     listener: TcpListener,
     tls: Option<&Arc<H>>,
-    services: Services<S>,
+    service: S,
     limits: &ConnectionLimits,
     open: &IntGauge,
     shutdown: &Shutdown,
@@ -100,52 +99,43 @@ pub async fn serve<H, S, B>(
     B: Body<Data: Send, Error: Into<BoxError>> + Send + Unpin + 'static,
 {
     let mut acceptor = Acceptor::new(listener);
-    let permits = ConnectionPermits::new(limits.max_connections, open);
+    let permits = Arc::new(Semaphore::new(limits.max_connections.get()));
     let mut connections = JoinSet::new();
-    let serve_on = |stream: TcpStream, permit: ConnectionPermit| {
-        let is_regular = permit.is_regular();
-        let (service, max_duration) = if is_regular {
-            (services.regular.clone(), Duration::MAX)
-        } else {
-            (services.beyond_limit.clone(), TIMEOUT_BEYOND_LIMIT)
-        };
+    let serve_on = |stream: TcpStream, permit: Option<OwnedSemaphorePermit>| {
+        let connection = OpenConnection::new(permit, open);
         let rules = Rules {
-            limits: ConnectionLimits {
-                header_timeout: limits.header_timeout.min(max_duration),
-                ..limits.clone()
-            },
-            one_request_only: !is_regular,
+            limits: limits.clone(),
             client: stream.peer_addr().ok(),
             shutdown: shutdown.clone(),
         };
-        let tls = tls.cloned();
+        let (service, tls) = (service.clone(), tls.cloned());
         async move {
-            let served = async {
-                match tls {
-                    None => connection::serve(stream, service, rules).await,
-                    Some(tls) => {
-                        if let Some(stream) = tls.accept(stream, max_duration).await {
-                            connection::serve(stream, service, rules).await;
-                        }
+            let _connection = connection;
+            match tls {
+                None => connection::serve(stream, service, rules).await,
+                Some(tls) => {
+                    if let Some(stream) = tls.accept(stream).await {
+                        connection::serve(stream, service, rules).await;
                     }
                 }
-            };
-            tokio::select! {
-                () = served => {}
-                () = permit.closed.cancelled() => {}
             }
         }
     };
     loop {
-        let stream = tokio::select! {
+        // Connections beyond the limit wait in the backlog of the listener.
+        let next = async {
+            let permit = Arc::clone(&permits).acquire_owned().await.ok();
+            (acceptor.accept().await, permit)
+        };
+        let (stream, permit) = tokio::select! {
             () = shutdown.draining() => break,
             Some(_ended) = connections.join_next() => continue,
-            stream = acceptor.accept() => stream,
+            next = next => next,
         };
-        connections.spawn(serve_on(stream, permits.take()));
+        connections.spawn(serve_on(stream, permit));
     }
     for stream in acceptor.close() {
-        connections.spawn(serve_on(stream, permits.take()));
+        connections.spawn(serve_on(stream, None));
     }
     while connections.join_next().await.is_some() {}
 }

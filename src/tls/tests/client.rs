@@ -1,6 +1,6 @@
 //! A client that trusts one authority, and an echo server.
 
-use std::{io, net::SocketAddr, sync::Arc, time::Duration};
+use std::{io, net::SocketAddr, sync::Arc};
 
 use lookdown_http::server::Handshake;
 use rustls::{
@@ -32,7 +32,7 @@ pub(super) async fn echo(tls: &Arc<Tls>) -> SocketAddr {
             let (connection, _) = listener.accept().await.unwrap();
             let tls = Arc::clone(&tls);
             tokio::spawn(async move {
-                let encrypted = tls.accept(connection, Duration::MAX).await?;
+                let encrypted = tls.accept(connection).await?;
                 let (mut reader, mut writer) = tokio::io::split(encrypted);
                 tokio::io::copy(&mut reader, &mut writer).await.ok()
             });

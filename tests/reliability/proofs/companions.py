@@ -17,8 +17,8 @@ from support.exchange import Lost, ask, connect, request
 from support.row import Row
 
 LOCAL = {"Host": "localhost"}
-SILENT = 330
-"""More than the connections of a companion, and than those that wait beyond its limit."""
+SILENT = 48
+"""Fewer than the connections of a companion."""
 READERS = 40
 NOWHERE = "127.0.0.1:9"
 """No server: the companions serve requests all the same."""

@@ -37,7 +37,6 @@ const MAX_DISCARDED_BYTES: u64 = 4 << 20;
 /// The rules of a connection.
 pub(super) struct Rules {
     pub(super) limits: ConnectionLimits,
-    pub(super) one_request_only: bool,
     /// The address of the client, unless it has already disconnected.
     pub(super) client: Option<SocketAddr>,
     pub(super) shutdown: Shutdown,
@@ -53,7 +52,6 @@ where
 {
     let Rules {
         limits,
-        one_request_only,
         client,
         shutdown,
     } = rules;
@@ -67,7 +65,7 @@ where
         let (timeouts, shutdown) = (Arc::clone(&timeouts), &shutdown);
         async move {
             let mut response = answer.await?;
-            if one_request_only || shutdown.is_requested() {
+            if shutdown.is_requested() {
                 let close = HeaderValue::from_static("close");
                 response.headers_mut().insert(CONNECTION, close);
             }

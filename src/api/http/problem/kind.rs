@@ -143,10 +143,6 @@ problems! {
     /// The server failed to process the request.
     Internal = INTERNAL_SERVER_ERROR "internal" "Internal server error"
         => "Search the log for the `request_id`, and report the error.";
-    /// The server has too many open connections.
-    TooManyConnections = SERVICE_UNAVAILABLE "too-many-connections" "Too many connections" retry_after_seconds 1
-        => "Retry after `Retry-After`; close connections that are not needed, or raise \
-            `server.max_connections`.";
     /// The result store does not respond.
     ResultsUnreachable = SERVICE_UNAVAILABLE "results-unreachable" "Result store unavailable" retry_after_seconds 1
         => "Retry after `Retry-After`; the log and `/readyz` report the error of Redis.";
