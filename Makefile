@@ -38,8 +38,9 @@ serve: ## download ONNX Runtime, build what a first look needs, and run the serv
 	@$(PYTHON) scripts/setup.py runtime
 	@exec target/quick/lookdown serve
 
-check: ## check formatting and lints and run the unit tests; without network once the crates are there
+check: ## check formatting, lints and budgets of lines, and run the unit tests; without network once the crates are there
 	cargo fmt --all --check
+	$(PYTHON) scripts/lines.py --check
 	cargo clippy --workspace --lib --bins --locked -- -D warnings
 	cargo test --workspace --lib --locked
 
