@@ -37,7 +37,8 @@ pub struct Observation {
 }
 
 impl Observation {
-    /// Returns the number of views with detections, from this frame's inference or from the motion cache.
+    /// Returns the number of views with detections, from this frame's inference or from the motion
+    /// cache.
     #[must_use]
     pub fn view_count(&self) -> usize {
         let left_out = usize::from(!self.is_searched);
