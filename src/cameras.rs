@@ -3,6 +3,7 @@
 
 mod error;
 mod state_folder;
+mod stored;
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -11,18 +12,18 @@ use std::{
     time::Duration,
 };
 
-use lookdown_common::{ConfigError, OwnCameras, Secret, StoredFile, plain_name};
+use lookdown_common::{ConfigError, OwnCameras, Secret};
 use lookdown_watch::{
     Camera, CameraEntry, CameraState, Frame, Location, MAX_CAMERAS, Metrics, first_frame,
 };
 use parking_lot::{Mutex, RwLock};
 use secrecy::ExposeSecret;
-use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value};
 use state_folder::StateFolder;
+use stored::{CameraFile, FILE, TEST, check_name, entry};
 use tokio::sync::Semaphore;
 
 pub use error::CameraError;
+pub use stored::{Stored, StoredCamera};
 
 /// Longest wait for the frame of a test.
 const TEST_TIMEOUT: Duration = Duration::from_secs(15);
@@ -30,58 +31,8 @@ const TEST_TIMEOUT: Duration = Duration::from_secs(15);
 const TOO_MANY: &str = "there are 256 cameras: delete one first";
 /// Most cameras that are tested at a time: each may start a decoder.
 const MAX_TESTS: usize = 4;
-/// The name in the path of a test, which no camera has.
-const TEST: &str = "test";
-/// The file of the cameras in the state folder.
-const FILE: &str = "cameras.json";
 /// The file with the names of the cameras of the settings that are paused, in the state folder.
 const PAUSED: &str = "paused.json";
-
-/// A camera as it is stored, without its password.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct StoredCamera {
-    /// The URL of the source.
-    pub url: String,
-    /// The user name.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub user: Option<String>,
-    /// The interval between two frames.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub every: Option<String>,
-    /// The ID of the calibration.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub calibration: Option<String>,
-    /// The profile.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub profile: Option<String>,
-    /// True if no frames are read.
-    #[serde(default)]
-    pub paused: bool,
-}
-
-impl StoredCamera {
-    /// Returns the source without its query, which may hold a token.
-    #[must_use]
-    pub fn shown_source(&self) -> String {
-        let location = Location::parse(&self.url);
-        location.map_or_else(|_| String::new(), |(location, _)| location.to_string())
-    }
-}
-
-/// Stored cameras by name.
-pub type Stored = BTreeMap<String, StoredCamera>;
-
-/// The content of the file of the cameras.
-#[derive(Serialize)]
-struct CameraFile {
-    version: u8,
-    #[serde(flatten)]
-    cameras: Stored,
-    /// Entries that are not cameras. They stay until they are replaced or deleted.
-    #[serde(flatten)]
-    invalid: Map<String, Value>,
-}
 
 /// The cameras of this process.
 pub struct Cameras {
@@ -275,23 +226,7 @@ impl Cameras {
 
     /// Reads the file of the cameras.
     fn file(&self) -> Result<CameraFile, ConfigError> {
-        let mut entries: Map<String, Value> = self.folder.read(FILE)?;
-        if let Some(version) = entries.remove(StoredFile::KEY) {
-            let checked = StoredFile::Cameras.check(&version.to_string());
-            checked.map_err(|problem| self.folder.refused(FILE, &problem))?;
-        }
-        let (mut cameras, mut invalid) = (Stored::new(), Map::new());
-        for (name, entry) in entries {
-            match StoredCamera::deserialize(&entry) {
-                Ok(camera) => drop(cameras.insert(name, camera)),
-                Err(_) => drop(invalid.insert(name, entry)),
-            }
-        }
-        Ok(CameraFile {
-            version: StoredFile::Cameras.version(),
-            cameras,
-            invalid,
-        })
+        CameraFile::read(&self.folder)
     }
 
     /// Returns the names of the paused cameras of the settings, possibly also of earlier settings.
@@ -444,26 +379,6 @@ impl Cameras {
     fn store(&self, file: &CameraFile) -> Result<(), CameraError> {
         let content = serde_json::to_string_pretty(file).unwrap_or_default();
         self.folder.write(&self.folder.file(FILE), &content)
-    }
-}
-
-fn check_name(name: &str) -> Result<(), ConfigError> {
-    if plain_name::is_plain(name) && ![TEST, StoredFile::KEY].contains(&name) {
-        return Ok(());
-    }
-    let remedy = "is not a name of 1 to 64 of a-z, 0-9, '_' and '-', and not test or version";
-    Err(ConfigError::value("name", name, remedy))
-}
-
-fn entry(name: &str, camera: &StoredCamera) -> CameraEntry {
-    CameraEntry {
-        name: Some(name.to_owned()),
-        url: Some(camera.url.clone()),
-        user: camera.user.clone(),
-        every: camera.every.clone(),
-        calibration: camera.calibration.clone(),
-        profile: camera.profile.clone(),
-        ..CameraEntry::default()
     }
 }
 

@@ -13,9 +13,7 @@ use lookdown_common::{InProcess, OwnCameras};
 use parking_lot::Mutex;
 use tower::ServiceExt;
 
-/// The mark of a request of this process.
-#[derive(Clone, Copy)]
-pub(super) struct OwnRequest;
+use super::http::context::OwnRequest;
 
 /// Returns the connection of parts of this process to the server with these routes.
 #[must_use]

@@ -2,6 +2,7 @@ use std::{fs, os::unix::fs::PermissionsExt, path::Path};
 
 use lookdown_common::{Reload, ServerEntry};
 use lookdown_watch::{Origin, WatchOptions, watch};
+use serde_json::Value;
 
 use super::*;
 

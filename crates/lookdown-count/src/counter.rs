@@ -1,6 +1,7 @@
 //! All cameras and sites, the sums that are not stored yet, and the totals.
 
 mod furniture;
+mod places;
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -8,7 +9,7 @@ use std::{
     time::Duration,
 };
 
-use lookdown_common::{Claim, OwnCameras, Place, makes_room, text::one_line};
+use lookdown_common::{Claim, OwnCameras, text::one_line};
 use lookdown_tracking::MAX_CAMERAS;
 
 use crate::{
@@ -21,7 +22,7 @@ use crate::{
     report_time::ReportTime,
     scene::{Scene, SceneState},
     scene_camera::NamedCrossing,
-    sums::{DAY_MS, Owner, Sums, Totals},
+    sums::{Owner, Sums, Totals},
 };
 
 /// Times that are this much after the own clock are logged, milliseconds.
@@ -346,75 +347,6 @@ impl Counter {
         self.owners.insert(camera.to_owned(), owner.clone());
         self.restore_furniture(camera, furniture);
         Some(owner)
-    }
-
-    fn claim(&self, camera: &str, definition: &CameraDefinition) -> Claim {
-        self.options
-            .own
-            .claim(camera, definition.geometry.is_some())
-    }
-
-    /// Removes the camera with the weakest claim, of a site or of all, for a camera with this claim.
-    /// Returns false if none makes room.
-    fn make_room(&mut self, claim: Claim, site: Option<&Owner>, now: Now) -> bool {
-        let longest_gap = Duration::from_millis(self.options.longest_gap_ms.unsigned_abs());
-        let is_there = |scene: &&Scene| site.is_none_or(|site| scene.owner == *site);
-        let places = self.scenes().filter(is_there).flat_map(|scene| {
-            scene.cameras.iter().map(|camera| {
-                let last = camera.arrived();
-                let age = last.map(|last| now.instant.saturating_duration_since(last));
-                Place {
-                    camera: (scene.owner.clone(), camera.name.clone()),
-                    claim: self.claim(&camera.name, &camera.definition),
-                    last,
-                    is_silent: age.is_none_or(|age| age > longest_gap),
-                }
-            })
-        });
-        let Some((owner, camera)) = makes_room(claim, places) else {
-            return false;
-        };
-        if self.room_log.is_over(LOG_PAUSE, now) {
-            let shown = one_line(&camera);
-            tracing::warn!(
-                "there are too many cameras: {shown} made room for another: raise counts.max_cameras, or see GET /counts for unknown names"
-            );
-        }
-        self.displaced_cameras += 1;
-        self.forget(&owner, &camera);
-        true
-    }
-
-    /// Stops following a camera. Its counts stay in the store.
-    fn forget(&mut self, owner: &Owner, camera: &str) {
-        self.owners.remove(camera);
-        self.rebuild(owner, |cameras| drop(cameras.remove(camera)));
-        self.has_news = true;
-    }
-
-    /// Removes cameras without a report in the day before the newest report, so that others have
-    /// their place. A report of the future does not count. Their counts stay in the store.
-    pub(crate) fn forget_silent(&mut self, now_ms: i64) {
-        let cameras = self.scenes.values().flat_map(|scene| {
-            let cameras = scene.cameras.iter();
-            cameras.map(|camera| {
-                (
-                    scene.owner.clone(),
-                    camera.name.clone(),
-                    camera.presence().last_ms,
-                )
-            })
-        });
-        let cameras: Vec<_> = cameras.collect();
-        let times = cameras.iter().filter_map(|(.., last_ms)| *last_ms);
-        let newest = times.filter(|last| *last <= now_ms + MAX_AHEAD_MS).max();
-        for (owner, camera, last_ms) in cameras {
-            if newest.is_none_or(|newest| last_ms.is_some_and(|last| newest - last <= DAY_MS)) {
-                continue;
-            }
-            tracing::info!(camera, "no longer followed: it has had no report for a day");
-            self.forget(&owner, &camera);
-        }
     }
 
     /// Creates a scene again with other cameras. Its tracks end.

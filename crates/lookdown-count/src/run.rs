@@ -36,6 +36,9 @@ use crate::{
 /// Longest time for the last transaction.
 const LAST_COMMIT: Duration = Duration::from_secs(10);
 
+/// Returns the reason why the reports of a camera are not counted, if they are not.
+type NotCounted = Box<dyn Fn(&str) -> Option<String> + Send + Sync>;
+
 /// The running counts, for a server that answers with them.
 pub struct Started {
     /// The routes below `/counts` and `/sites`, without access control.
@@ -43,7 +46,7 @@ pub struct Started {
     /// Returns all metrics in the text format of Prometheus.
     pub metrics: Box<dyn Fn() -> Vec<u8> + Send + Sync>,
     /// Returns the reason why the reports of a camera are not counted now.
-    pub not_counted: Box<dyn Fn(&str) -> Option<String> + Send + Sync>,
+    pub not_counted: NotCounted,
 }
 
 /// The reason why nothing is counted.

@@ -19,10 +19,7 @@ use super::{
     incoming_trace,
     problem::Problem,
 };
-use crate::{
-    api::in_process::OwnRequest,
-    telemetry::{RequestTrace, Tracer},
-};
+use crate::telemetry::{RequestTrace, Tracer};
 
 /// The settings of the contexts.
 #[derive(Clone)]
@@ -32,6 +29,10 @@ pub(in crate::api) struct ContextSource {
     /// The longest duration of a request, from its first byte to its response.
     pub(in crate::api) request_timeout: Duration,
 }
+
+/// The mark of a request of this process.
+#[derive(Clone, Copy)]
+pub(in crate::api) struct OwnRequest;
 
 /// The facts that follow from the head of a request.
 pub(in crate::api) struct RequestContext {

@@ -162,10 +162,9 @@ fn unreachable(error: impl Into<HttpError>) -> SourceError {
 
 #[cfg(test)]
 mod tests {
-    use std::{
-        io::{BufRead, BufReader, Write},
+    use tokio::{
+        io::{AsyncBufReadExt, AsyncWriteExt, BufReader},
         net::TcpListener,
-        thread,
     };
 
     use super::*;
@@ -176,14 +175,14 @@ mod tests {
 
     /// Requests the image of a camera that closes its connection after each of these answers.
     async fn answer(answers: &'static [&'static str]) -> Result<Response, SourceError> {
-        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let url = format!("http://{}/snap.jpg", listener.local_addr().unwrap());
-        thread::spawn(move || {
+        tokio::spawn(async move {
             for answer in answers {
-                let (stream, _) = listener.accept().unwrap();
-                let mut lines = BufReader::new(&stream).lines();
-                while lines.next().is_some_and(|line| !line.unwrap().is_empty()) {}
-                (&stream).write_all(answer.as_bytes()).unwrap();
+                let (stream, _) = listener.accept().await.unwrap();
+                let mut lines = BufReader::new(stream).lines();
+                while lines.next_line().await.unwrap() != Some(String::new()) {}
+                lines.get_mut().write_all(answer.as_bytes()).await.unwrap();
             }
         });
         let mut login = Login::new(Some(Credentials {

@@ -78,9 +78,10 @@ pub(super) fn exif_orientation(exif: &[u8]) -> Option<Orientation> {
     let number = |at: usize, length: usize| {
         let bytes = exif.get(at..at.checked_add(length)?)?.iter();
         let add = |sum: u32, byte: &u8| sum << 8 | u32::from(*byte);
-        Some(match is_little {
-            true => bytes.rev().fold(0, add),
-            false => bytes.fold(0, add),
+        Some(if is_little {
+            bytes.rev().fold(0, add)
+        } else {
+            bytes.fold(0, add)
         })
     };
     let first = number(4, 4)? as usize;
