@@ -64,7 +64,7 @@ class Installing(InEmptyFolder):
         self.write(f"downloads/{FILE}", WHEEL)
         self.assertEqual(self.install(None), [])
 
-    def test_without_a_network_the_file_its_sum_and_its_place_are_named(self):
+    def test_without_a_network_file_sum_and_place_are_named(self):
         with self.assertRaises(SetupError) as refused:
             self.install(None)
         sentence = str(refused.exception)

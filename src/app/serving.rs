@@ -199,7 +199,8 @@ impl App {
             self.readiness.warmed_up();
             let port = address.port();
             tracing::info!(
-                "ready: try curl -F img=@samples/office.jpg {scheme}://localhost:{port}/detect"
+                "ready: the page is {scheme}://localhost:{port}, try curl -F img=@samples/office.jpg \
+                 {scheme}://localhost:{port}/detect"
             );
         }
         Ok(())

@@ -11,6 +11,7 @@ mod health;
 mod keys;
 mod models;
 mod planted;
+mod readme;
 mod run;
 mod samples;
 mod serve;

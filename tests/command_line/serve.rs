@@ -285,7 +285,7 @@ impl Server {
     fn becomes_ready(&mut self) {
         let lines = self.log.by_ref().map(Result::unwrap);
         self.before_ready = lines
-            .take_while(|line| !line.contains("ready: try curl"))
+            .take_while(|line| !line.contains("ready: the page is"))
             .collect();
     }
 

@@ -5,11 +5,11 @@ import os
 import subprocess
 import unittest
 
-from harness.places import LOOKDOWN, ROOT, SAMPLES
-from remote_inference import assert_same
+from harness.places import LOOKDOWN, ROOT, SAMPLES, model
+from remote_inference import MODEL, assert_same
 
 PACKAGES = ROOT / ".setup" / "real" / "openvino" / "lib"
-HERE = {"INFERENCE__PRECISION": "fp32"}
+HERE = {"MODEL__PATH": str(model(MODEL).parent)}
 
 
 def device(name: str) -> dict[str, str]:

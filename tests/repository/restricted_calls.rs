@@ -94,8 +94,6 @@ const CLIENTS: [&str; 3] = [
 /// The files that may make them.
 const CLIENT_MAKERS: [&str; 6] = [
     "crates/lookdown-common/src/http_transport.rs",
-    // Follows redirections and uses the proxies of the system; ends after 30 s.
-    "crates/lookdown-detect/src/inference/fetch/source.rs",
     // Used by blocking threads without a runtime; three failures open the breaker.
     "crates/lookdown-detect/src/inference/remote/connection.rs",
     // The calculation of digests.

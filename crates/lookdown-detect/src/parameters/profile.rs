@@ -103,7 +103,7 @@ impl Profile {
         }
     }
 
-    /// Returns the constants for the default models. A manifest may have others.
+    /// Returns the constants for the default models.
     #[must_use]
     pub fn tuning(self) -> Tuning {
         let (even_odds, crop_vote) = match self {
