@@ -12,7 +12,6 @@ from .console import SetupError, run, say
 STEPS = {
     "checkers": (("scripts/requirements/checkers.txt", "venv"),),
     "converters": (("scripts/requirements/converters.txt", "venv"),),
-    "s3-server": (("tests/files/buckets/requirements.txt", "venv"),),
     "reliability": (("tests/reliability/requirements.txt", "reliability"),),
     "wheel": (("crates/lookdown-python/build-requirements.txt", "wheel"),),
 }

@@ -92,7 +92,7 @@ const CLIENTS: [&str; 3] = [
     "legacy::Client::builder(",
 ];
 /// The files that may make them.
-const CLIENT_MAKERS: [&str; 6] = [
+const CLIENT_MAKERS: [&str; 5] = [
     "crates/lookdown-common/src/http_transport.rs",
     // Used by blocking threads without a runtime; three failures open the breaker.
     "crates/lookdown-detect/src/inference/remote/connection.rs",
