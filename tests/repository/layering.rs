@@ -45,6 +45,7 @@ const MAY_USE_CRATE: [(&str, &[&str]); 26] = [
             "open_inference",
             "recording",
             "report",
+            "server",
             "simulate",
             "webhooks",
         ],
