@@ -237,7 +237,7 @@ fn a_camera_that_cannot_be_watched_leaves_the_others() {
 }
 
 #[test]
-fn a_camera_is_checked_with_the_defaults_with_which_it_is_loaded() {
+fn a_camera_is_checked_with_the_defaults_of_its_load() {
     let folder = tempfile::tempdir().unwrap();
     let cameras = cameras(folder.path());
     let defaults = CameraEntry {

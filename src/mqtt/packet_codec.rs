@@ -1,7 +1,7 @@
 //! The packets of a broker, within limits.
 //!
-//! Any client of the broker may retain a large message on a subscribed topic, which the broker sends
-//! after each subscription. Such a message is skipped, without memory for it: ending the connection
+//! Any client of the broker may retain a large message on a subscribed topic, which the broker
+//! sends after each subscription. Such a message is skipped, without memory for it: ending the connection
 //! would end MQTT for good.
 
 use bytes::{Buf, BytesMut};

@@ -7,7 +7,6 @@ and `NUMBER_SERIES` a file that gets the series. Rows with a slow search infer o
 import contextlib
 import json
 import os
-import re
 import subprocess
 import sys
 import tempfile
@@ -15,7 +14,7 @@ import time
 import unittest
 from collections.abc import Iterator
 from dataclasses import dataclass
-from datetime import datetime, timezone
+from datetime import UTC, datetime
 from pathlib import Path
 from statistics import mean, pstdev
 
@@ -178,7 +177,7 @@ class Number(unittest.TestCase):
         wait_until(row, "there is a report", 60)
         # The stream begins when it is read, and the first frame is sent at once.
         first = json.loads(server.get(f"/results/{CAMERA}/latest"))["captured_at"]
-        age = datetime.now(timezone.utc) - datetime.fromisoformat(first.replace("Z", "+00:00"))
+        age = datetime.now(UTC) - datetime.fromisoformat(first.replace("Z", "+00:00"))
         began = time.monotonic() - age.total_seconds()
         seconds = max(SECONDS, len(true) / FRAMES_PER_SECOND if condition.enters else 0)
         series = Series([], [])

@@ -1,8 +1,8 @@
 //! The profile and the rate of a camera, chosen by the time that searches of the whole frame take.
 //!
 //! A camera whose profile or rate is not named has several operating points, best first. Searches
-//! that take too long choose a cheaper one at once; a better one is tried again after a while. Where
-//! even the cheapest is too slow, fewer frames are sent: the sender waits for each answer.
+//! that take too long choose a cheaper one at once; a better one is tried again after a while.
+//! Where even the cheapest is too slow, fewer frames are sent: the sender waits for each answer.
 
 use std::{
     fmt,

@@ -139,8 +139,8 @@ pub(in crate::api) async fn readyz(
 
 /// Get metrics
 ///
-/// Returns the Prometheus text format. Lines with a camera, a line, a zone or a site are for clients
-/// that may read.
+/// Returns the Prometheus text format. Lines with a camera, a line, a zone or a site are for
+/// clients that may read.
 #[utoipa::path(
     get, path = "/metrics", tag = "operation", operation_id = "get_metrics",
     responses(
@@ -163,8 +163,8 @@ pub(in crate::api) async fn metrics(
     Ok(([(CONTENT_TYPE, "text/plain; version=0.0.4")], text))
 }
 
-/// The labels that only clients that may read see. A value has no quotation mark before which there
-/// is no backslash.
+/// The labels that only clients that may read see. A backslash precedes each quotation mark in a
+/// value.
 const READERS_LABELS: [&str; 4] = ["camera=\"", "line=\"", "site=\"", "zone=\""];
 
 /// Returns the metrics without the lines of cameras.

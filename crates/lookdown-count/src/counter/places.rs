@@ -19,8 +19,8 @@ impl Counter {
             .claim(camera, definition.geometry.is_some())
     }
 
-    /// Removes the camera with the weakest claim, of a site or of all, for a camera with this claim.
-    /// Returns false if none makes room.
+    /// Removes the camera with the weakest claim, of a site or of all, for a camera with this
+    /// claim. Returns false if none makes room.
     pub(super) fn make_room(&mut self, claim: Claim, site: Option<&Owner>, now: Now) -> bool {
         let longest_gap = Duration::from_millis(self.options.longest_gap_ms.unsigned_abs());
         let is_there = |scene: &&Scene| site.is_none_or(|site| scene.owner == *site);

@@ -15,7 +15,7 @@ pub(super) struct JpegHead {
 }
 
 impl JpegHead {
-    /// Reads the head. It ends where the bytes are no segment.
+    /// Reads the head. It ends at the first bytes that are not a segment.
     pub(super) fn new(bytes: &[u8]) -> Self {
         let mut head = Self::default();
         let mut rest = bytes.get(2..).unwrap_or_default();

@@ -42,8 +42,8 @@ pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
 }
 
 /// The part of the sensor that the frames show, if they do not show all of it: its size and its
-/// corner. The matrix is that of the whole sensor. Frames of another size, as by binning, are scaled
-/// as those of every calibration.
+/// corner. The matrix is that of the whole sensor. Frames of another size, as by binning, are
+/// scaled as those of every calibration.
 fn region(fields: &Fields<'_>) -> Result<Option<(NativeImage, [f64; 2])>, FormatError> {
     if !fields.has("roi") {
         return Ok(None);
