@@ -1,8 +1,8 @@
 //! The packets of a broker, within limits.
 //!
 //! Any client of the broker may retain a large message on a subscribed topic, which the broker
-//! sends after each subscription. Such a message is skipped, without memory for it: ending the connection
-//! would end MQTT for good.
+//! sends after each subscription. Such a message is skipped, without memory for it: ending the
+//! connection would end MQTT for good.
 
 use bytes::{Buf, BytesMut};
 use rumqttc::{Codec, Packet};
