@@ -61,7 +61,8 @@ async function loadHistory({ camera, persons_source: source }, signal) {
   const rows = await askJson(`results/${name}/history?limit=${counts ? 1 : MAX_HISTORY}`, { signal });
   for (const { id, persons, report } of rows) addReport(id, report, persons);
   const card = cards.get(camera);
-  if (counts?.steps.length && card) card.history = countedNumbers(counts.steps);
+  const numbers = countedNumbers(counts?.steps ?? []);
+  if (numbers.length > 0 && card) card.history = numbers;
 }
 
 /** Updates the numbers of all cards until `signal` aborts: the server has one number of each camera. */

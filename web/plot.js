@@ -48,12 +48,13 @@ export function steps(history, x, y) {
   return path;
 }
 
-/** The history of the steps of a camera's counts: the mean number of each. */
+/** The history of the steps of a camera's counts from the first known number on: the mean number of each. */
 export function countedNumbers(counted) {
   const history = [];
   for (const { from, persons } of counted) {
     const number = persons ? Math.round(persons.mean) : null;
-    if (history.at(-1)?.persons !== number) history.push({ time: Date.parse(from), persons: number });
+    const isFirst = history.length === 0 && number !== null;
+    if (isFirst || (history.length > 0 && history.at(-1).persons !== number)) history.push({ time: Date.parse(from), persons: number });
   }
   return history;
 }

@@ -27,8 +27,8 @@ from cameras import rtsp_camera
 
 HERE = Path(__file__).resolve().parent
 CAMERA = "hall"
-SECONDS = float(os.environ.get("NUMBER_SECONDS", "30"))
-SETTLING_SECONDS = 15.0
+SECONDS = float(os.environ.get("NUMBER_SECONDS", "40"))
+SETTLING_SECONDS = 20.0
 """The time after the first report in which profile and rate are chosen and tracks begin."""
 BUSY = [sys.executable, "-c", "while True: pass"]
 NETWORK = "nanodet_g_views_416"

@@ -229,11 +229,10 @@ impl CameraMetrics {
     /// Stores the profile and the rate in use. Logs a change.
     pub(crate) fn chose(&self, choice: Choice) {
         let mut last = self.choice.lock();
-        let is_changed = last.as_ref().is_none_or(|last| !last.is_same(&choice));
-        if is_changed {
+        if last.as_ref().is_none_or(|last| !last.is_same(&choice)) {
             tracing::info!("{choice}");
-            *last = Some(choice);
         }
+        *last = Some(choice);
     }
 
     /// The number of whole frames of the camera.

@@ -122,9 +122,10 @@ impl fmt::Display for Choice {
             ..
         } = self;
         let seconds = search.as_secs_f64();
+        let unit = if *rate == 1.0 { "frame/s" } else { "frames/s" };
         write!(
             f,
-            "{profile} at {rate} frames/s: a search takes {seconds:.1} s"
+            "{profile} at {rate} {unit}: a search takes {seconds:.1} s"
         )
     }
 }
@@ -172,7 +173,7 @@ impl Governor {
 
     /// Returns the point, once it was chosen by a measurement.
     pub(crate) fn choice(&self) -> Option<Choice> {
-        let last = *self.searches.last()?;
+        let last = *self.searches.get(SEARCHES - 1)?;
         Some(Choice {
             profile: self.profile.clone(),
             rate: self.every().as_secs_f64().recip(),
