@@ -334,11 +334,11 @@ class Cameras(unittest.TestCase):
         self.assertEqual(len(set(times)), len(times))
 
     def test_a_playlist_is_not_read_as_a_video(self):
-        playlist = self.folder / "playlist.mp4"
+        clip, playlist = self.clip(), self.folder / "playlist.mp4"
         settings = {f"LOOKDOWN__{name}": value for name, value in TINY.items()}
         for text in (
-            f"#EXTM3U\n#EXT-X-TARGETDURATION:2\n#EXTINF:2,\n{self.clip()}\n#EXT-X-ENDLIST\n",
-            f"ffconcat version 1.0\nfile {self.clip().name}\n",
+            f"#EXTM3U\n#EXT-X-TARGETDURATION:2\n#EXTINF:2,\n{clip}\n#EXT-X-ENDLIST\n",
+            f"ffconcat version 1.0\nfile {clip.name}\n",
         ):
             playlist.write_text(text, encoding="utf-8")
             command = [LOOKDOWN, "detect", playlist, "--every", "1s", "--profile", "fast"]
