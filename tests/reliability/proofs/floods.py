@@ -1,4 +1,7 @@
-"""Floods without a valid key: `/livez` and `/readyz` are answered within a second beside each of them."""
+"""Floods without a valid key: `/livez` and `/readyz` of the metrics port are answered within a second beside each of them.
+
+The image, the manifests and the Debian package set that port. Connections to the main port wait for one another.
+"""
 
 import contextlib
 import multiprocessing
@@ -9,7 +12,7 @@ import subprocess
 import tempfile
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from harness.places import LOOKDOWN
@@ -43,7 +46,7 @@ def prove(effort: Effort) -> list[Row]:
         keys = Path(folder) / "keys.toml"
         write_keys(keys, KEYS)
         settings = TINY | {"LOG__FILTER": "error", "ACCESS__KEYS_FILE": str(keys)}
-        with lookdown(settings) as server:
+        with _flooded(settings) as addresses:
             floods: dict[str, Callable[[str, float], None]] = {
                 "silent connections": _silent,
                 "connections at rest after an answer": _at_rest,
@@ -52,14 +55,23 @@ def prove(effort: Effort) -> list[Row]:
                 "event streams without a key": _event_stream,
                 "large bodies with wrong keys": _large_body,
             }
-            rows = [_flood(server.address, name, client, effort, connect) for name, client in floods.items()]
+            rows = [_flood(addresses, name, client, effort) for name, client in floods.items()]
         return [*rows, *_with_open_streams(effort), *_with_tls(effort, settings, Path(folder))]
 
 
 def _with_open_streams(effort: Effort) -> list[Row]:
     """A server without keys, on which every client may open event streams."""
-    with lookdown(TINY | {"LOG__FILTER": "error"}) as server:
-        return [_flood(server.address, "event streams of a server without keys", _event_stream, effort, connect)]
+    with _flooded(TINY | {"LOG__FILTER": "error"}) as addresses:
+        return [_flood(addresses, "event streams of a server without keys", _event_stream, effort)]
+
+
+@contextlib.contextmanager
+def _flooded(settings: dict[str, str]) -> Iterator[tuple[str, str]]:
+    """Starts a server, and yields its address and that of its probes."""
+    (port,) = free_ports(1)
+    probes = f"127.0.0.1:{port}"
+    with lookdown(settings | {"SERVER__METRICS_LISTEN": probes}) as server:
+        yield server.address, probes
 
 
 def _with_tls(effort: Effort, settings: dict[str, str], folder: Path) -> list[Row]:
@@ -97,13 +109,14 @@ def _with_tls(effort: Effort, settings: dict[str, str], folder: Path) -> list[Ro
         over_tls(address, max(0.1, ends_at - time.monotonic())).close()
 
     with running("lookdown", [str(LOOKDOWN), "serve"], probe_port, "/readyz", variables):
-        address = f"127.0.0.1:{port}"
+        addresses = f"127.0.0.1:{port}", f"127.0.0.1:{probe_port}"
         clients = zip(names, (unfinished, finished), strict=True)
-        return [_flood(address, name, client, effort, over_tls) for name, client in clients]
+        return [_flood(addresses, name, client, effort) for name, client in clients]
 
 
-def _flood(address: str, name: str, client: Callable, effort: Effort, connecting: Callable) -> Row:
-    """Repeats the client in many threads of another process, and asks the probes meanwhile."""
+def _flood(addresses: tuple[str, str], name: str, client: Callable, effort: Effort) -> Row:
+    """Repeats the client in many threads of another process, and asks the probes at the second address meanwhile."""
+    address, probes = addresses
     count, seconds = effort.flood_clients, effort.flood_seconds
     row = Row(f"flood: {name}", f"{count} clients at a time for {seconds:.0f} s, and probes on new connections")
     processes = multiprocessing.get_context("fork")
@@ -117,7 +130,7 @@ def _flood(address: str, name: str, client: Callable, effort: Effort, connecting
         for path in ("/livez", "/readyz"):
             asked = time.monotonic()
             try:
-                with contextlib.closing(connecting(address, 5.0)) as connection:
+                with contextlib.closing(connect(probes, 5.0)) as connection:
                     status = exchange(connection, request("GET", path, headers={"Connection": "close"})).status
             except (Lost, OSError) as error:
                 status = f"none ({error})"
