@@ -166,9 +166,11 @@ impl Governor {
         self.points[self.current].every
     }
 
-    /// Returns the profile to request, if it is not that of the camera or the server.
+    /// Returns the profile to request, if it is not that of the camera or the server. The first
+    /// search requests none: only its report tells whether that of the server is a setting.
     pub(crate) fn profile(&self) -> Option<&'static str> {
-        self.points[self.current].is_fast.then_some(FAST)
+        let has_searched = !self.profile.is_empty();
+        (has_searched && self.points[self.current].is_fast).then_some(FAST)
     }
 
     /// Returns the point, once it was chosen by a measurement.
@@ -339,6 +341,7 @@ mod tests {
     #[test]
     fn profile_of_the_server_is_kept_if_it_is_a_setting() {
         let mut machine = Machine::new(false, None);
+        assert_eq!(machine.governor.profile(), None, "the report names it");
         let search = FinishedSearch {
             profile: "quality".to_owned(),
             is_profile_named: true,
