@@ -9,15 +9,13 @@ mod sketch;
 use std::sync::Arc;
 
 pub use kept::{StoredFrame, StoredFrameError};
-use lookdown_detect::{
-    imaging::{
-        Frame,
-        annotate::{
-            Cancelled, Concealment, EncodeError, annotate_unless, conceal, encode_jpeg, encode_png,
-        },
-        narrowed,
+use lookdown_detect::pipeline::DetectedFrame;
+use lookdown_imaging::{
+    Frame,
+    annotate::{
+        Cancelled, Concealment, EncodeError, annotate_unless, conceal, encode_jpeg, encode_png,
     },
-    pipeline::DetectedFrame,
+    narrowed,
 };
 pub use options::{AnnotationOptions, Layer};
 use sketch::Sketch;

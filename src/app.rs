@@ -13,11 +13,11 @@ use std::{sync::Arc, time::Duration};
 
 use anyhow::Context;
 use lookdown_detect::{
-    imaging::decode::DecodeLimits,
     inference::ModelRepository,
     parameters::DetectParameters,
     pipeline::{BatchOptions, DefaultModels, Engine, EngineOptions, WorkerPool},
 };
+use lookdown_imaging::decode::DecodeLimits;
 
 use lookdown_common::{InProcess, OwnCameras, ServerClient, ServerOptions};
 

@@ -6,7 +6,7 @@ pub(crate) mod preview;
 use std::collections::BTreeMap;
 
 use anyhow::Context;
-use lookdown_detect::imaging::{
+use lookdown_imaging::{
     Frame,
     room_fit::{RoomFrame, fit_room},
 };

@@ -21,7 +21,8 @@ use std::{
 };
 
 use lookdown_common::{Claim, OwnCameras, Place, makes_room};
-use lookdown_detect::{imaging::decode::DecodeLimits, pipeline::DetectedFrame};
+use lookdown_detect::pipeline::DetectedFrame;
+use lookdown_imaging::decode::DecodeLimits;
 use lookdown_lens::{
     calibration::CalibrationId,
     self_calibration::{IdealLens, KnownCamera},

@@ -20,7 +20,7 @@ use std::{
     time::Instant,
 };
 
-use lookdown_detect::imaging::{Frame, NetworkInput, RemapTable};
+use lookdown_imaging::{Frame, NetworkInput, RemapTable};
 use lookdown_lens::geometry::{FieldOfViewReading, Lens, Mount, ViewPlan};
 
 use self::times::{times, times_after};

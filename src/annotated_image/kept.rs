@@ -5,14 +5,12 @@ use std::sync::Arc;
 
 use bytes::Bytes;
 use lookdown_common::JPEG_START;
-use lookdown_detect::{
-    imaging::{
-        Frame,
-        annotate::{Concealment, EncodeError, conceal, encode_jpeg},
-        decode::{DecodeError, DecodeLimits, decode},
-        narrowed,
-    },
-    pipeline::DetectedFrame,
+use lookdown_detect::pipeline::DetectedFrame;
+use lookdown_imaging::{
+    Frame,
+    annotate::{Concealment, EncodeError, conceal, encode_jpeg},
+    decode::{DecodeError, DecodeLimits, decode},
+    narrowed,
 };
 use strum::VariantArray;
 

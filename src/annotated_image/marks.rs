@@ -1,9 +1,7 @@
 //! The mark of a person in the frame.
 
-use lookdown_detect::{
-    imaging::annotate::{Head, Mark, OrientedMark},
-    pipeline::Person,
-};
+use lookdown_detect::pipeline::Person;
+use lookdown_imaging::annotate::{Head, Mark, OrientedMark};
 use lookdown_lens::geometry::OrientedBox;
 
 /// The person's mark, with the score on its label.

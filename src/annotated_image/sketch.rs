@@ -1,9 +1,7 @@
 //! The drawings for a frame, stored separately from the frame.
 
-use lookdown_detect::{
-    imaging::annotate::{Drawing, Mark, ZoneOutline},
-    pipeline::{DetectedFrame, DetectionReport},
-};
+use lookdown_detect::pipeline::{DetectedFrame, DetectionReport};
+use lookdown_imaging::annotate::{Drawing, Mark, ZoneOutline};
 use serde::{Deserialize, Serialize};
 
 use super::{Layer, marks};

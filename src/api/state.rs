@@ -9,12 +9,12 @@ use std::{
 
 use lookdown_detect::{
     fairness::SharedBudget,
-    imaging::annotate::Concealment,
     inference::ModelRepository,
     parameters::DetectDefaults,
     pipeline::{PipelineError, WorkerPool},
 };
 use lookdown_http::{csrf::AllowedOrigins, header_limits::HeaderLimits};
+use lookdown_imaging::annotate::Concealment;
 use lookdown_lens::self_calibration::IdealLens;
 
 use super::{

@@ -6,7 +6,7 @@ mod wall_views;
 use std::f64::consts::FRAC_PI_2;
 
 use anyhow::Context;
-use lookdown_detect::imaging::{
+use lookdown_imaging::{
     Frame,
     annotate::{Caption, ROOM_LEGEND, encode_jpeg, sketch_room},
     lens_circle, narrowed,

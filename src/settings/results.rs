@@ -3,7 +3,7 @@
 use std::{collections::BTreeSet, ops::RangeInclusive};
 
 use lookdown_common::report::MAX_REPORT_BYTES;
-use lookdown_detect::imaging::annotate::Concealment;
+use lookdown_imaging::annotate::Concealment;
 use secrecy::{ExposeSecret, SecretString};
 
 use super::{

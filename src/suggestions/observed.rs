@@ -5,7 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use lookdown_detect::imaging::room_fit::RoomFrame;
+use lookdown_imaging::room_fit::RoomFrame;
 use lookdown_lens::{
     calibration::{CalibrationId, native::NativeImage},
     geometry::OrientedBox,

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use lookdown_detect::imaging::decode::DecodeLimits;
+use lookdown_imaging::decode::DecodeLimits;
 use lookdown_lens::{
     calibration::{Calibration, CalibrationId, native::NativeCalibration},
     self_calibration::{CameraHeight, FitRefusal, HeightRefusal, KnownCamera, RoomFit},

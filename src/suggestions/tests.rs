@@ -36,7 +36,7 @@ fn shared(folder: &TempDir, applies: bool) -> Arc<Shared> {
     Arc::new(Shared {
         cameras: parking_lot::Mutex::default(),
         calibrations: Arc::new(calibrations),
-        limits: lookdown_detect::imaging::decode::DecodeLimits::default(),
+        limits: lookdown_imaging::decode::DecodeLimits::default(),
         known: KnownCamera::default(),
         applies,
     })

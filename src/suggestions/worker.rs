@@ -5,7 +5,7 @@ use std::{
     sync::{Arc, mpsc::Receiver},
 };
 
-use lookdown_detect::imaging::{
+use lookdown_imaging::{
     decode::decode,
     room_fit::{RoomFrame, fit_room},
 };

@@ -1,7 +1,7 @@
 //! Responses other than the report: annotated images and files for annotation tools.
 
 use axum::{body::Body, http::Request};
-use lookdown_detect::imaging::{
+use lookdown_imaging::{
     Frame,
     decode::{DecodeLimits, decode},
 };

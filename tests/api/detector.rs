@@ -8,9 +8,9 @@ use std::{
 
 use lookdown_detect::{
     detection::BBox,
-    imaging::{NetworkInput, ViewBatch},
     inference::{Detector, HeadOutput, InferenceError, ViewDetection},
 };
+use lookdown_imaging::{NetworkInput, ViewBatch};
 
 /// A test that waits longer than this has failed.
 const TIMEOUT: Duration = Duration::from_secs(20);

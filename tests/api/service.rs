@@ -25,13 +25,13 @@ use lookdown::{
     telemetry::Tracer,
 };
 use lookdown_detect::{
-    imaging::{
-        Frame, NetworkInput,
-        annotate::{Concealment, encode_png},
-    },
     inference::{InferenceError, Model, ModelFolder, ModelRepository, RepositoryOptions},
     parameters::DetectDefaults,
     pipeline::{Engine, EngineOptions, WorkerPool},
+};
+use lookdown_imaging::{
+    Frame, NetworkInput,
+    annotate::{Concealment, encode_png},
 };
 use serde_json::Value;
 use tempfile::TempDir;

@@ -7,7 +7,7 @@ use lookdown::{
     annotated_image::StoredFrame,
     results::{ImagesOf, NewReport, ResultStore},
 };
-use lookdown_detect::imaging::{
+use lookdown_imaging::{
     Frame,
     annotate::{Concealment, encode_jpeg},
     decode::{DecodeLimits, decode},

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use lookdown_detect::imaging::{Frame, annotate::encode_jpeg};
+use lookdown_imaging::{Frame, annotate::encode_jpeg};
 use nalgebra::{Rotation3, Vector3};
 use serde_json::Value;
 use tokio::time::{sleep, timeout};

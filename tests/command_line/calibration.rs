@@ -331,8 +331,8 @@ fn a_preview_shows_the_lens_in_the_frame() {
         &[],
     );
     assert!(output.status.success());
-    let limits = lookdown_detect::imaging::decode::DecodeLimits::default();
-    let frame = lookdown_detect::imaging::decode::decode(&std::fs::read(out).unwrap(), &limits)
+    let limits = lookdown_imaging::decode::DecodeLimits::default();
+    let frame = lookdown_imaging::decode::decode(&std::fs::read(out).unwrap(), &limits)
         .unwrap()
         .frame;
     assert_eq!((frame.width(), frame.height()), (960, 960));
@@ -369,8 +369,8 @@ fn zones_and_masks_are_listed_and_drawn_in_the_preview() {
     ] {
         assert!(report.contains(line), "{report}");
     }
-    let limits = lookdown_detect::imaging::decode::DecodeLimits::default();
-    let preview = lookdown_detect::imaging::decode::decode(&std::fs::read(out).unwrap(), &limits);
+    let limits = lookdown_imaging::decode::DecodeLimits::default();
+    let preview = lookdown_imaging::decode::decode(&std::fs::read(out).unwrap(), &limits);
     let preview = preview.unwrap().frame;
     // Between the rings and lines of the drawing the frame is black.
     let black = (0..240)

@@ -2,11 +2,8 @@
 
 use std::{path::Path, process::Command, sync::Arc};
 
-use lookdown_detect::{
-    Detector, DetectorOptions,
-    imaging::decode::{DecodeLimits, decode},
-    parameters::DetectParameters,
-};
+use lookdown_detect::{Detector, DetectorOptions, parameters::DetectParameters};
+use lookdown_imaging::decode::{DecodeLimits, decode};
 use lookdown_lens::calibration::Calibration;
 use serde_json::Value;
 

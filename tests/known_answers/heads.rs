@@ -1,10 +1,8 @@
 //! Output heads against a reference implementation in another language
 //! (`tests/fixtures/heads/make_head_vectors.py`).
 
-use lookdown_detect::{
-    imaging::NetworkInput,
-    inference::heads::{Head, OutputShape, TensorView},
-};
+use lookdown_detect::inference::heads::{Head, OutputShape, TensorView};
+use lookdown_imaging::NetworkInput;
 use serde::Deserialize;
 
 /// Both sides compute in 64-bit floats from the same 32-bit values, so only the order of a few

@@ -11,7 +11,7 @@ use source_scan::{CRATES, all_sources, code, names_crate, sources, without_test_
 /// Crates for external systems, and the only crates and modules that may use them.
 const MAY_USE_CRATE: [(&str, &[&str]); 26] = [
     ("ort", &["inference"]),
-    ("image", &["imaging"]),
+    ("image", &["lookdown-imaging"]),
     (
         "axum",
         &["api", "http", "lookdown-http", "metrics_server", "run"],
@@ -150,10 +150,10 @@ fn only_vector_instructions_are_unsafe() {
             code.contains("unsafe {") || code.contains("unsafe fn") || code.contains("unsafe_code")
         });
     let mut naming: Vec<_> = naming
-        .filter(|path| !path.ends_with("imaging/remap_table.rs"))
+        .filter(|path| !path.ends_with("remap_table.rs"))
         .collect();
     naming.sort();
-    let ends = ["imaging/remap_table/avx2.rs", "imaging/remap_table/neon.rs"];
+    let ends = ["remap_table/avx2.rs", "remap_table/neon.rs"];
     assert_eq!(naming.len(), ends.len(), "{naming:?}");
     for (path, end) in naming.iter().zip(ends) {
         assert!(path.ends_with(end), "{naming:?}");

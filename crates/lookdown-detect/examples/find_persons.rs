@@ -3,11 +3,8 @@
 
 use std::{env, error::Error, fs, path::Path, sync::Arc};
 
-use lookdown_detect::{
-    Detector, DetectorOptions,
-    imaging::decode::{DecodeLimits, decode},
-    parameters::DetectParameters,
-};
+use lookdown_detect::{Detector, DetectorOptions, parameters::DetectParameters};
+use lookdown_imaging::decode::{DecodeLimits, decode};
 use lookdown_lens::calibration::Calibration;
 
 fn main() -> Result<(), Box<dyn Error>> {

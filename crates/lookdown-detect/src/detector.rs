@@ -6,7 +6,6 @@ use lookdown_lens::calibration::Calibration;
 use parking_lot::Mutex;
 
 use crate::{
-    imaging::Frame,
     inference::{
         CandidateOptions, Device, ModelFolder, ModelRepository, OnnxOptions, RepositoryError,
         RepositoryOptions, onnx_loader,
@@ -17,6 +16,7 @@ use crate::{
         DefaultModels, DetectJob, DetectionReport, Engine, EngineOptions, JobImage, PipelineError,
     },
 };
+use lookdown_imaging::Frame;
 
 /// The library of ONNX Runtime that `make setup` fetches.
 pub const DEFAULT_ONNX_RUNTIME: &str = "runtime/libonnxruntime.so";

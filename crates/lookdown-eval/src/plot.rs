@@ -4,7 +4,7 @@ mod draw;
 mod line_plot;
 mod precision_recall;
 
-use lookdown_detect::imaging::{
+use lookdown_imaging::{
     Frame,
     annotate::{EncodeError, encode_png},
 };

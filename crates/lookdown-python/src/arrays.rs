@@ -1,6 +1,6 @@
 //! NumPy arrays: points and directions of shape (N, 2) and (N, 3), and pixels.
 
-use lookdown_detect::imaging::{Frame, decode::DecodeLimits};
+use lookdown_imaging::{Frame, decode::DecodeLimits};
 use numpy::ndarray::{Array2, ArrayView1};
 use numpy::{PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::PyResult;

@@ -3,7 +3,7 @@
 use std::{borrow::Cow, sync::Arc};
 
 use lookdown::room_calibration;
-use lookdown_detect::imaging::{
+use lookdown_imaging::{
     Frame,
     decode::{DecodeLimits, decode},
 };

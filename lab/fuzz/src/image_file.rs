@@ -1,6 +1,6 @@
 //! Fuzzes the decoding of images within limits.
 
-use lookdown_detect::imaging::decode::{DecodeLimits, decode};
+use lookdown_imaging::decode::{DecodeLimits, decode};
 
 /// Small limits, to decode thousands of images per second with the same checks.
 const LIMITS: DecodeLimits = DecodeLimits {
@@ -22,8 +22,8 @@ pub fn read(bytes: &[u8]) -> bool {
             assert!(!error.to_string().is_empty());
             !matches!(
                 error,
-                lookdown_detect::imaging::decode::DecodeError::Empty
-                    | lookdown_detect::imaging::decode::DecodeError::UnsupportedFormat { .. }
+                lookdown_imaging::decode::DecodeError::Empty
+                    | lookdown_imaging::decode::DecodeError::UnsupportedFormat { .. }
             )
         }
     }

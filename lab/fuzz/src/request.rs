@@ -24,13 +24,13 @@ use lookdown::{
     results::{MemoryResults, ResultLimits, ResultStore},
 };
 use lookdown_detect::{
-    imaging::{NetworkInput, ViewBatch, decode::DecodeLimits},
     inference::{
         Detector, HeadOutput, InferenceError, Model, ModelFolder, ModelRepository,
         RepositoryOptions,
     },
     pipeline::{Engine, EngineOptions, WorkerPool},
 };
+use lookdown_imaging::{NetworkInput, ViewBatch, decode::DecodeLimits};
 use tokio::runtime::{self, Runtime};
 use tower::ServiceExt;
 

@@ -6,10 +6,10 @@ use lookdown_common::report::{
     ReportZone,
 };
 use lookdown_detect::{
-    imaging::lens_circle::LensCircle,
     parameters::DefaultUsed,
     pipeline::{self, DetectionReport, ModelUsed},
 };
+use lookdown_imaging::lens_circle::LensCircle;
 use lookdown_lens::warning::Warning;
 
 use crate::rounding::{

@@ -9,10 +9,10 @@ use std::{
 use bytes::Bytes;
 use lookdown_common::report::Report;
 use lookdown_detect::{
-    imaging::annotate::Concealment,
     parameters::DetectParameters,
     pipeline::{DetectJob, DetectedFrame, DetectionReport, PipelineError, Timeline},
 };
+use lookdown_imaging::annotate::Concealment;
 
 use lookdown_lens::calibration::CalibrationId;
 

@@ -9,7 +9,7 @@ use std::{
 
 use anyhow::{Context, bail};
 use clap::Args;
-use lookdown_detect::imaging::{
+use lookdown_imaging::{
     MaskedPixels,
     annotate::{encode_jpeg, sketch_areas, sketch_foot_filter, sketch_lens, sketch_lines},
 };

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use lookdown_common::files::{self, MAX_IMAGE_BYTES};
-use lookdown_detect::imaging::{
+use lookdown_imaging::{
     Frame,
     decode::{DecodeLimits, decode},
 };

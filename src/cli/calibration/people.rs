@@ -4,10 +4,10 @@ use std::{path::PathBuf, sync::Arc};
 
 use anyhow::Context;
 use lookdown_detect::{
-    imaging::Frame,
     parameters::DetectParameters,
     pipeline::{DetectJob, JobImage},
 };
+use lookdown_imaging::Frame;
 use lookdown_lens::{
     calibration::{
         Calibration,

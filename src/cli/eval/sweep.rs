@@ -8,8 +8,8 @@ use std::{
 
 use anyhow::Context;
 use lookdown_common::files::{self, MAX_IMAGE_BYTES};
-use lookdown_detect::imaging::{Frame, annotate::encode_jpeg, decode::decode};
 use lookdown_eval::{DataSet, DetectedRow, EvaluatedRow, sweep};
+use lookdown_imaging::{Frame, annotate::encode_jpeg, decode::decode};
 
 use super::{
     Arguments, detect_group,

@@ -9,10 +9,8 @@ use std::{
 
 use anyhow::{Context, anyhow};
 use clap::Args;
-use lookdown_detect::{
-    imaging::ViewBatch,
-    inference::{Detector, InferenceError, OnnxDetector},
-};
+use lookdown_detect::inference::{Detector, InferenceError, OnnxDetector};
+use lookdown_imaging::ViewBatch;
 
 use super::{description, manifest, sample::detect};
 use crate::{

@@ -2,10 +2,8 @@
 
 use std::fmt;
 
-use lookdown_detect::{
-    imaging::ChannelOrder,
-    inference::{ModelDescription, OnnxTensor},
-};
+use lookdown_detect::inference::{ModelDescription, OnnxTensor};
+use lookdown_imaging::ChannelOrder;
 
 /// One property per line.
 pub(super) struct Lines<'a>(pub(super) &'a ModelDescription);

@@ -1,6 +1,6 @@
 //! Straightened views toward the four walls of a room, side by side.
 
-use lookdown_detect::imaging::{Frame, FrameError};
+use lookdown_imaging::{Frame, FrameError};
 use lookdown_lens::geometry::{Lens, Mount, Pixel, Ray, VirtualView};
 
 /// Side of a view in pixels.

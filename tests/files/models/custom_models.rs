@@ -1,9 +1,7 @@
 //! Custom models: effects of a manifest and an ONNX file on the network input and the detections.
 
-use lookdown_detect::{
-    imaging::{Frame, Letterbox, NetworkInput, ViewBatch},
-    inference::{Detector, HeadOutput, Layout, OnnxDetector},
-};
+use lookdown_detect::inference::{Detector, HeadOutput, Layout, OnnxDetector};
+use lookdown_imaging::{Frame, Letterbox, NetworkInput, ViewBatch};
 
 use crate::models::folder::{fixture, library, load, options};
 

@@ -2,10 +2,8 @@
 
 use std::{fs, path::Path, process::Command};
 
-use lookdown_detect::{
-    imaging::{Frame, Letterbox, ViewBatch},
-    inference::{CandidateOptions, Detector, OnnxDetector, OnnxOptions},
-};
+use lookdown_detect::inference::{CandidateOptions, Detector, OnnxDetector, OnnxOptions};
+use lookdown_imaging::{Frame, Letterbox, ViewBatch};
 use serde_json::Value;
 use tempfile::TempDir;
 

@@ -3,10 +3,8 @@
 
 use std::fs;
 
-use lookdown_detect::{
-    imaging::ViewBatch,
-    inference::{Detector, OnnxDetector},
-};
+use lookdown_detect::inference::{Detector, OnnxDetector};
+use lookdown_imaging::ViewBatch;
 
 use crate::models::folder::{library, of_repository, options};
 

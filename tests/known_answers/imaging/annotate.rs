@@ -1,6 +1,6 @@
 //! Annotated frames: painted pixels and encoding.
 
-use lookdown_detect::imaging::{
+use lookdown_imaging::{
     Frame,
     annotate::{
         Cancelled, Drawing, Head, Mark, OrientedMark, annotate, annotate_unless, encode_jpeg,

@@ -1,8 +1,6 @@
 //! Decoding of every accepted format, upright and in RGB, and refusal of everything else.
 
-use lookdown_detect::imaging::decode::{
-    DecodeError, DecodeLimits, DecodedFrame, ExceededLimit, decode,
-};
+use lookdown_imaging::decode::{DecodeError, DecodeLimits, DecodedFrame, ExceededLimit, decode};
 use proptest::prelude::*;
 
 fn fixture(name: &str) -> Vec<u8> {

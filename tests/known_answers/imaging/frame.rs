@@ -1,6 +1,6 @@
 //! Construction and access of frames.
 
-use lookdown_detect::imaging::{Frame, frame::FrameError};
+use lookdown_imaging::{Frame, frame::FrameError};
 
 #[test]
 fn pixels_are_rows_of_red_green_and_blue_from_the_top() {

@@ -1,6 +1,6 @@
 //! The lens circle of synthetic rooms with a known circle is found within half a percent.
 
-use lookdown_detect::imaging::{
+use lookdown_imaging::{
     Frame,
     lens_circle::{LensCircle, assumed_circle, find_lens_circle},
 };

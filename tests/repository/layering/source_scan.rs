@@ -7,9 +7,10 @@ use std::{
 };
 
 /// The crates of the workspace with the folders of their sources.
-pub const CRATES: [(&str, &str); 12] = [
+pub const CRATES: [(&str, &str); 13] = [
     ("lookdown-common", "crates/lookdown-common/src"),
     ("lookdown-lens", "crates/lookdown-lens/src"),
+    ("lookdown-imaging", "crates/lookdown-imaging/src"),
     ("lookdown-tracking", "crates/lookdown-tracking/src"),
     ("lookdown-detect", "crates/lookdown-detect/src"),
     ("lookdown-eval", "crates/lookdown-eval/src"),

@@ -11,7 +11,7 @@ use super::{
     heads::OutputShape,
     manifest::{Layout, ModelManifest},
 };
-use crate::imaging::NetworkInput;
+use lookdown_imaging::NetworkInput;
 
 /// Properties of a model.
 #[derive(Debug, Clone, PartialEq)]

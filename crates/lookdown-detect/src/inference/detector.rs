@@ -3,7 +3,7 @@
 use std::num::NonZeroUsize;
 
 use super::{HeadOutput, InferenceError};
-use crate::imaging::{NetworkInput, ViewBatch};
+use lookdown_imaging::{NetworkInput, ViewBatch};
 
 /// A person detector. Runs on one thread at a time.
 pub trait Detector: Send {

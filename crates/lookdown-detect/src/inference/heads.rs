@@ -24,7 +24,7 @@ use strum::IntoStaticStr;
 
 use self::{candidate_collector::CandidateCollector, decoder::Decoder, shape::Batch};
 use super::{HeadOutput, InferenceError};
-use crate::imaging::NetworkInput;
+use lookdown_imaging::NetworkInput;
 
 pub use self::{
     boxes_scores::BoxesScoresHead,

@@ -5,7 +5,7 @@ use std::{num::NonZeroUsize, path::PathBuf};
 use parking_lot::Mutex;
 
 use super::{detector::Detector, error::InferenceError, head_output::HeadOutput, stamp::Stamp};
-use crate::imaging::{NetworkInput, ViewBatch};
+use lookdown_imaging::{NetworkInput, ViewBatch};
 
 /// A loaded model. A frame keeps a reference to its model, so a replaced model is dropped when its
 /// last frame ends.

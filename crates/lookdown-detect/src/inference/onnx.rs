@@ -22,7 +22,7 @@ use super::{
     signature::Signature,
     staging::{Staged, Staging},
 };
-use crate::imaging::{NetworkInput, ViewBatch};
+use lookdown_imaging::{NetworkInput, ViewBatch};
 
 use first_line::first_line;
 pub use loader::onnx_loader;

@@ -50,10 +50,8 @@ impl ModelRegistry {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{
-        imaging::{NetworkInput, ViewBatch},
-        inference::{Detector, HeadOutput, InferenceError},
-    };
+    use crate::inference::{Detector, HeadOutput, InferenceError};
+    use lookdown_imaging::{NetworkInput, ViewBatch};
 
     struct Blind(String, NetworkInput);
 

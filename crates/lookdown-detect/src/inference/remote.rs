@@ -22,7 +22,7 @@ use super::{
     heads::TensorView,
     staging::{Staged, Staging},
 };
-use crate::imaging::{NetworkInput, ViewBatch};
+use lookdown_imaging::{NetworkInput, ViewBatch};
 
 pub use options::RemoteOptions;
 pub use server::RemoteServer;

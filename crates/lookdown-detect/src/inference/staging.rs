@@ -3,7 +3,7 @@
 use std::num::NonZeroUsize;
 
 use super::{HeadOutput, InferenceError, Layout, signature::Signature};
-use crate::imaging::{NetworkInput, ViewBatch};
+use lookdown_imaging::{NetworkInput, ViewBatch};
 
 /// Converts batches to inputs.
 pub(super) struct Staging {

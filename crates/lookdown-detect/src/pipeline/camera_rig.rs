@@ -16,10 +16,8 @@ use super::{
     outline::{crop_outline, view_outline},
     visible_views::{Hidden, LeftOut, Visible},
 };
-use crate::{
-    detection::{BBox, FramePixels, ViewPixels},
-    imaging::{Frame, Letterbox, NetworkInput, RemapTable},
-};
+use crate::detection::{BBox, FramePixels, ViewPixels};
+use lookdown_imaging::{Frame, Letterbox, NetworkInput, RemapTable};
 
 /// Distance to the view's border, as a share of the view's width, below which a box is considered
 /// cut off.

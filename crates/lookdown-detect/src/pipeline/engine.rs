@@ -34,13 +34,13 @@ use super::{
 };
 use crate::{
     detection::RefinementParameters,
-    imaging::{
-        Frame,
-        decode::{DecodeLimits, decode},
-    },
     inference::{Model, ModelRegistry},
     metrics::{DetectMetrics, start_at_zero},
     parameters::DetectParameters,
+};
+use lookdown_imaging::{
+    Frame,
+    decode::{DecodeLimits, decode},
 };
 
 /// The smallest frame side that can hold a lens image, pixels.

@@ -2,10 +2,8 @@
 
 use std::time::Duration;
 
-use crate::{
-    fairness::Client, imaging::decode::DecodeError, inference::InferenceError,
-    parameters::ParameterError,
-};
+use crate::{fairness::Client, inference::InferenceError, parameters::ParameterError};
+use lookdown_imaging::decode::DecodeError;
 
 /// The reason why a frame has no report.
 #[derive(Debug, thiserror::Error)]

@@ -20,11 +20,8 @@ use parking_lot::Mutex;
 use super::{
     Person, camera_cache::CameraCache, camera_rig::CameraRig, merge, motion_cache::MAX_AGE,
 };
-use crate::{
-    detection::RefinementParameters,
-    imaging::{Frame, FrameSignature, MovedCell, NEW_LEVELS, is_noise},
-    inference::Model,
-};
+use crate::{detection::RefinementParameters, inference::Model};
+use lookdown_imaging::{Frame, FrameSignature, MovedCell, NEW_LEVELS, is_noise};
 
 /// Most persons in motion that are followed. With more, every frame is searched.
 const MAX_MOVING: usize = 32;

@@ -8,10 +8,8 @@ use lookdown_lens::{calibration::Calibration, geometry::Pixel};
 use tokio_util::sync::CancellationToken;
 
 use super::{DetectionReport, Person, Ticket, camera_rig::CameraRig};
-use crate::{
-    imaging::{Frame, annotate::ZoneOutline, decode::declared_size},
-    parameters::DetectParameters,
-};
+use crate::parameters::DetectParameters;
+use lookdown_imaging::{Frame, annotate::ZoneOutline, decode::declared_size};
 
 /// The frame of a job.
 #[derive(Debug, Clone)]

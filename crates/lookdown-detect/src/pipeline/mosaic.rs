@@ -2,10 +2,8 @@
 
 use lookdown_lens::geometry::FrameCrop;
 
-use crate::{
-    detection::{BBox, ViewPixels},
-    imaging::{Frame, NetworkInput, RemapTable},
-};
+use crate::detection::{BBox, ViewPixels};
+use lookdown_imaging::{Frame, NetworkInput, RemapTable};
 
 /// The number of tiles along each side of a mosaic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -12,10 +12,8 @@ use lookdown_lens::geometry::{FrameCrop, VirtualView};
 use parking_lot::{Mutex, MutexGuard};
 
 use super::{camera_cache::CameraCache, camera_rig::CameraRig};
-use crate::{
-    imaging::ViewSignature,
-    inference::{Model, ViewDetection},
-};
+use crate::inference::{Model, ViewDetection};
+use lookdown_imaging::ViewSignature;
 
 /// Maximum age of cached detections, with or without motion.
 pub(super) const MAX_AGE: Duration = Duration::from_secs(10);

@@ -29,10 +29,8 @@ use super::{
     error::{PipelineError, internal, of_inference},
     motion_cache::CameraViews,
 };
-use crate::{
-    imaging::{Frame, ViewBatch},
-    inference::Model,
-};
+use crate::inference::Model;
+use lookdown_imaging::{Frame, ViewBatch};
 
 pub(super) use batch_cost::BatchCost;
 pub(super) use pass_task::PassTask;

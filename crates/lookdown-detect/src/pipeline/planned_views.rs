@@ -11,7 +11,8 @@ use lookdown_lens::{
 };
 
 use super::{Engine, PipelineError, outline::view_outline};
-use crate::{imaging::MaskedPixels, parameters::Profile};
+use crate::parameters::Profile;
+use lookdown_imaging::MaskedPixels;
 
 /// Steps along each side of a view between the rays that test whether it covers the lens image.
 const SIGHT_STEPS: u32 = 64;

@@ -13,10 +13,10 @@ use lookdown_lens::{
 
 use crate::{
     detection::{BBox, FramePixels, RefinementParameters},
-    imaging::lens_circle::LensCircle,
     inference::Model,
     parameters::{DefaultUsed, Profile},
 };
+use lookdown_imaging::lens_circle::LensCircle;
 
 /// The persons in one frame.
 #[derive(Debug, Clone)]

@@ -17,10 +17,10 @@ use super::{
 };
 use crate::{
     detection::{BBox, ViewPixels},
-    imaging::{Frame, NetworkInput, ViewBatch, annotate::encode_png},
     inference::{Detector, HeadOutput, InferenceError, Model, ModelRegistry, ViewDetection},
     parameters::DetectParameters,
 };
+use lookdown_imaging::{Frame, NetworkInput, ViewBatch, annotate::encode_png};
 
 /// Returns the bounding box of all pixels in a view that are brighter than this.
 const BRIGHT: f32 = 200.0;

@@ -7,7 +7,7 @@ use lookdown_lens::{
     geometry::{Pixel, foot_filter::AreaReach},
 };
 
-use crate::imaging::{MaskedPixels, RemapTable};
+use lookdown_imaging::{MaskedPixels, RemapTable};
 
 /// The pixels of a frame that show no person who counts.
 #[derive(Debug, Clone)]

@@ -1,4 +1,4 @@
-use lookdown_detect::imaging::decode::{DecodeLimits, decode};
+use lookdown_imaging::decode::{DecodeLimits, decode};
 
 use super::*;
 

@@ -2,14 +2,12 @@
 
 use std::ops::Range;
 
-use lookdown_detect::{
-    detection::Refinement,
-    imaging::{
-        Frame, FrameError,
-        annotate::{Drawing, Mark, annotate},
-        image_grid::{GridCell, ImageGrid},
-        thumbnail,
-    },
+use lookdown_detect::detection::Refinement;
+use lookdown_imaging::{
+    Frame, FrameError,
+    annotate::{Drawing, Mark, annotate},
+    image_grid::{GridCell, ImageGrid},
+    thumbnail,
 };
 
 use super::{SCORE_THRESHOLDS, SIGMAS};

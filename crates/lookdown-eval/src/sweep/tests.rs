@@ -1,4 +1,5 @@
-use lookdown_detect::{detection::BBox, imaging::Frame};
+use lookdown_detect::detection::BBox;
+use lookdown_imaging::Frame;
 
 use super::*;
 use crate::{

@@ -1,10 +1,10 @@
 //! Converts errors of the pipeline to problems. No other place decides their kind.
 
 use lookdown_detect::{
-    imaging::decode::DecodeError,
     parameters::{ParameterError, ParameterFault},
     pipeline::PipelineError,
 };
+use lookdown_imaging::decode::DecodeError;
 
 use super::{FRAME, Problem, ProblemKind};
 

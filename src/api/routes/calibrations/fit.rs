@@ -6,7 +6,7 @@ use axum::{
     response::IntoResponse,
 };
 use bytes::Bytes;
-use lookdown_detect::imaging::{
+use lookdown_imaging::{
     decode::{DecodeLimits, decode},
     room_fit::{RoomFrame, fit_room},
 };

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use anyhow::Context;
-use lookdown_detect::imaging::{
+use lookdown_imaging::{
     Frame,
     lens_circle::{AgreedCircle, agreed_circle, find_lens_circle},
 };

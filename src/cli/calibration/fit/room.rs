@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, fs};
 
 use anyhow::Context;
-use lookdown_detect::imaging::{
+use lookdown_imaging::{
     Frame,
     room_fit::{RoomFrame, fit_room},
 };

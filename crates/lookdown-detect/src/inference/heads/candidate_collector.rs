@@ -3,9 +3,9 @@
 use super::score::{Floor, Score};
 use crate::{
     detection::{BBox, BBoxError, ViewPixels},
-    imaging::NetworkInput,
     inference::{HeadOutput, ViewDetection},
 };
+use lookdown_imaging::NetworkInput;
 
 /// Collects persons and counts the dropped candidates.
 pub(super) struct CandidateCollector {

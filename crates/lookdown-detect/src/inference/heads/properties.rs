@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 use self::cases::{CASES, Case, N};
 use super::{Head, HeadOutput, InferenceError, OutputShape, TensorView};
-use crate::imaging::NetworkInput;
+use lookdown_imaging::NetworkInput;
 
 const INPUT: (u32, u32) = (8, 4);
 

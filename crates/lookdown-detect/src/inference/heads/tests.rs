@@ -4,7 +4,8 @@ mod known_models;
 mod refusals;
 
 use super::{Head, HeadOutput, InferenceError, TensorView};
-use crate::{detection::BBox, imaging::NetworkInput, inference::ViewDetection};
+use crate::{detection::BBox, inference::ViewDetection};
+use lookdown_imaging::NetworkInput;
 
 /// The head of a manifest's `[output]` table.
 fn head(manifest: &str) -> Head {

@@ -5,7 +5,7 @@ use std::num::NonZeroU32;
 use serde::Deserialize;
 use strum::Display;
 
-use crate::imaging::ChannelOrder;
+use lookdown_imaging::ChannelOrder;
 
 /// Conversion of pixels to network input. With pixels 0 to 255, each value is either
 /// `pixel · scale + offset` or `(pixel − mean) / std`, per plane in the network's plane order.

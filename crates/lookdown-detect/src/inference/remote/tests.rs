@@ -9,7 +9,7 @@ use tempfile::TempDir;
 
 use self::fake::{FakeServer, ScriptedReply};
 use super::*;
-use crate::imaging::ViewBatch;
+use lookdown_imaging::ViewBatch;
 
 /// A folder with a manifest and no weights.
 fn manifest() -> TempDir {

@@ -6,7 +6,6 @@ use serde::Deserialize;
 
 use super::server::{RemoteServer, refusal};
 use crate::{
-    imaging::NetworkInput,
     inference::{
         InferenceError, ModelManifest, OnnxTensor,
         description::{FLOAT, Metadata, float_shapes},
@@ -18,6 +17,7 @@ use crate::{
         metadata::{ModelMetadata, ServerMetadata, TensorMetadata},
     },
 };
+use lookdown_imaging::NetworkInput;
 
 /// Longest name of a tensor or a datatype.
 const MAX_NAME_BYTES: usize = 256;

@@ -10,10 +10,6 @@ use lookdown_lens::{
 
 use super::Engine;
 use crate::{
-    imaging::{
-        Frame, NetworkInput,
-        lens_circle::{LensCircle, assumed_circle, find_lens_circle},
-    },
     inference::Model,
     parameters::Profile,
     pipeline::{
@@ -23,6 +19,10 @@ use crate::{
         report::CalibrationUsed,
         rig_cache::{RigCamera, RigKey},
     },
+};
+use lookdown_imaging::{
+    Frame, NetworkInput,
+    lens_circle::{LensCircle, assumed_circle, find_lens_circle},
 };
 
 /// The rounding step of lens circles, as a share of the radius. Rounding maps the jittering circles

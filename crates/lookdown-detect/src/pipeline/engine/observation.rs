@@ -6,7 +6,6 @@ use lookdown_lens::warning::Warning;
 
 use super::camera::FrameCamera;
 use crate::{
-    imaging::Frame,
     inference::Model,
     parameters::{Profile, Tuning},
     pipeline::{
@@ -14,6 +13,7 @@ use crate::{
         network::PassTask, pass::Pass,
     },
 };
+use lookdown_imaging::Frame;
 
 /// A frame with its detections: the complete input of refinement, so that other refinements of the
 /// same frame need no inference.

@@ -232,7 +232,7 @@ fn a_scaled_frame_is_accepted_and_another_aspect_is_refused() {
     assert!((report.persons[0].bbox.center()[0] - 630.0).abs() < 8.0);
 
     let wide = Frame::new(800, 600, vec![90; 800 * 600 * 3]).unwrap();
-    let wide = crate::imaging::annotate::encode_png(&wide).unwrap();
+    let wide = lookdown_imaging::annotate::encode_png(&wide).unwrap();
     let error = engine
         .detect(&job(wide.into(), &[("calibration", "lobby")]))
         .unwrap_err();

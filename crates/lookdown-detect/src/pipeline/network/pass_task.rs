@@ -6,10 +6,10 @@ use parking_lot::{Condvar, Mutex, MutexGuard};
 
 use super::BatchCost;
 use crate::{
-    imaging::Frame,
     inference::{Model, ViewDetection},
     pipeline::{PipelineError, Ticket, camera_rig::CameraRig, motion_cache::CameraViews},
 };
+use lookdown_imaging::Frame;
 
 /// One pass over a frame: the views of a rig and the model that processes them.
 pub(in crate::pipeline) struct PassTask {

@@ -6,10 +6,8 @@ use std::time::Instant;
 use rayon::{ThreadPool, prelude::*};
 
 use super::{BatchCost, Claim, PassTask};
-use crate::{
-    imaging::{NetworkInput, ViewBatch, ViewSignature},
-    inference::{InferenceError, ViewDetection},
-};
+use crate::inference::{InferenceError, ViewDetection};
+use lookdown_imaging::{NetworkInput, ViewBatch, ViewSignature};
 
 /// The result of a batch.
 pub(super) struct Run {

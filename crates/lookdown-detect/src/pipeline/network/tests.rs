@@ -10,10 +10,10 @@ use lookdown_lens::{
 
 use super::*;
 use crate::{
-    imaging::NetworkInput,
     inference::{Detector, HeadOutput, InferenceError},
     parameters::Priority,
 };
+use lookdown_imaging::NetworkInput;
 
 /// Reports the view count of each run and the brightness of its first view, then waits for release.
 struct Gated {

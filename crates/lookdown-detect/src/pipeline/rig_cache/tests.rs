@@ -5,7 +5,8 @@ use lookdown_lens::{
 use strum::VariantArray;
 
 use super::*;
-use crate::{imaging::NetworkInput, metrics::IntGauge};
+use crate::metrics::IntGauge;
+use lookdown_imaging::NetworkInput;
 
 fn key(radius: i64) -> RigKey {
     RigKey {

@@ -1,10 +1,8 @@
 //! Models and manifests that do not fit, and their error messages.
 
 use super::{decode, head};
-use crate::{
-    imaging::NetworkInput,
-    inference::heads::{Head, OutputShape, TensorView},
-};
+use crate::inference::heads::{Head, OutputShape, TensorView};
+use lookdown_imaging::NetworkInput;
 
 fn refusal(manifest: &str, outputs: &[(&str, &[i64])]) -> String {
     let outputs: Vec<OutputShape<'_>> = outputs

@@ -1,6 +1,6 @@
 //! The dark surround of the lens image, whose outline is not an edge of the room.
 
-use crate::imaging::{frame::Frame, lens_circle::surround_threshold};
+use crate::{frame::Frame, lens_circle::surround_threshold};
 
 /// Side of a cell, in pixels of the divided frame.
 const CELL: usize = 4;

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use super::LensCircle;
 use super::surround::{Surround, brightness};
-use crate::imaging::frame::Frame;
+use crate::frame::Frame;
 
 /// Rays around the circle.
 const RAYS: u32 = 360;

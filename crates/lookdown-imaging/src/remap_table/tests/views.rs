@@ -9,7 +9,7 @@ use super::{
     sampling::{noise, reference},
     three_rings,
 };
-use crate::imaging::ChannelOrder;
+use crate::ChannelOrder;
 
 fn tilted() -> Mount {
     Mount::new(Unit::new_normalize(Ray::new(0.1, 0.05, -1.0)), None)

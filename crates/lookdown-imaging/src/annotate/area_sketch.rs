@@ -11,7 +11,7 @@ use super::{
     label::Labels,
     line_width,
 };
-use crate::imaging::{Frame, MaskedPixels};
+use crate::{Frame, MaskedPixels};
 
 pub(super) const ZONE: Rgb = [126, 240, 110];
 const MASK: Rgb = [255, 128, 210];

@@ -1,7 +1,7 @@
 //! Outline points: positions where scans from the frame's border inward leave the surround.
 
 use super::surround::{Surround, brightness, margin};
-use crate::imaging::frame::Frame;
+use crate::frame::Frame;
 
 /// Scan lines across each axis of the frame. Rows and columns together cover the outline of a
 /// circle almost evenly.

@@ -11,7 +11,7 @@ use super::{
     effort::Cancelled,
     mark::Mark,
 };
-use crate::imaging::frame::Frame;
+use crate::frame::Frame;
 
 /// The replacement of concealed pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -243,7 +243,7 @@ fn mix(from: Rgb, to: Rgb, part: u32, whole: u32) -> Rgb {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::imaging::annotate::OrientedMark;
+    use crate::annotate::OrientedMark;
 
     /// Columns of two colors, which no mean has.
     fn stripes(side: u32) -> Frame {

@@ -4,7 +4,7 @@ use super::{
     band::{Band, Block, Seen},
     block_size::LANES,
 };
-use crate::imaging::{Frame, NetworkInput};
+use crate::{Frame, NetworkInput};
 
 /// Weights of right neighbors are whole fractions of this: with pixels of eight bits, a product
 /// of 16-bit numbers loses nothing.

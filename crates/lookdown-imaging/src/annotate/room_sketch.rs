@@ -17,7 +17,7 @@ use super::{
     lens_sketch::{self, CIRCLE_POINTS},
     line_width,
 };
-use crate::imaging::Frame;
+use crate::Frame;
 
 /// Colors of the edges along the vertical, and along the two horizontal directions.
 const EDGES: [Rgb; 3] = [[0, 214, 255], [255, 200, 30], [255, 80, 200]];

@@ -1,7 +1,7 @@
 //! Sizes, colors and limits of everything that is drawn.
 
 use super::canvas::Rgb;
-use crate::imaging::frame::Frame;
+use crate::frame::Frame;
 
 pub(super) const INK: Rgb = [12, 14, 18];
 

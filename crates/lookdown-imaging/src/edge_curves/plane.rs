@@ -1,6 +1,6 @@
 //! One channel of numbers.
 
-use crate::imaging::frame::Frame;
+use crate::frame::Frame;
 
 /// A raster of numbers, row by row.
 pub(super) struct Plane {

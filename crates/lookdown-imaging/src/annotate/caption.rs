@@ -6,7 +6,7 @@ use super::{
     text::Text,
     text_height,
 };
-use crate::imaging::frame::Frame;
+use crate::frame::Frame;
 
 const BACKGROUND: Rgb = [0, 0, 0];
 const BACKGROUND_OPACITY: f64 = 0.6;

@@ -8,7 +8,7 @@ use super::{
     text::Text,
     text_height,
 };
-use crate::imaging::frame::Frame;
+use crate::frame::Frame;
 
 const PLATE_OPACITY: f64 = 0.92;
 /// Costs of covering another plate, a head or a box, per covered share of the plate.

@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use crate::imaging::frame::Frame;
+use crate::frame::Frame;
 
 /// A color, 8 bits a channel.
 pub(super) type Rgb = [u8; 3];

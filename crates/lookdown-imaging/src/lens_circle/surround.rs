@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::imaging::frame::Frame;
+use crate::frame::Frame;
 
 /// A corner brighter than this (of 255) is lens image, not surround.
 const MAX_LEVEL: f64 = 80.0;

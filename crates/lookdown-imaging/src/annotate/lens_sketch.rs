@@ -12,7 +12,7 @@ use super::{
     canvas::{Rgb, Stroke},
     line_width,
 };
-use crate::imaging::Frame;
+use crate::Frame;
 
 const RIM: Rgb = [255, 90, 80];
 const RING: Rgb = [255, 220, 60];

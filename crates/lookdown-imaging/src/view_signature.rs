@@ -87,7 +87,7 @@ fn level(mean: f32) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::imaging::ChannelOrder;
+    use crate::ChannelOrder;
 
     fn input() -> NetworkInput {
         NetworkInput {

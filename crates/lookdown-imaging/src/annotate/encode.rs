@@ -5,7 +5,7 @@ use std::error::Error;
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use jpeg_encoder::{ColorType, Encoder as JpegEncoder, SamplingFactor};
 
-use crate::imaging::frame::Frame;
+use crate::frame::Frame;
 
 /// A frame cannot be encoded.
 #[derive(Debug, thiserror::Error)]

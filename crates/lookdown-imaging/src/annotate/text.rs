@@ -3,17 +3,17 @@
 use ab_glyph::{Font, FontRef, PxScale, ScaleFont, point};
 
 use super::canvas::{Rgb, blend, pixels};
-use crate::imaging::frame::Frame;
+use crate::frame::Frame;
 
 /// Glyphs of one size.
-pub(in crate::imaging) struct Text {
+pub(crate) struct Text {
     font: FontRef<'static>,
     scale: PxScale,
 }
 
 impl Text {
     /// Glyphs `height` pixels high, from the lowest to the highest point.
-    pub(in crate::imaging) fn new(height: f64) -> Self {
+    pub(crate) fn new(height: f64) -> Self {
         #[expect(clippy::expect_used, reason = "the font is part of the program")]
         let font = FontRef::try_from_slice(epaint_default_fonts::HACK_REGULAR)
             .expect("the embedded font is valid");
@@ -23,12 +23,12 @@ impl Text {
     }
 
     /// Height of a line, pixels.
-    pub(in crate::imaging) fn height(&self) -> f64 {
+    pub(crate) fn height(&self) -> f64 {
         f64::from(self.scale.y)
     }
 
     /// Width of a text, pixels.
-    pub(in crate::imaging) fn width(&self, text: &str) -> f64 {
+    pub(crate) fn width(&self, text: &str) -> f64 {
         let font = self.font.as_scaled(self.scale);
         let advance = |letter| font.h_advance(font.glyph_id(letter));
         f64::from(text.chars().map(advance).sum::<f32>())
@@ -37,7 +37,7 @@ impl Text {
     /// Writes one line with its upper left corner at `[left, top]`. Parts outside the frame are cut
     /// off. Returns the number of painted pixels.
     #[expect(clippy::cast_possible_truncation, reason = "positions in a frame")]
-    pub(in crate::imaging) fn write(
+    pub(crate) fn write(
         &self,
         frame: &mut Frame,
         text: &str,
