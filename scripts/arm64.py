@@ -31,7 +31,7 @@ HIDE_CPU = ("unshare", "--mount", "sh", "-c", 'mount -t tmpfs none /sys && exec 
 """Runs a command without /sys: in the emulator, ONNX Runtime ends with a segmentation fault while it reads there
 about the caches of the x86-64 processor. Needs root."""
 RECORD = ROOT / "tests" / "fixtures" / "sample_persons.json"
-LIBRARIES = ("lookdown-lens", "lookdown-imaging", "lookdown-detect", "lookdown-eval")
+LIBRARIES = ("lookdown-lens", "lookdown-calibration", "lookdown-imaging", "lookdown-detect", "lookdown-eval")
 
 
 def main(arguments: list[str]) -> int:

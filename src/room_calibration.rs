@@ -6,18 +6,18 @@ pub(crate) mod preview;
 use std::collections::BTreeMap;
 
 use anyhow::Context;
+use lookdown_calibration::{
+    Calibration, CalibrationFile, CalibrationId,
+    export::Target,
+    native::{
+        NativeCalibration, NativeImage, NativeMount, NativeSource, SourcedValue, ValueSource,
+    },
+};
 use lookdown_imaging::{
     Frame,
     room_fit::{RoomFrame, fit_room},
 };
 use lookdown_lens::{
-    calibration::{
-        Calibration, CalibrationFile, CalibrationId,
-        export::Target,
-        native::{
-            NativeCalibration, NativeImage, NativeMount, NativeSource, SourcedValue, ValueSource,
-        },
-    },
     geometry::lens::{KannalaBrandt, LensModel},
     self_calibration::{CameraHeight, FieldOfView, KnownCamera, RoomFit},
 };

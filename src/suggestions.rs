@@ -20,13 +20,11 @@ use std::{
     time::{Duration, Instant},
 };
 
+use lookdown_calibration::CalibrationId;
 use lookdown_common::{Claim, OwnCameras, Place, makes_room};
 use lookdown_detect::pipeline::DetectedFrame;
 use lookdown_imaging::decode::DecodeLimits;
-use lookdown_lens::{
-    calibration::CalibrationId,
-    self_calibration::{IdealLens, KnownCamera},
-};
+use lookdown_lens::self_calibration::{IdealLens, KnownCamera};
 use parking_lot::Mutex;
 
 use crate::calibration_store::Calibrations;

@@ -27,7 +27,7 @@ class Crates(unittest.TestCase):
         cls.crates = published()
 
     def test_the_libraries_for_others_are_published(self):
-        libraries = {"lookdown-common", "lookdown-lens", "lookdown-imaging", "lookdown-detect", "lookdown-tracking"}
+        libraries = {"lookdown-common", "lookdown-calibration", "lookdown-lens", "lookdown-imaging", "lookdown-detect", "lookdown-tracking"}
         libraries |= {"lookdown-eval"}
         self.assertLessEqual(libraries, {*self.crates})
 

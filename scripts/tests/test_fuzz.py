@@ -8,7 +8,7 @@ from fuzz import IMPORTERS, ROOT, TARGETS, seeds, statistic
 
 class Fuzz(unittest.TestCase):
     def test_every_format_has_its_importer_fuzzed(self):
-        source = (ROOT / "crates/lookdown-lens/src/calibration/formats/format.rs").read_text()
+        source = (ROOT / "crates/lookdown-calibration/src/formats/format.rs").read_text()
         variants = re.search(r"pub enum Format \{(.*?)\n\}", source, re.DOTALL)[1]
         formats = re.findall(r"^ +(\w+),$", variants, re.MULTILINE)
         fuzzed = re.findall(r"Format::(\w+)\),$", (ROOT / "lab/fuzz/src/importer.rs").read_text(), re.MULTILINE)

@@ -21,11 +21,11 @@ use std::{
     time::Duration,
 };
 
+use lookdown_calibration::{Calibration, CalibrationId};
 use lookdown_detect::{
     metrics::start_at_zero,
     pipeline::{CalibrationLookup, UnusableCalibration},
 };
-use lookdown_lens::calibration::{Calibration, CalibrationId};
 use parking_lot::{Mutex, MutexGuard, RwLock};
 
 use self::{file_reader::FileReader, snapshot::Snapshot};

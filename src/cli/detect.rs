@@ -19,12 +19,12 @@ use clap::{
     Args,
     builder::{PossibleValue, PossibleValuesParser, TypedValueParser},
 };
+use lookdown_calibration::{Calibration, CalibrationId};
 use lookdown_common::files;
 use lookdown_detect::{
     parameters::DetectParameters,
     pipeline::{DetectJob, DetectedFrame, Engine, JobImage},
 };
-use lookdown_lens::calibration::{Calibration, CalibrationId};
 use strum::VariantArray;
 
 use self::{

@@ -6,6 +6,7 @@ mod wall_views;
 use std::f64::consts::FRAC_PI_2;
 
 use anyhow::Context;
+use lookdown_calibration::Calibration;
 use lookdown_imaging::{
     Frame,
     annotate::{Caption, ROOM_LEGEND, encode_jpeg, sketch_room},
@@ -13,7 +14,6 @@ use lookdown_imaging::{
     room_fit::RoomFrame,
 };
 use lookdown_lens::{
-    calibration::Calibration,
     geometry::{Lens, Mount},
     self_calibration::RoomFit,
 };

@@ -1,6 +1,6 @@
 //! The log and traces.
 
-use tracing_subscriber::EnvFilter;
+use tracing_subscriber::filter::Targets;
 use url::Url;
 
 use super::{
@@ -49,7 +49,7 @@ pub enum LogFormat {
 fn filter() -> Form<String> {
     parsed(
         "log filter",
-        |text| match EnvFilter::try_new(text) {
+        |text| match text.parse::<Targets>() {
             Ok(_) => Ok(text.to_owned()),
             Err(error) => Err(Refusal::Shown(format!(
                 "{error}; give a level such as info, or info,lookdown=debug"

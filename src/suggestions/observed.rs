@@ -5,9 +5,9 @@ use std::{
     time::{Duration, Instant},
 };
 
+use lookdown_calibration::{CalibrationId, native::NativeImage};
 use lookdown_imaging::room_fit::RoomFrame;
 use lookdown_lens::{
-    calibration::{CalibrationId, native::NativeImage},
     geometry::OrientedBox,
     self_calibration::{CameraHeight, FitRefusal, HeightRefusal, RoomFit},
 };

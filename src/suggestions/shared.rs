@@ -2,10 +2,10 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
+use lookdown_calibration::{Calibration, CalibrationId, native::NativeCalibration};
 use lookdown_imaging::decode::DecodeLimits;
-use lookdown_lens::{
-    calibration::{Calibration, CalibrationId, native::NativeCalibration},
-    self_calibration::{CameraHeight, FitRefusal, HeightRefusal, KnownCamera, RoomFit},
+use lookdown_lens::self_calibration::{
+    CameraHeight, FitRefusal, HeightRefusal, KnownCamera, RoomFit,
 };
 use parking_lot::Mutex;
 

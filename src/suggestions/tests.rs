@@ -2,11 +2,11 @@
 
 use std::{sync::Arc, time::Instant};
 
+use lookdown_calibration::{
+    CalibrationId,
+    native::{SourcedValue, ValueSource},
+};
 use lookdown_lens::{
-    calibration::{
-        CalibrationId,
-        native::{SourcedValue, ValueSource},
-    },
     geometry::{
         Lens, OrientedBox, Pixel, Ray,
         pixels::{PixelConvention, cross_half_pixel},

@@ -5,14 +5,12 @@ use std::{
     sync::{Arc, mpsc::Receiver},
 };
 
+use lookdown_calibration::{CalibrationId, export::Target};
 use lookdown_imaging::{
     decode::decode,
     room_fit::{RoomFrame, fit_room},
 };
-use lookdown_lens::{
-    calibration::{CalibrationId, export::Target},
-    self_calibration::CameraHeight,
-};
+use lookdown_lens::self_calibration::CameraHeight;
 
 use super::{
     observed::{FRAMES, Observed, Subject},

@@ -2,10 +2,11 @@
 
 use std::io::IsTerminal;
 
-use tracing::Subscriber;
+use tracing::{Subscriber, level_filters::LevelFilter};
 use tracing_subscriber::{
-    EnvFilter, fmt,
-    fmt::MakeWriter,
+    filter::Targets,
+    fmt::{self, MakeWriter},
+    layer::SubscriberExt,
     util::{SubscriberInitExt, TryInitError},
 };
 
@@ -33,15 +34,17 @@ pub fn log_subscriber(
     writer: impl for<'writer> MakeWriter<'writer> + Send + Sync + 'static,
     in_color: bool,
 ) -> Box<dyn Subscriber + Send + Sync> {
-    let logs = fmt()
+    let logs = fmt::Subscriber::builder()
         .with_writer(writer)
         .with_ansi(in_color)
-        .with_env_filter(EnvFilter::new(&settings.filter));
+        .with_max_level(LevelFilter::TRACE);
+    // The setting was parsed when it was read.
+    let filter: Targets = settings.filter.parse().unwrap_or_default();
     match settings.format {
-        LogFormat::Text => Box::new(logs.finish()),
+        LogFormat::Text => Box::new(logs.finish().with(filter)),
         LogFormat::Json => {
             let logs = logs.json().flatten_event(true).with_span_list(false);
-            Box::new(logs.finish())
+            Box::new(logs.finish().with(filter))
         }
     }
 }

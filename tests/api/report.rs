@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use jiff::Timestamp;
 use lookdown::api::to_report;
+use lookdown_calibration::warning::{Warning, WarningCode};
 use lookdown_common::report::Report;
 use lookdown_detect::{
     detection::{BBox, Refinement, RefinementParameters},
@@ -13,12 +14,9 @@ use lookdown_detect::{
         ZoneCount,
     },
 };
-use lookdown_lens::{
-    geometry::{
-        OrientedBox, PersonHeight, Pixel,
-        floor::{Bearing, FloorPosition},
-    },
-    warning::{Warning, WarningCode},
+use lookdown_lens::geometry::{
+    OrientedBox, PersonHeight, Pixel,
+    floor::{Bearing, FloorPosition},
 };
 
 fn person() -> Person {

@@ -286,7 +286,7 @@ fn calibrations_of_other_programs_are_checked_and_converted() {
         &[],
     );
     assert!(converted.status.success());
-    let calibration = lookdown_lens::calibration::Calibration::read(native.as_ref()).unwrap();
+    let calibration = lookdown_calibration::Calibration::read(native.as_ref()).unwrap();
     assert_eq!(calibration.id().as_str(), "hall");
     assert_eq!(calibration.image_size(), (512, 512));
 }

@@ -2,9 +2,9 @@
 
 use std::{path::Path, process::Command, sync::Arc};
 
+use lookdown_calibration::Calibration;
 use lookdown_detect::{Detector, DetectorOptions, parameters::DetectParameters};
 use lookdown_imaging::decode::{DecodeLimits, decode};
-use lookdown_lens::calibration::Calibration;
 use serde_json::Value;
 
 /// `x_min, y_min, x_max, y_max`.

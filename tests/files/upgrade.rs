@@ -9,9 +9,9 @@ use std::{
 };
 
 use lookdown::{cameras::Cameras, settings::load};
+use lookdown_calibration::Calibration;
 use lookdown_common::{OwnCameras, StoredFile};
 use lookdown_count::Recording;
-use lookdown_lens::calibration::Calibration;
 use lookdown_watch::Metrics;
 
 /// The folders of the versions.

@@ -10,10 +10,8 @@ mod traps;
 
 use std::path::PathBuf;
 
-use lookdown_lens::{
-    calibration::{CalibrationFile, formats::Camera},
-    geometry::{Lens, Ray},
-};
+use lookdown_calibration::{CalibrationFile, formats::Camera};
+use lookdown_lens::geometry::{Lens, Ray};
 use serde_json::Value;
 
 /// A file of `tests/fixtures`.

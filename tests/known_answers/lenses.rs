@@ -8,7 +8,8 @@ mod public_calibrations;
 use std::f64::consts::PI;
 
 use known_answers::KnownAnswers;
-use lookdown_lens::{calibration::Calibration, geometry::Ray};
+use lookdown_calibration::Calibration;
+use lookdown_lens::geometry::Ray;
 use serde_json::json;
 
 /// All sets: 22 synthetic and published cameras with rays in all directions, and 16 published

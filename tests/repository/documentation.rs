@@ -5,7 +5,7 @@
 use std::{env, fs, path::Path};
 
 use lookdown::api::problem_table;
-use lookdown_lens::warning::warning_table;
+use lookdown_calibration::warning::warning_table;
 
 /// A generated part of a file.
 struct Section {

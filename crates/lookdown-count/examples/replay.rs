@@ -6,8 +6,8 @@
 use std::{error::Error, fs, path::PathBuf, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
+use lookdown_calibration::CalibrationFile;
 use lookdown_count::Recording;
-use lookdown_lens::calibration::CalibrationFile;
 
 /// Longest time between two reports that is known.
 const LONGEST_GAP: Duration = Duration::from_secs(10);

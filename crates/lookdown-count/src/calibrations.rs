@@ -2,8 +2,8 @@
 
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
+use lookdown_calibration::{Calibration, CalibrationFile};
 use lookdown_common::{ServerClient, read_body, text::one_line};
-use lookdown_lens::calibration::{Calibration, CalibrationFile};
 use reqwest::{StatusCode, header::ETAG};
 
 use crate::{

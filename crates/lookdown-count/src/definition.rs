@@ -1,14 +1,12 @@
 //! The settings of a camera's calibration that counting needs: lines, zones, and the place on a
 //! site.
 
-use lookdown_lens::{
-    calibration::{Calibration, CameraGeometry},
-    geometry::{
-        CountingLine, LineEnds, Pixel, Polygon, ZoneArea,
-        floor::{FloorPosition, floor_position, pixel_of},
-        oriented_box::vertical_in_frame,
-        polygon::MAX_CORNERS,
-    },
+use lookdown_calibration::{Calibration, CameraGeometry};
+use lookdown_lens::geometry::{
+    CountingLine, LineEnds, Pixel, Polygon, ZoneArea,
+    floor::{FloorPosition, floor_position, pixel_of},
+    oriented_box::vertical_in_frame,
+    polygon::MAX_CORNERS,
 };
 use lookdown_tracking::{
     CameraPose, Plane,

@@ -8,7 +8,7 @@ use std::{
 };
 
 use jiff::Timestamp;
-use lookdown_lens::calibration::Calibration;
+use lookdown_calibration::Calibration;
 use lookdown_tracking::MAX_CAMERAS;
 
 use crate::{

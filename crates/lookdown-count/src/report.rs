@@ -1,14 +1,12 @@
 //! The reports of the server.
 
 use jiff::Timestamp;
+use lookdown_calibration::CalibrationId;
 use lookdown_common::{
     report::{Report, ReportCalibration, ReportImage, ReportOrientedBox, ReportPerson},
     text::is_camera_name,
 };
-use lookdown_lens::{
-    calibration::CalibrationId,
-    geometry::{OrientedBox, Pixel},
-};
+use lookdown_lens::geometry::{OrientedBox, Pixel};
 use lookdown_tracking::Observation;
 use serde::{Deserialize, Serialize};
 

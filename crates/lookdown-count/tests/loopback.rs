@@ -11,9 +11,9 @@ use std::{
 };
 
 use events::{CALIBRATION, START_MS, Server, event, person, walks};
+use lookdown_calibration::Calibration;
 use lookdown_common::{HttpClient, ServerEntry};
 use lookdown_count::{CountEntry, Recording, Snapshot, WebhookEntry, count};
-use lookdown_lens::calibration::Calibration;
 use reqwest::RequestBuilder;
 use serde_json::{Value, json};
 use tokio::{

@@ -3,9 +3,9 @@
 
 use std::{env, error::Error, fs, path::Path, sync::Arc};
 
+use lookdown_calibration::Calibration;
 use lookdown_detect::{Detector, DetectorOptions, parameters::DetectParameters};
 use lookdown_imaging::decode::{DecodeLimits, decode};
-use lookdown_lens::calibration::Calibration;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = env::args().skip(1);

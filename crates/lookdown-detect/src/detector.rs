@@ -2,7 +2,7 @@
 
 use std::{num::NonZeroUsize, path::PathBuf, sync::Arc, thread::available_parallelism};
 
-use lookdown_lens::calibration::Calibration;
+use lookdown_calibration::Calibration;
 use parking_lot::Mutex;
 
 use crate::{

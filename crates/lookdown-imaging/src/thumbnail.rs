@@ -1,10 +1,6 @@
 //! Reduced versions of images.
 
-use fast_image_resize::{
-    FilterType, ResizeAlg, ResizeOptions, Resizer,
-    images::{TypedImage, TypedImageRef},
-    pixels::U8x3,
-};
+use image::{ImageBuffer, Rgb, imageops};
 
 use super::Frame;
 
@@ -39,19 +35,9 @@ pub fn narrowed(frame: &Frame, width: u32) -> Frame {
 }
 
 fn resized(frame: &Frame, width: u32, height: u32) -> Frame {
-    let options = ResizeOptions::new().resize_alg(ResizeAlg::Convolution(FilterType::Bilinear));
-    // The typed calls compile the code for this one type of pixels; the others compile all types.
-    let mut small = TypedImage::<U8x3>::new(width, height);
-    TypedImageRef::<U8x3>::from_buffer(frame.width(), frame.height(), frame.pixels())
-        .ok()
-        .and_then(|image| {
-            let resized = Resizer::new().resize_typed(&image, &mut small, &options);
-            resized.ok()
-        })
-        .and_then(|()| {
-            let values = small.pixels().iter().flat_map(|pixel| pixel.0);
-            Frame::new(width, height, values.collect()).ok()
-        })
+    ImageBuffer::<Rgb<u8>, _>::from_raw(frame.width(), frame.height(), frame.pixels())
+        .map(|image| imageops::thumbnail(&image, width, height))
+        .and_then(|small| Frame::new(width, height, small.into_raw()).ok())
         // No step can fail: the buffer length of a frame matches its size.
         .unwrap_or_else(|| frame.clone())
 }

@@ -1,10 +1,6 @@
 #![doc = include_str!("../README.md")]
 //!
-//! [`calibration`] reads a file of any of its formats into a checked camera; [`geometry`] projects
-//! with it.
+//! [`geometry`] projects with a camera, [`self_calibration`] finds one.
 
-pub mod calibration;
 pub mod geometry;
-pub mod revision;
 pub mod self_calibration;
-pub mod warning;

@@ -3,11 +3,11 @@
 use std::{borrow::Cow, sync::Arc};
 
 use lookdown::room_calibration;
+use lookdown_calibration::CalibrationId;
 use lookdown_imaging::{
     Frame,
     decode::{DecodeLimits, decode},
 };
-use lookdown_lens::calibration::CalibrationId;
 use numpy::PyReadonlyArray3;
 use pyo3::prelude::*;
 

@@ -2,7 +2,7 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use lookdown_lens::calibration::{
+use lookdown_calibration::{
     Calibration, export::Target, formats::Camera, native::NativeImage, read_camera,
 };
 use pyo3::prelude::*;

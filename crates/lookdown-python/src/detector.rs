@@ -3,11 +3,11 @@
 use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
 
 use lookdown::{api::to_report, app::engine_for, settings};
+use lookdown_calibration::Calibration;
 use lookdown_detect::{
     parameters::DetectParameters,
     pipeline::{DetectJob, Engine, JobImage},
 };
-use lookdown_lens::calibration::Calibration;
 use numpy::PyReadonlyArray3;
 use pyo3::prelude::*;
 

@@ -2,13 +2,11 @@
 
 use std::sync::Arc;
 
+use lookdown_calibration::Calibration;
 use lookdown_detect::pipeline::PlannedView;
-use lookdown_lens::{
-    calibration::Calibration,
-    geometry::{
-        Pixel,
-        pixels::{PixelConvention, cross_half_pixel},
-    },
+use lookdown_lens::geometry::{
+    Pixel,
+    pixels::{PixelConvention, cross_half_pixel},
 };
 use numpy::ndarray::{Array2, arr1, arr2};
 use numpy::{IntoPyArray, PyArray1, PyArray2};

@@ -11,7 +11,7 @@ use std::sync::{
 
 use libfuzzer_sys::{Corpus, fuzz_mutator, fuzz_target, fuzzer_mutate};
 use lookdown_fuzz::importer::{IMPORTERS, read};
-use lookdown_lens::calibration::formats::Format;
+use lookdown_calibration::formats::Format;
 
 /// The interval of prints of the count.
 const PRINT_EVERY: u64 = 1_000;

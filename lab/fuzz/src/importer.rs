@@ -1,14 +1,12 @@
 //! Fuzzes calibration files, one importer at a time, with all uses of their cameras in the server.
 
-use lookdown_lens::{
-    calibration::{
-        Calibration, CalibrationFile, FormatError,
-        export::{Exported, Target},
-        formats::{Camera, Format},
-        native::NativeImage,
-    },
-    geometry::Pixel,
+use lookdown_calibration::{
+    Calibration, CalibrationFile, FormatError,
+    export::{Exported, Target},
+    formats::{Camera, Format},
+    native::NativeImage,
 };
+use lookdown_lens::geometry::Pixel;
 use strum::VariantArray;
 
 /// The importers, with the names of their folders of seeds and corpora.

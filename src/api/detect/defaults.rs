@@ -1,8 +1,8 @@
 //! The parameters of a detection request: those that it gives, completed with the defaults of its
 //! calibration and of the server.
 
+use lookdown_calibration::CalibrationId;
 use lookdown_detect::parameters::{DefaultSource, DetectParameters, ParameterError};
-use lookdown_lens::calibration::CalibrationId;
 
 use crate::api::ApiState;
 

@@ -1,5 +1,6 @@
 //! Converts the report of the pipeline to the units and decimals of the API.
 
+use lookdown_calibration::warning::Warning;
 use lookdown_common::report::{
     Report, ReportBearing, ReportBox, ReportCalibration, ReportCircle, ReportDefault, ReportImage,
     ReportModel, ReportPerson, ReportRefinement, ReportTimings, ReportViews, ReportWarning,
@@ -10,7 +11,6 @@ use lookdown_detect::{
     pipeline::{self, DetectionReport, ModelUsed},
 };
 use lookdown_imaging::lens_circle::LensCircle;
-use lookdown_lens::warning::Warning;
 
 use crate::rounding::{
     azimuth_degrees, degrees, floor, meters, milliseconds, oriented_box, pixels, share,

@@ -14,7 +14,7 @@ use lookdown_detect::{
 };
 use lookdown_imaging::annotate::Concealment;
 
-use lookdown_lens::calibration::CalibrationId;
+use lookdown_calibration::CalibrationId;
 
 use crate::{
     annotated_image::StoredFrame,

@@ -115,7 +115,7 @@ fn model_ready() -> Value {
 
 #[cfg(test)]
 mod tests {
-    use lookdown_lens::calibration::CalibrationFile;
+    use lookdown_calibration::CalibrationFile;
 
     use super::*;
 

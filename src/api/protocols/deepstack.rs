@@ -13,7 +13,7 @@ use axum::{
     Json,
     extract::{Path, State},
 };
-use lookdown_lens::calibration::CalibrationId;
+use lookdown_calibration::CalibrationId;
 
 use self::{
     answer::{DeepStackAnswer, DeepStackModels},

@@ -172,7 +172,7 @@ pub(in crate::api) async fn delete(
 }
 
 /// Returns the problem of a calibration ID that is not in use.
-fn unknown(state: &ApiState, id: &lookdown_lens::calibration::CalibrationId) -> Problem {
+fn unknown(state: &ApiState, id: &lookdown_calibration::CalibrationId) -> Problem {
     let rows = state.calibrations.rows();
     let row = rows.into_iter().find(|row| row.id == *id);
     let detail = match row.and_then(|row| Some((row.file, row.problem?))) {

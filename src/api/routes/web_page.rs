@@ -14,8 +14,8 @@ use axum::{
     response::{IntoResponse, Response},
     routing::get,
 };
+use lookdown_calibration::revision::revision_of;
 use lookdown_http::page_headers;
-use lookdown_lens::revision::revision_of;
 
 use serde::Serialize;
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use lookdown_lens::calibration::CalibrationId;
+use lookdown_calibration::CalibrationId;
 
 use super::{
     CalibrationEntry, Calibrations, ChangeError, Reading, content::import, load::LoadedFile,

@@ -2,16 +2,14 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use lookdown_detect::parameters::DetectDefaults;
-use lookdown_lens::{
-    calibration::{
-        Calibration, CalibrationFile, CalibrationId, FormatError,
-        export::Target,
-        formats::FileCamera,
-        native::{NativeCalibration, NativeImage, NativeValue},
-    },
-    warning::Warning,
+use lookdown_calibration::warning::Warning;
+use lookdown_calibration::{
+    Calibration, CalibrationFile, CalibrationId, FormatError,
+    export::Target,
+    formats::FileCamera,
+    native::{NativeCalibration, NativeImage, NativeValue},
 };
+use lookdown_detect::parameters::DetectDefaults;
 
 use super::ChangeError;
 

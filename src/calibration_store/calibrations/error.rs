@@ -1,7 +1,7 @@
 //! Reasons for which a calibration cannot be used or was not changed, or for which the outcome is
 //! unknown.
 
-use lookdown_lens::calibration::{CalibrationId, FormatError};
+use lookdown_calibration::{CalibrationId, FormatError};
 
 use crate::calibration_store::StoreError;
 

@@ -12,7 +12,7 @@ use std::{
     time::Duration,
 };
 
-use lookdown_lens::calibration::{CalibrationId, FormatError};
+use lookdown_calibration::{CalibrationId, FormatError};
 
 use super::content::{Cameras, cameras};
 

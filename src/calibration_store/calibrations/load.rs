@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use lookdown_lens::calibration::CalibrationId;
+use lookdown_calibration::CalibrationId;
 
 use super::{
     content::CalibrationEntry,

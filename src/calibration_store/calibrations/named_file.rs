@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use lookdown_lens::calibration::CalibrationId;
+use lookdown_calibration::CalibrationId;
 
 use crate::calibration_store::ListedFile;
 

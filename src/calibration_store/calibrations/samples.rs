@@ -7,7 +7,7 @@ use std::{
     sync::{Arc, LazyLock},
 };
 
-use lookdown_lens::calibration::{CalibrationId, native::NativeCalibration};
+use lookdown_calibration::{CalibrationId, native::NativeCalibration};
 
 use super::{CalibrationEntry, Reading, content::import, named_file::written_name};
 use crate::samples::SAMPLES;

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use lookdown_lens::calibration::CalibrationFile;
+use lookdown_calibration::CalibrationFile;
 use parking_lot::MutexGuard;
 
 use super::{Calibrations, load::LoadedFile, named_file::by_id, snapshot::Snapshot};

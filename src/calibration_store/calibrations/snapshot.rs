@@ -5,8 +5,9 @@ use std::{
     sync::Arc,
 };
 
+use lookdown_calibration::CalibrationId;
+use lookdown_calibration::revision::revision_of;
 use lookdown_detect::metrics::{gauge_value, replace_info};
-use lookdown_lens::{calibration::CalibrationId, revision::revision_of};
 
 use super::{CalibrationEntry, load::LoadedFile, samples::sample};
 use crate::metrics::Metrics;

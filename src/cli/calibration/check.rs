@@ -9,16 +9,16 @@ use std::{
 
 use anyhow::{Context, bail};
 use clap::Args;
+use lookdown_calibration::{
+    AreaShare, Areas, Calibration, CameraGeometry,
+    native::{NativeSource, SourcedValue},
+};
 use lookdown_imaging::{
     MaskedPixels,
     annotate::{encode_jpeg, sketch_areas, sketch_foot_filter, sketch_lens, sketch_lines},
 };
-use lookdown_lens::{
-    calibration::{
-        AreaShare, Areas, Calibration, CameraGeometry,
-        native::{NativeSource, SourcedValue},
-    },
-    geometry::{Lens, Pixel, Ray, ViewPlan, VirtualView, ZoneArea, view_plan::Coverage},
+use lookdown_lens::geometry::{
+    Lens, Pixel, Ray, ViewPlan, VirtualView, ZoneArea, view_plan::Coverage,
 };
 
 use super::{

@@ -4,7 +4,7 @@ use std::{path::PathBuf, process::ExitCode};
 
 use anyhow::Context;
 use clap::Args;
-use lookdown_lens::calibration::export::Target;
+use lookdown_calibration::export::Target;
 
 use super::{native_output::write_content, source::Source};
 use crate::cli::parameters::one_of;

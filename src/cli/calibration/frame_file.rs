@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
+use lookdown_calibration::native::NativeImage;
 use lookdown_common::files::{self, MAX_IMAGE_BYTES};
 use lookdown_imaging::{
     Frame,
     decode::{DecodeLimits, decode},
 };
-use lookdown_lens::calibration::native::NativeImage;
 
 /// Decodes a frame from an image file.
 pub(super) fn read_frame(path: &Path) -> anyhow::Result<Frame> {

@@ -7,7 +7,7 @@ use std::{
 };
 
 use anyhow::{Context, ensure};
-use lookdown_lens::calibration::{export::Target, native::NativeCalibration};
+use lookdown_calibration::{export::Target, native::NativeCalibration};
 
 use crate::cli::output::UNWRITABLE;
 

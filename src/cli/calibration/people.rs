@@ -3,16 +3,16 @@
 use std::{path::PathBuf, sync::Arc};
 
 use anyhow::Context;
+use lookdown_calibration::{
+    Calibration,
+    native::{NativeCalibration, SourcedValue},
+};
 use lookdown_detect::{
     parameters::DetectParameters,
     pipeline::{DetectJob, JobImage},
 };
 use lookdown_imaging::Frame;
 use lookdown_lens::{
-    calibration::{
-        Calibration,
-        native::{NativeCalibration, SourcedValue},
-    },
     geometry::OrientedBox,
     self_calibration::{CameraHeight, LevelFromPeople},
 };

@@ -10,8 +10,8 @@ use std::{
 use anyhow::{Context, bail};
 use clap::Args;
 use jiff::Timestamp;
+use lookdown_calibration::native::{NativeSource, SourcedValue};
 use lookdown_common::{ServerClient, read_body};
-use lookdown_lens::calibration::native::{NativeSource, SourcedValue};
 use lookdown_tracking::{RelativePose, Walk, relative_pose};
 use serde::Deserialize;
 use serde_json::json;

@@ -6,15 +6,13 @@ use std::{
 };
 
 use anyhow::{Context, anyhow, bail};
+use lookdown_calibration::Calibration;
 use lookdown_common::{
     files::{self, Links},
     report::{MAX_REPORT_BYTES, Report, ReportOrientedBox},
 };
 use lookdown_detect::parameters::DetectParameters;
-use lookdown_lens::{
-    calibration::Calibration,
-    geometry::{OrientedBox, Pixel, oriented_box::vertical_in_frame},
-};
+use lookdown_lens::geometry::{OrientedBox, Pixel, oriented_box::vertical_in_frame};
 
 /// Reads the people of all reports of a file, in pixels of the calibration. Persons below the
 /// score threshold are left out: counts use reports with a very low one.

@@ -4,14 +4,12 @@ use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use clap::Args;
-use lookdown_lens::{
-    calibration::{
-        Calibration, CalibrationFile, CalibrationId, FormatError,
-        formats::{FileCamera, Format},
-        native::{NativeCalibration, NativeImage},
-        read_content,
-    },
-    warning::Warning,
+use lookdown_calibration::warning::Warning;
+use lookdown_calibration::{
+    Calibration, CalibrationFile, CalibrationId, FormatError,
+    formats::{FileCamera, Format},
+    native::{NativeCalibration, NativeImage},
+    read_content,
 };
 
 use crate::calibration_store::defaults;

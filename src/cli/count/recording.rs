@@ -15,12 +15,12 @@ use anyhow::{Context, bail};
 use bytes::Bytes;
 use clap::Args;
 use jiff::Timestamp;
+use lookdown_calibration::{Calibration, CalibrationId};
 use lookdown_count::Recording;
 use lookdown_detect::{
     parameters::DetectParameters,
     pipeline::{CalibrationLookup, DetectJob, DetectedFrame, Engine, JobImage},
 };
-use lookdown_lens::calibration::{Calibration, CalibrationId};
 use lookdown_watch::{VideoFrames, VideoOptions, VideoWriter, video_created_at, video_duration};
 use tokio::runtime::Runtime;
 

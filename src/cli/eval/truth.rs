@@ -7,9 +7,9 @@ use std::{
 
 use anyhow::Context;
 use clap::Args;
+use lookdown_calibration::{Calibration, CalibrationId};
 use lookdown_detect::pipeline::CalibrationLookup;
 use lookdown_eval::{DataSet, Scoring};
-use lookdown_lens::calibration::{Calibration, CalibrationId};
 
 use crate::{app::open_calibrations, cli::SettingsFile};
 

@@ -11,11 +11,11 @@ use std::{
 };
 
 use lookdown::settings::explain;
+use lookdown_calibration::revision::sha256_of;
 use lookdown_detect::{
     inference::{InferenceError, ModelFolder, ModelRepository, RepositoryError, RepositoryOptions},
     metrics::DetectMetrics,
 };
-use lookdown_lens::revision::sha256_of;
 use tempfile::TempDir;
 
 use crate::models::folder::{fixture, model_of_two_sessions, write};

@@ -7,13 +7,13 @@ use lookdown::{
     app::engine_for,
     settings,
 };
+use lookdown_calibration::Calibration;
 use lookdown_detect::{
     detection::{BBox, FramePixels},
     inference::is_fetched,
     parameters::DetectParameters,
     pipeline::{DetectJob, DetectionReport, JobImage},
 };
-use lookdown_lens::calibration::Calibration;
 use serde_json::Value;
 
 use crate::models::folder::of_repository;

@@ -1,6 +1,7 @@
 //! Files with the parameters of a camera in `fixtures/vectors` project to its known answers.
 
-use lookdown_lens::{calibration::CalibrationFile, geometry::Pixel};
+use lookdown_calibration::CalibrationFile;
+use lookdown_lens::geometry::Pixel;
 use serde_json::Value;
 
 use crate::calibration_formats::{camera, fixture, json, lens, ray};

@@ -8,7 +8,7 @@
 
 use std::{collections::BTreeMap, env, fs, thread, time::Duration};
 
-use lookdown_lens::calibration::CalibrationFile;
+use lookdown_calibration::CalibrationFile;
 use rustix::time::{ClockId, clock_gettime};
 
 /// The factor between the two sizes of a file.

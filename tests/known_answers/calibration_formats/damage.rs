@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use lookdown::calibration_store::{Calibrations, FolderStore, Reading, WriteCondition};
-use lookdown_lens::calibration::CalibrationFile;
+use lookdown_calibration::CalibrationFile;
 use proptest::prelude::*;
 
 use crate::calibration_formats::refusal;

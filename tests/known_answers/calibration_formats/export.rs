@@ -3,10 +3,8 @@
 
 use std::f64::consts::TAU;
 
-use lookdown_lens::{
-    calibration::{CalibrationFile, export::Target, native::NativeCalibration},
-    geometry::{Lens, Ray},
-};
+use lookdown_calibration::{CalibrationFile, export::Target, native::NativeCalibration};
+use lookdown_lens::geometry::{Lens, Ray};
 use strum::VariantArray;
 
 use crate::calibration_formats::{camera, fixture, lens};

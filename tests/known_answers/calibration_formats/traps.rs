@@ -1,6 +1,7 @@
 //! Details of calibration formats that are easily misread.
 
-use lookdown_lens::{calibration::CalibrationFile, geometry::lens::LensModel};
+use lookdown_calibration::CalibrationFile;
+use lookdown_lens::geometry::lens::LensModel;
 
 use crate::calibration_formats::{camera, fixture, refusal};
 

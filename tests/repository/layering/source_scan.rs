@@ -7,9 +7,10 @@ use std::{
 };
 
 /// The crates of the workspace with the folders of their sources.
-pub const CRATES: [(&str, &str); 13] = [
+pub const CRATES: [(&str, &str); 14] = [
     ("lookdown-common", "crates/lookdown-common/src"),
     ("lookdown-lens", "crates/lookdown-lens/src"),
+    ("lookdown-calibration", "crates/lookdown-calibration/src"),
     ("lookdown-imaging", "crates/lookdown-imaging/src"),
     ("lookdown-tracking", "crates/lookdown-tracking/src"),
     ("lookdown-detect", "crates/lookdown-detect/src"),

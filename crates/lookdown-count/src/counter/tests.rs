@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use lookdown_lens::calibration::CalibrationFile;
+use lookdown_calibration::CalibrationFile;
 
 use super::*;
 use crate::report::other_fields::OF_REPORT;

@@ -3,7 +3,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use lookdown_lens::calibration::CalibrationFile;
+use lookdown_calibration::CalibrationFile;
 
 use super::*;
 

@@ -8,7 +8,7 @@ mod provider;
 
 use std::{num::NonZeroUsize, path::Path};
 
-use lookdown_lens::revision::{revision_of, sha256_of};
+use lookdown_calibration::revision::{revision_of, sha256_of};
 use ort::{session::Session, value::TensorRef};
 
 use super::{

@@ -5,8 +5,8 @@
 use std::time::Duration;
 
 use jiff::Timestamp;
+use lookdown_calibration::CalibrationId;
 use lookdown_common::text::MAX_CAMERA_CHARS;
-use lookdown_lens::calibration::CalibrationId;
 use strum::VariantNames;
 
 use super::{

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use lookdown_lens::calibration::{Calibration, CalibrationId};
+use lookdown_calibration::{Calibration, CalibrationId};
 
 /// Calibrations by their IDs. A lookup does not block.
 pub trait CalibrationLookup: Send + Sync {

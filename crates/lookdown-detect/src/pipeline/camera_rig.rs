@@ -2,13 +2,11 @@
 //!
 //! A rig is immutable. All frames of a camera share the rig of a view plan.
 
-use lookdown_lens::{
-    calibration::CameraGeometry,
-    geometry::{
-        BackProjection, Footprint, FrameCrop, Pixel, ViewPlan, VirtualView,
-        crop_placement::CropTarget,
-        pixels::{PixelConvention, cross_half_pixel},
-    },
+use lookdown_calibration::CameraGeometry;
+use lookdown_lens::geometry::{
+    BackProjection, Footprint, FrameCrop, Pixel, ViewPlan, VirtualView,
+    crop_placement::CropTarget,
+    pixels::{PixelConvention, cross_half_pixel},
 };
 
 use super::{

@@ -16,7 +16,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use lookdown_lens::warning::{Warning, WarningCode};
+use lookdown_calibration::warning::{Warning, WarningCode};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use strum::VariantNames as _;
 

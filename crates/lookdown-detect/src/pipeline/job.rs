@@ -4,7 +4,8 @@ use std::{sync::Arc, time::Instant};
 
 use bytes::Bytes;
 use jiff::Timestamp;
-use lookdown_lens::{calibration::Calibration, geometry::Pixel};
+use lookdown_calibration::Calibration;
+use lookdown_lens::geometry::Pixel;
 use tokio_util::sync::CancellationToken;
 
 use super::{DetectionReport, Person, Ticket, camera_rig::CameraRig};

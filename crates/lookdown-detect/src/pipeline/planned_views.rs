@@ -1,13 +1,11 @@
 //! The view plan of a camera, without a frame of it.
 
-use lookdown_lens::{
-    calibration::Calibration,
-    geometry::{
-        Lens, Pixel, Polygon, VirtualView,
-        foot_filter::AreaReach,
-        pixels::{PixelConvention, cross_half_pixel},
-        view_plan::Coverage,
-    },
+use lookdown_calibration::Calibration;
+use lookdown_lens::geometry::{
+    Lens, Pixel, Polygon, VirtualView,
+    foot_filter::AreaReach,
+    pixels::{PixelConvention, cross_half_pixel},
+    view_plan::Coverage,
 };
 
 use super::{Engine, PipelineError, outline::view_outline};

@@ -3,12 +3,10 @@
 use std::time::Duration;
 
 use jiff::Timestamp;
-use lookdown_lens::{
-    geometry::{
-        OrientedBox, PersonHeight, Pixel, Zone,
-        floor::{Bearing, FloorPosition},
-    },
-    warning::Warning,
+use lookdown_calibration::warning::Warning;
+use lookdown_lens::geometry::{
+    OrientedBox, PersonHeight, Pixel, Zone,
+    floor::{Bearing, FloorPosition},
 };
 
 use crate::{

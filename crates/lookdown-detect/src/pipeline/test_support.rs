@@ -9,7 +9,7 @@ use std::{
 
 use bytes::Bytes;
 use jiff::Timestamp;
-use lookdown_lens::calibration::{Calibration, CalibrationFile, CalibrationId};
+use lookdown_calibration::{Calibration, CalibrationFile, CalibrationId};
 
 use super::{
     BatchOptions, CalibrationLookup, DetectJob, Engine, EngineOptions, JobImage, Ticket,

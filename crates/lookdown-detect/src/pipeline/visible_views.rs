@@ -2,10 +2,8 @@
 
 use std::sync::Arc;
 
-use lookdown_lens::{
-    calibration::CameraGeometry,
-    geometry::{Pixel, foot_filter::AreaReach},
-};
+use lookdown_calibration::CameraGeometry;
+use lookdown_lens::geometry::{Pixel, foot_filter::AreaReach};
 
 use lookdown_imaging::{MaskedPixels, RemapTable};
 

@@ -11,8 +11,8 @@ use std::{
     sync::Arc,
 };
 
+use lookdown_calibration::{Calibration, CalibrationError, CalibrationId};
 use lookdown_detect::detection::BBox;
-use lookdown_lens::calibration::{Calibration, CalibrationError, CalibrationId};
 use serde::Deserialize;
 
 use super::{DataSet, DataSetError, DataSetImage, ImageFileIndex, ImageId, text::read_text};

@@ -2,13 +2,11 @@
 
 use std::{path::PathBuf, sync::Arc};
 
+use lookdown_calibration::Calibration;
 use lookdown_detect::detection::{BBox, FramePixels};
-use lookdown_lens::{
-    calibration::Calibration,
-    geometry::{
-        Lens, OrientedBox, Pixel,
-        pixels::{PixelConvention, cross_half_pixel},
-    },
+use lookdown_lens::geometry::{
+    Lens, OrientedBox, Pixel,
+    pixels::{PixelConvention, cross_half_pixel},
 };
 
 use super::{ImageId, ScoringMismatch};

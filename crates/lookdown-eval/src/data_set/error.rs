@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use lookdown_lens::calibration::CalibrationError;
+use lookdown_calibration::CalibrationError;
 
 use crate::Scoring;
 

@@ -5,8 +5,8 @@ use std::{
     sync::Arc,
 };
 
+use lookdown_calibration::Calibration;
 use lookdown_detect::detection::BBox;
-use lookdown_lens::calibration::Calibration;
 
 use super::{
     test_support::{boxes, folder, open, refusal},

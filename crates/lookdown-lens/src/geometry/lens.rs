@@ -12,6 +12,7 @@ use std::f64::consts::PI;
 mod check;
 mod continuation;
 mod curve;
+mod deserialize;
 mod distortion;
 mod error;
 mod image_plane;

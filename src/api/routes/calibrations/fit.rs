@@ -6,17 +6,15 @@ use axum::{
     response::IntoResponse,
 };
 use bytes::Bytes;
+use lookdown_calibration::{
+    CalibrationId,
+    native::{NativeCalibration, NativeImage},
+};
 use lookdown_imaging::{
     decode::{DecodeLimits, decode},
     room_fit::{RoomFrame, fit_room},
 };
-use lookdown_lens::{
-    calibration::{
-        CalibrationId,
-        native::{NativeCalibration, NativeImage},
-    },
-    self_calibration::KnownCamera,
-};
+use lookdown_lens::self_calibration::KnownCamera;
 use serde::Serialize;
 use tokio_util::sync::CancellationToken;
 use utoipa::ToSchema;

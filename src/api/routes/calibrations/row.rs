@@ -1,7 +1,7 @@
 //! A calibration in the list of calibrations.
 
+use lookdown_calibration::AreaShare;
 use lookdown_common::report::ReportWarning;
-use lookdown_lens::calibration::AreaShare;
 use serde::Serialize;
 use utoipa::ToSchema;
 

@@ -5,7 +5,7 @@ use axum::{
     http::Uri,
 };
 use bytes::Bytes;
-use lookdown_lens::calibration::{CalibrationFile, native::NotAFrameSize};
+use lookdown_calibration::{CalibrationFile, native::NotAFrameSize};
 
 use crate::{
     api::{

@@ -7,11 +7,11 @@ use axum::{
     http::{Uri, header::CONTENT_TYPE},
     response::{IntoResponse, Response},
 };
+use lookdown_calibration::Calibration;
 use lookdown_detect::{
     parameters::{Profile, parse_profile, whole_number},
     pipeline::{Engine, PlannedView, PlannedViews},
 };
-use lookdown_lens::calibration::Calibration;
 use serde::Serialize;
 use utoipa::{IntoParams, ToSchema};
 

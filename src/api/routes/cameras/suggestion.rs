@@ -6,10 +6,8 @@ use axum::{
     http::header::CACHE_CONTROL,
     response::IntoResponse,
 };
-use lookdown_lens::{
-    calibration::native::NativeCalibration,
-    self_calibration::{CameraHeight, FitRefusal, HeightRefusal},
-};
+use lookdown_calibration::native::NativeCalibration;
+use lookdown_lens::self_calibration::{CameraHeight, FitRefusal, HeightRefusal};
 use serde::Serialize;
 use utoipa::ToSchema;
 

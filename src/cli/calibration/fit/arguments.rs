@@ -4,10 +4,8 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
-use lookdown_lens::{
-    calibration::CalibrationId,
-    self_calibration::{FieldOfView, IdealLens, KnownCamera},
-};
+use lookdown_calibration::CalibrationId;
+use lookdown_lens::self_calibration::{FieldOfView, IdealLens, KnownCamera};
 
 use crate::{
     cli::{parameters::one_of, settings_file::SettingsFile},

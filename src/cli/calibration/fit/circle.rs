@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 
 use anyhow::Context;
+use lookdown_calibration::native::{NativeCalibration, NativeImage, NativeSource, SourcedValue};
 use lookdown_imaging::{
     Frame,
     lens_circle::{AgreedCircle, agreed_circle, find_lens_circle},
 };
 use lookdown_lens::{
-    calibration::native::{NativeCalibration, NativeImage, NativeSource, SourcedValue},
     geometry::{Lens, Ray},
     self_calibration::{FieldOfView, IdealLens},
 };

@@ -2,7 +2,7 @@
 //! replace.
 
 use anyhow::{Context, bail};
-use lookdown_lens::calibration::{
+use lookdown_calibration::{
     formats::Format,
     native::{NativeCalibration, NativeImage, NativeMount, SourcedValue, ValueSource},
 };

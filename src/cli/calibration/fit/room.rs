@@ -3,14 +3,12 @@
 use std::{collections::BTreeMap, fs};
 
 use anyhow::Context;
+use lookdown_calibration::native::{NativeCalibration, NativeImage, NativeSource, SourcedValue};
 use lookdown_imaging::{
     Frame,
     room_fit::{RoomFrame, fit_room},
 };
-use lookdown_lens::{
-    calibration::native::{NativeCalibration, NativeImage, NativeSource, SourcedValue},
-    self_calibration::RoomFit,
-};
+use lookdown_lens::self_calibration::RoomFit;
 
 use super::arguments::Arguments;
 use crate::room_calibration::{checked, preview, room_calibration, tilt_deg};

@@ -1,7 +1,7 @@
 //! Metadata of a model on a server.
 
+use lookdown_calibration::revision::revision_of;
 use lookdown_common::text::{Quoted, one_line};
-use lookdown_lens::revision::revision_of;
 use serde::Deserialize;
 
 use super::server::{RemoteServer, refusal};

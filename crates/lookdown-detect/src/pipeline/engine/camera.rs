@@ -2,11 +2,9 @@
 
 use std::{f64::consts::FRAC_PI_2, sync::Arc};
 
-use lookdown_lens::{
-    calibration::{Areas, Calibration, CalibrationId, CameraGeometry},
-    geometry::{Lens, Mount},
-    warning::{Warning, WarningCode},
-};
+use lookdown_calibration::warning::{Warning, WarningCode};
+use lookdown_calibration::{Areas, Calibration, CalibrationId, CameraGeometry};
+use lookdown_lens::geometry::{Lens, Mount};
 
 use super::Engine;
 use crate::{

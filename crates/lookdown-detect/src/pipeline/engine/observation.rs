@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use lookdown_lens::warning::Warning;
+use lookdown_calibration::warning::Warning;
 
 use super::camera::FrameCamera;
 use crate::{

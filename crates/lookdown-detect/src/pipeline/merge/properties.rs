@@ -2,10 +2,8 @@
 
 use std::sync::{Arc, LazyLock};
 
-use lookdown_lens::{
-    calibration::{Areas, CameraGeometry},
-    geometry::{Lens, Mount},
-};
+use lookdown_calibration::{Areas, CameraGeometry};
+use lookdown_lens::geometry::{Lens, Mount};
 use proptest::prelude::*;
 use strum::VariantArray;
 

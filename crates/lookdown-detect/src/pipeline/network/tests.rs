@@ -3,10 +3,8 @@ use std::{
     time::Duration,
 };
 
-use lookdown_lens::{
-    calibration::{Areas, CameraGeometry},
-    geometry::{Lens, Mount, ViewPlan, view_plan::Ring},
-};
+use lookdown_calibration::{Areas, CameraGeometry};
+use lookdown_lens::geometry::{Lens, Mount, ViewPlan, view_plan::Ring};
 
 use super::*;
 use crate::{

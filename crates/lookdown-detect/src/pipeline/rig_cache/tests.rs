@@ -1,7 +1,5 @@
-use lookdown_lens::{
-    calibration::{Areas, CameraGeometry},
-    geometry::{Lens, Mount, ViewPlan},
-};
+use lookdown_calibration::{Areas, CameraGeometry};
+use lookdown_lens::geometry::{Lens, Mount, ViewPlan};
 use strum::VariantArray;
 
 use super::*;

@@ -1,0 +1,71 @@
+//! Basalt: `value0.intrinsics[]` with a `camera_type` each and `value0.resolution[]`
+//! (<https://gitlab.com/VladyslavUsenko/basalt-headers>, `calibration.hpp`).
+
+use serde_json::Value;
+
+use super::{
+    Camera, FileCamera, FormatError,
+    distortion::not_a_fisheye,
+    fields::{Fields, whole_pixels},
+    named_parameters::{self, NamedModel, pinhole},
+};
+use crate::native::NativeImage;
+use lookdown_lens::geometry::lens::Rectilinear;
+
+pub(super) fn read(fields: &Fields<'_>) -> Result<Vec<FileCamera>, FormatError> {
+    let calibration = fields.child("value0")?;
+    let count = calibration
+        .get("intrinsics")?
+        .as_array()
+        .map_or(0, Vec::len);
+    Ok((0..count)
+        .map(|index| FileCamera {
+            name: Some(format!("cam{index}")),
+            camera: read_camera(&calibration, index),
+        })
+        .collect())
+}
+
+fn read_camera(calibration: &Fields<'_>, index: usize) -> Result<Camera, FormatError> {
+    let camera = calibration.entry("intrinsics", index)?;
+    let parameters = camera.child("intrinsics")?;
+    let model = match camera.text("camera_type")? {
+        "ds" => NamedModel::DoubleSphere,
+        "eucm" => NamedModel::Eucm,
+        "ucm" => NamedModel::Ucm,
+        "kb4" => NamedModel::KannalaBrandt,
+        "pinhole" => {
+            let lens = Rectilinear::new(pinhole(&parameters)?);
+            return Ok(Camera::new(Some(image(calibration, index)?), lens));
+        }
+        other @ "pinhole-radtan8" => {
+            return Err(camera.invalid("camera_type", not_a_fisheye(other)));
+        }
+        other => {
+            return Err(camera.invalid(
+                "camera_type",
+                format!("it is {other:?}: ds, eucm, ucm, kb4 and pinhole are read"),
+            ));
+        }
+    };
+    let lens = named_parameters::read(model, &parameters)?;
+    Ok(Camera::new(Some(image(calibration, index)?), lens))
+}
+
+fn image(calibration: &Fields<'_>, index: usize) -> Result<NativeImage, FormatError> {
+    let resolution = calibration.get("resolution")?.get(index);
+    let sides: Vec<_> = resolution
+        .and_then(Value::as_array)
+        .into_iter()
+        .flatten()
+        .filter_map(Value::as_f64)
+        .filter_map(whole_pixels)
+        .collect();
+    match sides[..] {
+        [width, height] => Ok(NativeImage { width, height }),
+        _ => Err(calibration.invalid(
+            &format!("resolution[{index}]"),
+            "width and height in whole pixels are needed",
+        )),
+    }
+}

@@ -1,0 +1,35 @@
+//! `WoodScape`: `intrinsic` with the radius in pixels as a polynomial of the angle
+//! (<https://github.com/valeoai/WoodScape>, `scripts/calibration`).
+//!
+//! The principal point is an offset from the center of the image, which lies half a pixel before
+//! `width / 2` because pixel centers are whole numbers.
+
+use super::{Camera, FormatError, fields::Fields};
+use lookdown_lens::geometry::lens::RadialPolynomial;
+
+pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
+    let intrinsic = fields.child("intrinsic")?;
+    if intrinsic.has("model") && intrinsic.text("model")? != "radial_poly" {
+        return Err(intrinsic.invalid(
+            "model",
+            format!("it is {:?}: radial_poly is read", intrinsic.text("model")?),
+        ));
+    }
+    let image = intrinsic.image("width", "height")?;
+    let center = |side: u32| f64::from(side) / 2.0 - 0.5;
+    let coefficients = vec![
+        0.0,
+        intrinsic.number("k1")?,
+        intrinsic.number("k2")?,
+        intrinsic.number("k3")?,
+        intrinsic.number("k4")?,
+    ];
+    let aspect = intrinsic.number_or("aspect_ratio", 1.0)?;
+    let cx = intrinsic.number("cx_offset")? + center(image.width);
+    let cy = intrinsic.number("cy_offset")? + center(image.height);
+    let lens = RadialPolynomial {
+        aspect,
+        ..RadialPolynomial::new(coefficients, [cx, cy])
+    };
+    Ok(Camera::new(Some(image), lens))
+}

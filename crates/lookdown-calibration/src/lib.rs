@@ -1,0 +1,22 @@
+#![doc = include_str!("../README.md")]
+
+mod areas;
+mod calibrated_camera;
+mod error;
+pub mod export;
+mod file;
+pub mod formats;
+mod id;
+pub mod native;
+mod plausibility;
+pub mod revision;
+mod site;
+pub mod warning;
+mod warnings;
+
+pub use areas::{AreaShare, Areas};
+pub use calibrated_camera::{Calibration, CameraGeometry, FrameSizeMismatch};
+pub use error::CalibrationError;
+pub use file::{content as read_content, read_camera};
+pub use formats::{CalibrationFile, FormatError};
+pub use id::CalibrationId;
