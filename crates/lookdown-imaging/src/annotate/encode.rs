@@ -34,7 +34,7 @@ impl EncodeError {
     }
 }
 
-/// A frame as the encoder reads it. Its own function for bytes compiles an encoder for each of eleven
+/// A frame as the encoder reads it. The encoder's function for bytes is compiled for each of eleven
 /// types of pixels.
 struct Rows<'a> {
     frame: &'a Frame,
