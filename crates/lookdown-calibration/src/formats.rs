@@ -3,6 +3,7 @@
 //!
 //! Each reader documents its format and the usual mistakes; `docs/calibrate.md` has the table.
 
+mod alicevision;
 mod basalt;
 mod camera_file;
 mod camera_intrinsic_model;
@@ -11,24 +12,31 @@ mod camodocal;
 mod claimed_field;
 mod colmap;
 mod column_first;
+mod depthai;
 mod distortion;
 mod document;
 mod error;
 mod fields;
 mod fisheye_calib_adapter;
+mod foreign;
 mod format;
+mod gyroflow;
 mod kalibr;
+mod matlab;
 mod moil;
 mod multicol;
 mod named_parameters;
 mod native_file;
+mod nerfstudio;
 mod nvidia;
 mod ocam;
 mod opencv;
 mod opencv_xml;
+mod opensfm;
 mod py_ocamcalib;
 mod recognize;
 mod ros;
+mod slam;
 mod woodscape;
 
 pub use camera_file::{CalibrationFile, Camera, FileCamera};
@@ -37,7 +45,7 @@ pub use format::Format;
 
 use self::{
     camera_file::alone,
-    document::Document,
+    document::{Document, Syntax},
     fields::Fields,
     recognize::{recognize_lines, recognize_tree},
 };
@@ -53,21 +61,16 @@ impl CalibrationFile {
     /// [`FormatError`] when the content is in no format that is read, or not whole.
     pub fn parse(content: &[u8]) -> Result<Self, FormatError> {
         let (text, syntax) = document::text_of(content)?;
-        let document = document::parse(text, syntax)?;
-        let file = match &document {
-            Document::Lines(text) => read_lines(text)?,
-            Document::Tree(tree) => {
-                let fields = Fields::of(tree)?;
-                match recognize_tree(&fields) {
-                    Some(Format::Native) => native_file::read(&fields, text, syntax)?,
-                    Some(format) => Self {
-                        format,
-                        cameras: read_tree(format, &fields)?,
-                    },
-                    None => return Err(unrecognized()),
-                }
+        let documents = document::documents(text, syntax);
+        let file = read_document(documents[0], syntax)?;
+        // Messages are printed one after the other; the first one stands for all.
+        for text in &documents[1..] {
+            if read_document(text, syntax).map(|another| another.format) != Ok(file.format) {
+                return Err(FormatError::malformed(
+                    "it has several YAML documents of different kinds: keep that of the camera",
+                ));
             }
-        };
+        }
         match file.cameras.len() {
             0 => Err(FormatError::invalid("cameras", "the file holds none")),
             1..=MAX_CAMERAS => Ok(file),
@@ -99,11 +102,28 @@ impl CalibrationFile {
     }
 }
 
+/// Reads one document.
+fn read_document(text: &str, syntax: Syntax) -> Result<CalibrationFile, FormatError> {
+    let document = document::parse(text, syntax);
+    let tree = match document.map_err(|error| foreign::text(text, None, error))? {
+        Document::Lines(text) => return read_lines(text),
+        Document::Tree(tree) => tree,
+    };
+    let explained = |error| foreign::text(text, Some(&tree), error);
+    let fields = Fields::of(&tree).map_err(explained)?;
+    let format = recognize_tree(&fields).ok_or_else(|| explained(unrecognized()))?;
+    if format == Format::Native {
+        return native_file::read(&fields, text, syntax);
+    }
+    let cameras = read_tree(format, &fields)?;
+    Ok(CalibrationFile { format, cameras })
+}
+
 fn unrecognized() -> FormatError {
     FormatError::malformed(
         "its fields are those of no format that is read (the native one, Kalibr, OpenCV, ROS, \
-         OCamCalib, py-OCamCalib, COLMAP, camodocal, Basalt, WoodScape, NVIDIA f-theta, MOIL and a \
-         few more)",
+         OCamCalib, py-OCamCalib, COLMAP, camodocal, Basalt, WoodScape, NVIDIA f-theta, MOIL, \
+         ORB-SLAM, OpenVSLAM, nerfstudio, gyroflow, DepthAI, OpenSfM, MATLAB and a few more)",
     )
 }
 
@@ -120,7 +140,7 @@ fn read_lines(text: &str) -> Result<CalibrationFile, FormatError> {
 fn read_tree(format: Format, fields: &Fields<'_>) -> Result<Vec<FileCamera>, FormatError> {
     Ok(match format {
         Format::Kalibr => kalibr::read(fields),
-        Format::OpenCv => alone(opencv::read(fields)),
+        Format::OpenCv => opencv::read(fields),
         Format::Ros => alone(ros::read(fields)),
         Format::PyOCamCalib => alone(py_ocamcalib::read(fields)),
         Format::Camodocal => alone(camodocal::read(fields)),
@@ -130,6 +150,13 @@ fn read_tree(format: Format, fields: &Fields<'_>) -> Result<Vec<FileCamera>, For
         Format::Moil => moil::read(fields),
         Format::FisheyeCalibAdapter => alone(fisheye_calib_adapter::read(fields)),
         Format::CameraIntrinsicModel => alone(camera_intrinsic_model::read(fields)),
+        Format::Slam => slam::read(fields),
+        Format::Nerfstudio => nerfstudio::read(fields),
+        Format::Gyroflow => alone(gyroflow::read(fields)),
+        Format::DepthAi => depthai::read(fields)?,
+        Format::OpenSfm => opensfm::read(fields),
+        Format::Matlab => alone(matlab::read(fields)),
+        Format::AliceVision => alicevision::read(fields),
         Format::Native | Format::OCamCalib | Format::MultiCol | Format::Colmap => Vec::new(),
     })
 }

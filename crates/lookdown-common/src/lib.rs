@@ -18,6 +18,7 @@ mod http_client;
 mod http_transport;
 #[cfg(feature = "companion")]
 mod in_process;
+mod jpeg;
 mod log_once;
 #[cfg(feature = "metrics")]
 pub mod metrics;
@@ -35,6 +36,7 @@ mod server_entry;
 mod stored_file;
 pub mod text;
 
+pub use jpeg::{JPEG_END, JPEG_START, jpeg_length};
 pub use log_once::LogOnce;
 pub use own_cameras::{Claim, OwnCameras, Place, makes_room};
 pub use replacement::{Replacement, UNFINISHED, replace_file, sync_folder};
@@ -52,6 +54,3 @@ pub use {
     secret::Secret,
     server_entry::{ServerEntry, ServerOptions},
 };
-
-/// The first bytes of a JPEG file.
-pub const JPEG_START: &[u8] = &[0xff, 0xd8, 0xff];

@@ -14,6 +14,8 @@ use image::error::{LimitError, LimitErrorKind};
 use image::metadata::Orientation;
 use image::{ColorType, DynamicImage, ImageDecoder, ImageError, ImageFormat, Limits, RgbImage};
 
+use lookdown_common::{JPEG_END, jpeg_length};
+
 use super::{buffer_pool, frame::Frame};
 pub use error::{DecodeError, ExceededLimit};
 use jpeg_head::JpegHead;
@@ -139,8 +141,12 @@ fn decode_jpeg(bytes: &[u8], limits: &DecodeLimits) -> Result<DecodedFrame, Deco
     let bytes = &*head.with_huffman_tables(bytes);
     let decoder = JpegDecoder::new(Cursor::new(bytes)).map_err(|e| task.refusal(e))?;
     limits.check(decoder.dimensions())?;
-    task.require(container::jpeg_is_whole(bytes), "the file ends early")?;
-    task.read(decoder)
+    let length = jpeg_length(bytes).ok_or_else(|| task.corrupt("the file ends early"))?;
+    if bytes[..length].ends_with(JPEG_END) {
+        return task.read(decoder);
+    }
+    let ended = [&bytes[..length], JPEG_END].concat();
+    task.read(JpegDecoder::new(Cursor::new(&*ended)).map_err(|e| task.refusal(e))?)
 }
 
 fn decode_png(bytes: &[u8], limits: &DecodeLimits) -> Result<DecodedFrame, DecodeError> {

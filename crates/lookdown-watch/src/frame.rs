@@ -4,15 +4,13 @@ use std::time::Instant;
 
 use bytes::Bytes;
 use jiff::Timestamp;
-use lookdown_common::JPEG_START;
+use lookdown_common::{JPEG_END, JPEG_START, jpeg_length};
 
 use crate::memory_budget::Reservation;
 
 /// Largest frame in bytes: an uncompressed-looking JPEG of 50 megapixels fits.
 pub const MAX_FRAME_BYTES: usize = 32 << 20;
 
-/// Last bytes of a JPEG.
-const JPEG_END: &[u8] = &[0xff, 0xd9];
 /// First bytes of a PNG.
 const PNG_START: &[u8] = b"\x89PNG\r\n\x1a\n";
 /// Last bytes of a PNG.
@@ -99,7 +97,8 @@ fn format_of(image: &[u8]) -> Result<ImageFormat, FrameError> {
         }
     };
     if image.starts_with(JPEG_START) {
-        whole(ImageFormat::Jpeg, trimmed.ends_with(JPEG_END))
+        let is_whole = trimmed.ends_with(JPEG_END) || jpeg_length(image).is_some();
+        whole(ImageFormat::Jpeg, is_whole)
     } else if image.starts_with(PNG_START) {
         whole(ImageFormat::Png, trimmed.ends_with(PNG_END))
     } else if image.starts_with(b"RIFF") && image.get(8..12) == Some(b"WEBP") {

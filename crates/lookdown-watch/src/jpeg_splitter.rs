@@ -4,7 +4,7 @@
 //! are skipped up to the start of the next file.
 
 use bytes::{Bytes, BytesMut};
-use lookdown_common::JPEG_START;
+use lookdown_common::{JPEG_START, jpeg_length};
 
 /// Bytes that are read at once.
 const CHUNK_BYTES: usize = 64 << 10;
@@ -131,7 +131,9 @@ impl JpegSplitter {
                 self.parsed += 2;
                 return Step::Whole;
             }
-            // The start of another file, or a byte that is not a marker.
+            // The start of another file: some cameras leave out the end marker.
+            0xd8 if jpeg_length(&self.buffer[..self.parsed]).is_some() => return Step::Whole,
+            // A byte that is not a marker, or another file after a damaged one.
             0xd8 | 0x00 => self.skip(self.parsed),
             // Markers without a segment.
             0x01 | 0xd0..=0xd7 => self.parsed += 2,

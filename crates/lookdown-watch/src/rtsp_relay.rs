@@ -30,6 +30,8 @@ const PORTS: (u16, u16) = (554, 322);
 const CHUNK_BYTES: usize = 64 << 10;
 /// Longest time for the first request of a connection to the relay.
 const FIRST_REQUEST: Duration = Duration::from_secs(5);
+/// Longest time for another connection to the camera.
+const RECONNECT: Duration = Duration::from_secs(5);
 /// Pause after the system has refused a connection, for example for lack of file descriptors.
 const PAUSE: Duration = Duration::from_millis(100);
 /// Random bytes of the token in the URL of the relay.
@@ -45,7 +47,8 @@ pub(crate) struct Relay {
     peer: IpAddr,
     listener: TcpListener,
     inner: String,
-    outer: String,
+    /// The URL of the camera without credentials.
+    url: Url,
 }
 
 impl Relay {
@@ -76,7 +79,7 @@ impl Relay {
             peer,
             listener,
             inner,
-            outer: url.as_str().to_owned(),
+            url: url.clone(),
         })
     }
 
@@ -93,15 +96,17 @@ impl Relay {
             peer,
             listener,
             inner,
-            outer,
+            url,
         } = self;
         let (mut ffmpeg, mut from_ffmpeg) = accept(&listener, &inner).await;
         drop(listener);
-        let mut exchange = Exchange::new(inner, outer, peer, login);
+        let mut exchange = Exchange::new(inner, url.as_str().to_owned(), peer, login);
         let mut from_camera = BytesMut::new();
+        let mut to_camera = BytesMut::new();
+        let mut reconnected = false;
         let relay = async {
             loop {
-                let (mut to_camera, mut to_ffmpeg) = (BytesMut::new(), BytesMut::new());
+                let mut to_ffmpeg = BytesMut::new();
                 while let Some(unit) = next_unit(&mut from_ffmpeg).map_err(too_long)? {
                     match unit {
                         Unit::Packet(packet) => to_camera.extend_from_slice(&packet),
@@ -118,23 +123,45 @@ impl Relay {
                         }
                     }
                 }
-                let written = async {
+                let sent = async {
                     camera.write_all(&to_camera).await?;
-                    camera.flush().await?;
-                    ffmpeg.write_all(&to_ffmpeg).await
+                    camera.flush().await
                 };
-                if written.await.is_err() {
+                let is_sent = sent.await.is_ok();
+                to_camera.clear();
+                if ffmpeg.write_all(&to_ffmpeg).await.is_err() {
                     return Ok(());
                 }
                 from_camera.reserve(CHUNK_BYTES);
                 from_ffmpeg.reserve(CHUNK_BYTES);
-                let read = tokio::select! {
-                    read = camera.read_buf(&mut from_camera) => read,
-                    read = ffmpeg.read_buf(&mut from_ffmpeg) => read,
-                };
-                if read.unwrap_or(0) == 0 {
+                let is_open = is_sent
+                    && tokio::select! {
+                        read = camera.read_buf(&mut from_camera) => read.unwrap_or(0) > 0,
+                        read = ffmpeg.read_buf(&mut from_ffmpeg) => {
+                            if read.unwrap_or(0) == 0 {
+                                return Ok(());
+                            }
+                            true
+                        }
+                    };
+                if is_open {
+                    continue;
+                }
+                // Some cameras close the connection of a 401: the answer goes through another one.
+                if !exchange.awaits_login() {
                     return Ok(());
                 }
+                if std::mem::replace(&mut reconnected, true) {
+                    return Err(SourceError::ClosedAfterChallenge);
+                }
+                let connected = timeout(RECONNECT, connect(&url)).await;
+                let Ok(Ok((connection, peer))) = connected else {
+                    return Err(SourceError::ClosedAfterChallenge);
+                };
+                camera = connection;
+                exchange.peer = peer;
+                from_camera.clear();
+                exchange.send_again(&mut to_camera);
             }
         };
         let ended: Result<(), SourceError> = relay.await;

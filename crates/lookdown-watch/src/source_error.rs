@@ -75,6 +75,11 @@ pub enum SourceError {
     /// The stream ended.
     #[error("the camera ended the stream: check it if this is logged again")]
     Closed,
+    /// The connection ended with a challenge, and so did another one.
+    #[error(
+        "the camera closed the connection after asking for the password: check that its user may read this stream"
+    )]
+    ClosedAfterChallenge,
     /// The camera cannot be reached.
     #[error("the camera cannot be reached: {0}: check its address and the network")]
     Unreachable(String),
@@ -132,6 +137,7 @@ mod tests {
             SourceError::NotAVideo,
             SourceError::Stalled(Duration::from_secs(1)),
             SourceError::Closed,
+            SourceError::ClosedAfterChallenge,
             SourceError::Unreachable(text()),
             SourceError::NoFfmpeg {
                 program: text(),

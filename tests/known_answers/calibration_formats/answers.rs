@@ -7,7 +7,7 @@ use serde_json::Value;
 use crate::calibration_formats::{camera, fixture, json, lens, ray};
 
 /// File, index of the camera in it, format, known answers.
-const FILES: [(&str, usize, &str, &str); 33] = [
+const FILES: [(&str, usize, &str, &str); 45] = [
     ("opencv_fisheye.yml", 0, "OpenCV FileStorage", "kb_tumvi512"),
     (
         "opencv_fisheye_4x_header.yml",
@@ -101,6 +101,43 @@ const FILES: [(&str, usize, &str, &str); 33] = [
     ),
     ("woodscape.json", 0, "WoodScape", "woodscape_fv"),
     ("nvidia_ftheta.json", 0, "NVIDIA f-theta", "ftheta_backward"),
+    ("opencv_stereo.yml", 1, "OpenCV FileStorage", "kb_tumvi512"),
+    ("openvslam.yaml", 0, "SLAM settings", "kb_tumvi512"),
+    ("stella_vslam.yaml", 0, "SLAM settings", "kb_tumvi512"),
+    ("orb_slam3.yaml", 0, "SLAM settings", "kb_tumvi512"),
+    ("orb_slam3.yaml", 1, "SLAM settings", "kb_tumvi512"),
+    (
+        "nerfstudio.json",
+        0,
+        "nerfstudio transforms.json",
+        "kb_tumvi512",
+    ),
+    (
+        "instant_ngp.json",
+        1,
+        "nerfstudio transforms.json",
+        "kb_tumvi512",
+    ),
+    ("gyroflow.json", 0, "gyroflow lens profile", "kb_tumvi512"),
+    ("depthai.json", 1, "DepthAI", "kb_tumvi512"),
+    (
+        "opensfm.json",
+        0,
+        "OpenSfM camera_models.json",
+        "kb_tumvi512",
+    ),
+    (
+        "opensfm.json",
+        1,
+        "OpenSfM camera_models.json",
+        "kb_tumvi512",
+    ),
+    (
+        "matlab_fisheye.json",
+        0,
+        "MATLAB fisheyeIntrinsics",
+        "ocamcalib_1600",
+    ),
 ];
 
 #[test]

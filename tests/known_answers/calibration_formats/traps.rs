@@ -1,9 +1,9 @@
 //! Details of calibration formats that are easily misread.
 
 use lookdown_calibration::CalibrationFile;
-use lookdown_lens::geometry::lens::LensModel;
+use lookdown_lens::geometry::{Pixel, Ray, lens::LensModel};
 
-use crate::calibration_formats::{camera, fixture, refusal};
+use crate::calibration_formats::{camera, fixture, lens, refusal};
 
 fn text(file: &str) -> String {
     String::from_utf8(fixture(&format!("calibrations/{file}"))).unwrap()
@@ -261,14 +261,20 @@ fn a_file_without_a_calibration_is_refused_in_a_sentence() {
             "<svg/>",
             "its XML is <svg>; of XML, OpenCV's <opencv_storage> is read",
         ),
-        ("{", "EOF while parsing"),
+        ("{", "its JSON ends early"),
         ("", "it has no named fields"),
-        ("<opencv_storage>", "not a calibration file: "),
+        ("<opencv_storage>", "its XML ends before </opencv_storage>"),
+        (
+            "a: b: c",
+            "it is not valid YAML at line 1: correct that line",
+        ),
+        ("a = ", "it is not valid TOML at line 1: correct that line"),
+        ("<opencv_storage><a></b>", "it is not valid XML at line 1"),
     ] {
         assert_refused(content, expected);
     }
     let deep = format!("{{\"lens\": {}", "[".repeat(10_000));
-    assert_refused(&deep, "recursion limit");
+    assert_refused(&deep, "it is not valid JSON at line 1");
     let deep = format!("a: {}", "[".repeat(1000));
     assert_refused(&deep, "not a calibration file: ");
     let deep = format!(
@@ -281,4 +287,184 @@ fn a_file_without_a_calibration_is_refused_in_a_sentence() {
     assert_refused(&bomb, "not a calibration file: ");
     let doctype = "<!DOCTYPE x [<!ENTITY a \"b\">]><opencv_storage>&a;</opencv_storage>";
     assert_refused(doctype, "not a calibration file: ");
+}
+
+#[test]
+fn files_of_other_kinds_are_named_with_the_one_to_take() {
+    let text = |text: &str| text.as_bytes().to_vec();
+    let tar = [vec![b'x'; 257], text("ustar")].concat();
+    for (content, expected) in [
+        (
+            b"PK\x03\x04..\xffK.npy".to_vec(),
+            "it is a NumPy archive (.npz): write K, D and",
+        ),
+        (b"PK\x03\x04\xff".to_vec(), "it is a ZIP archive: unpack it"),
+        (
+            b"\x93NUMPY\x01".to_vec(),
+            "it is a NumPy array (.npy): write K, D and",
+        ),
+        (
+            b"\x80\x04\x95}".to_vec(),
+            "it is a Python pickle: write K, D and",
+        ),
+        (
+            text("(dp0\nS'K'\np1\n"),
+            "it is a Python pickle: write K, D and",
+        ),
+        (b"\x1f\x8b\x08".to_vec(), "it is a gzip archive: unpack it"),
+        (
+            [tar, b"\xff".to_vec()].concat(),
+            "it is a tar archive: unpack it",
+        ),
+        (
+            b"MATLAB 5.0 MAT-file\0".to_vec(),
+            "it is a MATLAB file (.mat): write the intrinsics",
+        ),
+        (
+            text("%PDF-1.4\n1 0 obj"),
+            "it is a PDF report: take the file with the result",
+        ),
+        (
+            b"\xff\xd8\xff\xe0".to_vec(),
+            "it is a JPEG image: take the file with the result",
+        ),
+        (
+            b"\xff\xfeK\0".to_vec(),
+            "it is UTF-16 text: save it as UTF-8",
+        ),
+        (
+            b"\x01\0\0\0\0\0\0\0".to_vec(),
+            "it is a binary file: take the text file",
+        ),
+        (
+            b"K: \xe4".to_vec(),
+            "it is text in another encoding than UTF-8",
+        ),
+        (
+            text("Calibration results \n====\ncam0 (/a):\n    type: x"),
+            "take its camchain.yaml",
+        ),
+        (
+            text("# oST version 5.0 parameters\n\n[image]\n\nwidth\n640"),
+            "take the ost.yaml",
+        ),
+        (
+            text("[surface0]\nprojection-type=4\ndistortion=1;2"),
+            "a configuration of nvdewarper",
+        ),
+        (
+            text("DIM=(1, 2)\nK=np.array([[1.0]])"),
+            "printed NumPy arrays or code: write K",
+        ),
+        (
+            text("target_type: aprilgrid\ntagCols: 6"),
+            "the target of a Kalibr calibration",
+        ),
+        (
+            text("# Image list with two lines\n1 0.8"),
+            "it is COLMAP's images.txt: take cameras",
+        ),
+        (
+            text("[\n {\"shots\": {}}]"),
+            "OpenSfM's reconstruction.json: take camera_models",
+        ),
+        (text("<html><body>login"), "it is a web page"),
+    ] {
+        let refusal = refusal(&content);
+        assert!(refusal.starts_with("not a calibration file: "), "{refusal}");
+        assert!(refusal.contains(expected), "{refusal}");
+    }
+}
+
+#[test]
+fn the_first_of_several_equal_documents_is_read() {
+    let message = text("ros_message.yaml");
+    let expected = camera(message.as_bytes(), 0);
+    for content in [
+        format!("{message}\n---\n"),
+        format!("---\n{message}\n...\n# end\n"),
+        format!("{message}\n---\n{message}\n---\n"),
+    ] {
+        assert_eq!(camera(content.as_bytes(), 0), expected);
+    }
+    let mixed = format!("{message}\n---\n{}", text("kalibr_camchain.yaml"));
+    assert_refused(&mixed, "it has several YAML documents of different kinds");
+}
+
+/// The ray 60° off the axis at the azimuth of 30°, computed with the formula of each program.
+#[test]
+fn units_and_origins_of_reconstructions_are_converted() {
+    let ray = |degrees: f64| {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let (y, x) = 30_f64.to_radians().sin_cos();
+        Ray::new(sin * x, sin * y, cos)
+    };
+    let opensfm = r#"{"a": {"projection_type": "fisheye", "width": 1600, "height": 1200,
+        "focal": 0.36, "k1": -0.01, "k2": 0.002}}"#;
+    let fisheye62 = r#"{"a": {"projection_type": "fisheye62", "width": 1600, "height": 1200,
+        "focal_x": 0.36, "focal_y": 0.36, "c_x": 0, "c_y": 0, "k1": -0.01, "k2": 0.002,
+        "k3": 0, "k4": 0, "k5": 0, "k6": 0.01, "p1": 0, "p2": 0}}"#;
+    let alicevision = r#"{"intrinsics": [{"intrinsicId": "1", "width": "2000", "height": "2000",
+        "sensorWidth": "6.17", "sensorHeight": "6.17", "type": "fisheye4", "focalLength": "1.9",
+        "pixelRatio": "1", "principalPoint": ["13.5", "-26.25"],
+        "distortionParams": ["-0.0063", "0.003", "-0.0018", "0.0001"]}]}"#;
+    // Half as wide as the frame that it was calibrated with.
+    let anamorphic = r#"{"calib_dimension": {"w": 1920, "h": 1440}, "input_horizontal_stretch": 2.0,
+        "fisheye_params": {"camera_matrix": [[877.5, 0.0, 960.25], [0.0, 876.0, 718.5], [0, 0, 1]],
+        "distortion_coeffs": [0.2, 0.05, -0.02, 0.01]}}"#;
+    for (content, expected) in [
+        (opensfm, (1317.402_137_6, 898.510_938_5)),
+        (fisheye62, (1326.4871421, 903.7561684)),
+        (alicevision, (1568.455_535_4, 1293.942_402_9)),
+        (anamorphic, (1968.964_054_5 / 2.0, 1299.885_807_3)),
+    ] {
+        let camera = camera(content.as_bytes(), 0);
+        let pixel = lens(&camera).project(&ray(60.0)).unwrap();
+        let expected = Pixel::new(expected.0, expected.1);
+        assert!((pixel - expected).norm() < 1e-6, "{content}: {pixel}");
+    }
+}
+
+#[test]
+fn models_without_a_lens_here_are_refused_by_name() {
+    let changed = |file: &str, from: &str, to: &str| text(file).replace(from, to);
+    for (content, expected) in [
+        (
+            changed("opensfm.json", "\"p1\": 0.0", "\"p1\": 0.1"),
+            "tangential or thin-prism terms",
+        ),
+        (
+            changed("opensfm.json", "fisheye_opencv", "brown"),
+            "a.projection_type: it is brown, which",
+        ),
+        (
+            changed("opensfm.json", "fisheye_opencv", "spherical"),
+            "it is \"spherical\": fisheye,",
+        ),
+        (text("depthai.json"), "cameraData[0].cameraType: it is"),
+        (
+            changed("gyroflow.json", "null", "\"gopro\""),
+            "distortion_model: it is \"gopro\": only",
+        ),
+        (
+            changed("nerfstudio.json", "OPENCV_FISHEYE", "OPENCV"),
+            "camera_model: it is OPENCV, which",
+        ),
+        (
+            changed("alicevision.sfm", "fisheye4", "equidistant"),
+            "it is \"equidistant\": fisheye4 is",
+        ),
+        (
+            changed("openvslam.yaml", "fisheye", "perspective"),
+            "Camera.model: it is perspective,",
+        ),
+    ] {
+        let file = CalibrationFile::parse(content.as_bytes()).unwrap();
+        let mut problems = file
+            .cameras
+            .iter()
+            .filter_map(|camera| camera.camera.as_ref().err());
+        let found = problems.any(|problem| problem.to_string().contains(expected));
+        assert!(found, "{expected}: {file:?}");
+    }
 }

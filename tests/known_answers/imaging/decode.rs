@@ -281,13 +281,32 @@ fn the_format_is_detected_from_content_and_others_are_named() {
 fn a_truncated_file_is_an_error_and_never_gray_rows() {
     for name in IMAGES {
         let bytes = fixture(name);
-        for length in 0..bytes.len() {
+        // The end marker of a JPEG is not a part of its image.
+        let marker = if is_baseline(name) { 2 } else { 0 };
+        for length in 0..bytes.len() - marker {
             let error = refused(&bytes[..length]);
             assert!(
                 !matches!(error, DecodeError::TooLarge { .. }),
                 "{name} cut to {length}: {error}"
             );
         }
+    }
+}
+
+/// Images whose scan shows their end.
+fn is_baseline(name: &str) -> bool {
+    name.ends_with(".jpg") && name != "progressive.jpg"
+}
+
+#[test]
+fn a_jpeg_without_its_end_marker_is_whole() {
+    for name in IMAGES.into_iter().filter(|name| is_baseline(name)) {
+        let mut bytes = fixture(name);
+        bytes.truncate(bytes.len() - 2);
+        let decode = |bytes: &[u8]| decode(bytes, &DecodeLimits::default()).unwrap();
+        assert_eq!(decode(&bytes), decoded(name), "{name}");
+        bytes.extend_from_slice(b"dhav\0\x01\xff");
+        assert_eq!(decode(&bytes), decoded(name), "{name}");
     }
 }
 
@@ -408,6 +427,10 @@ fn text_instead_of_an_image_is_named() {
         (b"/9j/4AAQSkZJRg", "base64 text"),
         (b"\n iVBORw0KGgo", "base64 text"),
         (b"{\"image\": \"/9j/\"}", "JSON"),
+        (b"\"data:image/png;base64,iVB\"", "base64 text"),
+        (b"image=%2F9j%2F4AAQSkZJRg", "base64 text"),
+        (b"_9j_4AAQSkZJRg", "base64 text"),
+        (b"ffd8ffe000104a46", "hexadecimal text"),
         (b"\x1f\x8b\x08\0", "compressed with gzip"),
         (b"hello", "not in a known image format"),
     ] {

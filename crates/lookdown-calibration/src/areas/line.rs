@@ -5,10 +5,8 @@ use std::collections::BTreeSet;
 use nalgebra::Point2;
 
 use super::area_name::check_name;
-use crate::{
-    FormatError,
-    native::{NativeImage, NativeLine},
-};
+use crate::FormatError;
+use crate::native::{NativeImage, NativeLine};
 use lookdown_lens::geometry::{CountingLine, LineEnds, Mount, Polygon, polygon::Edge};
 
 /// Shortest line on the floor, meters, and in the frame, pixels.

@@ -1,4 +1,6 @@
-use crate::{CalibrationFile, export::Target, native::NativeCalibration};
+use crate::CalibrationFile;
+use crate::export::Target;
+use crate::native::NativeCalibration;
 use lookdown_lens::geometry::{Pixel, ZoneArea};
 
 /// A camera of 800 × 600 pixels with these further fields.

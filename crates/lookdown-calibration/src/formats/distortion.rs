@@ -23,6 +23,7 @@ const NAMES: [(Distortion, &[&str]); 4] = [
             "kannala_brandt",
             "kannala_brandt4",
             "kb4",
+            "kannalabrandt8",
             "opencv_fisheye",
         ],
     ),

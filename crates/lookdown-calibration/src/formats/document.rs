@@ -3,7 +3,7 @@
 
 use serde_json::Value;
 
-use super::{CalibrationFile, FormatError, opencv_xml};
+use super::{CalibrationFile, FormatError, foreign, opencv_xml};
 
 /// Deepest nesting that is read; real files have about six levels.
 const MAX_DEPTH: usize = 32;
@@ -38,15 +38,18 @@ pub(super) fn text_of(bytes: &[u8]) -> Result<(&str, Syntax), FormatError> {
         )));
     }
     let text = std::str::from_utf8(bytes)
-        .map_err(|error| FormatError::malformed(format!("it is not UTF-8 text: {error}")))?;
+        .ok()
+        .filter(|text| !text.contains('\0'));
+    let text = text.ok_or_else(|| foreign::binary(bytes))?;
     let text = text.trim_start_matches('\u{feff}');
     Ok((text, syntax_of(text)))
 }
 
 fn syntax_of(text: &str) -> Syntax {
-    match text.trim_start().chars().next() {
-        Some('{') => return Syntax::Json,
-        Some('<') => return Syntax::Xml,
+    let mut begin = text.chars().filter(|letter| !letter.is_whitespace());
+    match (begin.next(), begin.next()) {
+        (Some('{'), _) | (Some('['), Some('{')) => return Syntax::Json,
+        (Some('<'), _) => return Syntax::Xml,
         _ => {}
     }
     if super::recognize_lines(text).is_some() {
@@ -70,15 +73,66 @@ pub(super) fn parse(text: &str, syntax: Syntax) -> Result<Document<'_>, FormatEr
             "it has more than {MAX_NODES} values, and no calibration needs as many"
         )));
     }
-    let tree = match syntax {
+    // The words of the parsers are not repeated: they are about syntax, and the text may be none.
+    let (name, place) = match syntax {
         // Its parser stops at 128 levels by itself.
-        Syntax::Json => serde_json::from_str(text).map_err(|error| error.to_string()),
-        Syntax::Yaml => yaml(text),
-        Syntax::Toml => toml(text),
-        Syntax::Xml => opencv_xml::parse(text, MAX_DEPTH, MAX_NODES),
+        Syntax::Json => match serde_json::from_str(text) {
+            Ok(tree) => return Ok(Document::Tree(tree)),
+            Err(error) if error.is_eof() => {
+                let problem = "its JSON ends early: take the whole file";
+                return Err(FormatError::malformed(problem));
+            }
+            Err(error) => ("JSON", error.line() as u64),
+        },
+        Syntax::Yaml => match yaml(text) {
+            Ok(tree) => return Ok(Document::Tree(tree)),
+            Err(error) => ("YAML", error.location().map_or(0, |place| place.line())),
+        },
+        Syntax::Toml => match toml::from_str(text) {
+            Ok(tree) => return Ok(Document::Tree(tree)),
+            Err(error) => {
+                let before = error.span().and_then(|span| text.get(..span.start));
+                (
+                    "TOML",
+                    before.map_or(0, |before| before.matches('\n').count() as u64 + 1),
+                )
+            }
+        },
+        Syntax::Xml => {
+            let tree = opencv_xml::parse(text, MAX_DEPTH, MAX_NODES);
+            return tree.map(Document::Tree).map_err(FormatError::malformed);
+        }
         Syntax::Lines => return Ok(Document::Lines(text)),
     };
-    tree.map(Document::Tree).map_err(FormatError::malformed)
+    Err(FormatError::malformed(format!(
+        "it is not valid {name} at line {place}: correct that line, or take the file that the \
+         calibration program wrote"
+    )))
+}
+
+/// The documents of a YAML text that have content, with the lines before them; other syntaxes have
+/// one. Markers end a document wherever they stand, also in texts.
+pub(super) fn documents(text: &str, syntax: Syntax) -> Vec<&str> {
+    if syntax != Syntax::Yaml {
+        return vec![text];
+    }
+    let mut documents = Vec::new();
+    let (mut begin, mut position, mut has_content) = (0, 0, false);
+    for line in text.split_inclusive('\n') {
+        let is_marker = line.starts_with("---") || line.starts_with("...");
+        if is_marker && has_content {
+            documents.push(&text[begin..position]);
+            (begin, has_content) = (position, false);
+        }
+        position += line.len();
+        let written = line.trim_start_matches(['-', '.']).trim();
+        let is_comment = written.is_empty() || written.starts_with(['#', '%']);
+        has_content |= !is_comment;
+    }
+    if has_content || documents.is_empty() {
+        documents.push(&text[begin..]);
+    }
+    documents
 }
 
 /// At most as many values has a text whose parser does not count them itself. In TOML a table,
@@ -93,7 +147,7 @@ fn most_nodes(text: &str, syntax: Syntax) -> usize {
 }
 
 /// Reads YAML into any shape.
-pub(super) fn yaml<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, String> {
+pub(super) fn yaml<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, serde_saphyr::Error> {
     let options = serde_saphyr::options! {
         budget: serde_saphyr::budget! {
             max_depth: MAX_DEPTH,
@@ -105,18 +159,7 @@ pub(super) fn yaml<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, Stri
         with_snippet: false,
     };
     let text = without_directive(text);
-    serde_saphyr::from_str_with_options(&text, options).map_err(|error| first_line(&error))
-}
-
-/// Reads TOML into any shape.
-pub(super) fn toml<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, String> {
-    toml::from_str(text).map_err(|error| format!("{}: {}", first_line(&error), error.message()))
-}
-
-/// Returns the message of a parser without its drawing of the place.
-fn first_line(error: &impl std::fmt::Display) -> String {
-    let text = error.to_string();
-    text.lines().next().unwrap_or_default().to_owned()
+    serde_saphyr::from_str_with_options(&text, options)
 }
 
 /// OpenCV up to 4 begins its files with `%YAML:1.0`, which is not a YAML directive, and others

@@ -76,6 +76,14 @@ impl<'a> Fields<'a> {
         })
     }
 
+    /// A map that lies in this one.
+    pub(super) fn inside(&self, name: &str, map: &'a Map<String, Value>) -> Self {
+        Self {
+            name: self.name_of(name),
+            map,
+        }
+    }
+
     pub(super) fn text(&self, key: &str) -> Result<&'a str, FormatError> {
         let value = self.get(key)?;
         value
@@ -85,9 +93,20 @@ impl<'a> Fields<'a> {
 
     pub(super) fn number(&self, key: &str) -> Result<f64, FormatError> {
         let value = self.get(key)?;
-        value
-            .as_f64()
+        number(value)
             .ok_or_else(|| self.invalid(key, format!("it is {}: a number is needed", brief(value))))
+    }
+
+    /// Numbers that are 0 where they are missing.
+    pub(super) fn optional<const N: usize>(
+        &self,
+        keys: [&str; N],
+    ) -> Result<[f64; N], FormatError> {
+        let mut numbers = [0.0; N];
+        for (number, key) in numbers.iter_mut().zip(keys) {
+            *number = self.number_or(key, 0.0)?;
+        }
+        Ok(numbers)
     }
 
     pub(super) fn number_or(&self, key: &str, default: f64) -> Result<f64, FormatError> {
@@ -168,8 +187,14 @@ pub(super) fn whole_pixels(pixels: f64) -> Option<u32> {
 fn flatten(value: &Value, numbers: &mut Vec<f64>) -> bool {
     match value {
         Value::Array(items) => items.iter().all(|item| flatten(item, numbers)),
-        _ => value.as_f64().map(|number| numbers.push(number)).is_some(),
+        _ => number(value).map(|number| numbers.push(number)).is_some(),
     }
+}
+
+/// A number, which some programs write as a text.
+fn number(value: &Value) -> Option<f64> {
+    let written = || value.as_str()?.trim().parse().ok();
+    value.as_f64().or_else(written)
 }
 
 /// A value as it may be shown in a sentence.

@@ -36,6 +36,20 @@ pub enum Format {
     FisheyeCalibAdapter,
     #[strum(serialize = "camera-intrinsic-model")]
     CameraIntrinsicModel,
+    #[strum(serialize = "SLAM settings")]
+    Slam,
+    #[strum(serialize = "nerfstudio transforms.json")]
+    Nerfstudio,
+    #[strum(serialize = "gyroflow lens profile")]
+    Gyroflow,
+    #[strum(serialize = "DepthAI")]
+    DepthAi,
+    #[strum(serialize = "OpenSfM camera_models.json")]
+    OpenSfm,
+    #[strum(serialize = "MATLAB fisheyeIntrinsics")]
+    Matlab,
+    #[strum(serialize = "AliceVision")]
+    AliceVision,
 }
 
 impl Format {

@@ -3,7 +3,7 @@
 
 use super::{
     CalibrationFile, Camera, FileCamera, Format, FormatError,
-    document::{Syntax, toml, yaml},
+    document::{Syntax, yaml},
     fields::Fields,
 };
 use lookdown_common::StoredFile;
@@ -24,8 +24,9 @@ pub(super) fn read(
         })?;
     }
     let parsed: Result<NativeCalibration, String> = match syntax {
-        Syntax::Toml => toml(text),
-        Syntax::Yaml => yaml(text),
+        Syntax::Toml => toml::from_str(text)
+            .map_err(|error| format!("{}: {}", first_line(&error), error.message())),
+        Syntax::Yaml => yaml(text).map_err(|error| first_line(&error)),
         Syntax::Json | Syntax::Xml | Syntax::Lines => {
             serde_json::from_str(text).map_err(|error| error.to_string())
         }
@@ -50,4 +51,10 @@ pub(super) fn read(
             }),
         }],
     })
+}
+
+/// Returns the message of a parser without its drawing of the place.
+fn first_line(error: &impl std::fmt::Display) -> String {
+    let text = error.to_string();
+    text.lines().next().unwrap_or_default().to_owned()
 }

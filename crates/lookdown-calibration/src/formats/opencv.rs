@@ -3,11 +3,15 @@
 //!
 //! With `xi` it is `cv::omnidir` (`k1, k2, p1, p2`), else `cv::fisheye` (`k1` to `k4`) where the
 //! file says so, or has four coefficients and says nothing. Five and more are an ordinary camera.
+//!
+//! Files of several cameras number the names (`K1`, `camera_matrix_2`), call them left and right,
+//! or have a camera in each of their fields.
 
-use serde_json::Value;
+use serde_json::{Map, Value};
 
 use super::{
-    Camera, FormatError,
+    Camera, FileCamera, FormatError,
+    camera_file::{alone, named},
     camera_matrix::CameraMatrix,
     distortion::{Distortion, not_a_fisheye},
     fields::Fields,
@@ -17,10 +21,11 @@ use crate::warning::{Warning, WarningCode};
 use lookdown_lens::geometry::lens::{LensModel, Mei};
 
 /// Names of the camera matrix that programs choose.
-const MATRIX: [&str; 8] = [
+const MATRIX: [&str; 9] = [
     "camera_matrix",
     "cameraMatrix",
     "Camera_Matrix",
+    "CameraMatrix",
     "K",
     "M",
     "mtx",
@@ -28,9 +33,10 @@ const MATRIX: [&str; 8] = [
     "intrinsics",
 ];
 /// Names of the distortion coefficients.
-const COEFFICIENTS: [&str; 8] = [
+const COEFFICIENTS: [&str; 9] = [
     "distortion_coefficients",
     "distCoeffs",
+    "DistCoeffs",
     "Distortion_Coefficients",
     "D",
     "dist",
@@ -50,22 +56,60 @@ const SIZE_PAIRS: [&str; 4] = ["image_size", "imageSize", "img_size", "resolutio
 /// Fields that calibration programs store before they have a result.
 const CORNERS: [&str; 2] = ["imagePoints", "image_points"];
 
+/// Names of the cameras in a file of several.
+const SIDES: [&str; 13] = [
+    "0", "1", "2", "3", "4", "left", "right", "Left", "Right", "l", "r", "L", "R",
+];
+
 /// Returns true for a file with any of the names by which OpenCV's files are known.
 pub(super) fn is_storage(fields: &Fields<'_>) -> bool {
-    let mut names = MATRIX.iter().chain(&CORNERS);
-    names.any(|name| fields.has(name))
+    let mut entries = fields.map().values().filter_map(Value::as_object);
+    has_matrix(fields.map())
+        || CORNERS.iter().any(|name| fields.has(name))
+        || !sides(fields).is_empty()
+        || entries.any(has_matrix)
 }
 
-pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
-    let Some(matrix) = present(fields, &MATRIX) else {
+fn has_matrix(map: &Map<String, Value>) -> bool {
+    MATRIX.iter().any(|name| map.contains_key(*name))
+}
+
+/// The cameras of the file that have a matrix of their own.
+fn sides(fields: &Fields<'_>) -> Vec<&'static str> {
+    // A number under such a name is a coefficient.
+    let is_matrix = |key: &str| fields.numbers(key).is_ok_and(|numbers| numbers.len() == 9);
+    let has_matrix = |side: &&str| present(fields, &MATRIX, side).is_some_and(is_matrix);
+    SIDES.into_iter().filter(has_matrix).collect()
+}
+
+pub(super) fn read(fields: &Fields<'_>) -> Vec<FileCamera> {
+    let is_camera = |entry: &Value| entry.as_object().is_some_and(has_matrix);
+    if has_matrix(fields.map()) {
+        return alone(read_camera(fields, ""));
+    }
+    let mut cameras = named(fields, is_camera, |camera| read_camera(camera, ""));
+    for side in sides(fields) {
+        cameras.push(FileCamera {
+            name: Some(side.to_owned()),
+            camera: read_camera(fields, side),
+        });
+    }
+    if cameras.is_empty() {
+        return alone(read_camera(fields, ""));
+    }
+    cameras
+}
+
+fn read_camera(fields: &Fields<'_>, side: &str) -> Result<Camera, FormatError> {
+    let Some(matrix) = present(fields, &MATRIX, side) else {
         return Err(fields.invalid(
             MATRIX[0],
             "it is missing: the file holds the corner points of a calibration, not its result",
         ));
     };
     let matrix = CameraMatrix::read(fields, matrix)?;
-    let coefficients = present(fields, &COEFFICIENTS).unwrap_or(COEFFICIENTS[0]);
-    let (lens, note) = if let Some(xi) = present(fields, &["xi", "Xi"]) {
+    let coefficients = present(fields, &COEFFICIENTS, side).unwrap_or(COEFFICIENTS[0]);
+    let (lens, note) = if let Some(xi) = present(fields, &["xi", "Xi"], side) {
         let [xi] = fields.exactly(xi, "xi alone")?;
         let [k1, k2, p1, p2] = fields.exactly(coefficients, "k1, k2, p1, p2")?;
         let lens = Mei {
@@ -76,7 +120,7 @@ pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
     } else {
         without_xi(fields, matrix, coefficients)?
     };
-    let mut camera = Camera::new(image(fields)?, lens);
+    let mut camera = Camera::new(image(fields, side)?, lens);
     camera.notes.extend(note);
     Ok(camera)
 }
@@ -110,8 +154,8 @@ fn without_xi(
 }
 
 /// Returns the model that the file states, and the field that states it.
-fn said_distortion(fields: &Fields<'_>) -> Result<(&'static str, Option<Distortion>), FormatError> {
-    if let Some(key) = present(fields, &["distortion_model", "camera_model", "model"]) {
+fn said_distortion<'a>(fields: &Fields<'a>) -> Result<(&'a str, Option<Distortion>), FormatError> {
+    if let Some(key) = present(fields, &["distortion_model", "camera_model", "model"], "") {
         let name = fields.text(key)?;
         let known = Distortion::of_name(name).ok_or_else(|| {
             fields.invalid(
@@ -131,14 +175,32 @@ fn said_distortion(fields: &Fields<'_>) -> Result<(&'static str, Option<Distorti
     Ok((flag, distortion))
 }
 
-fn image(fields: &Fields<'_>) -> Result<Option<NativeImage>, FormatError> {
-    if let Some((width, height)) = SIZES.iter().find(|(width, _)| fields.has(width)) {
-        return fields.image(width, height).map(Some);
+/// The frame size, which the cameras of a file may share.
+fn image(fields: &Fields<'_>, side: &str) -> Result<Option<NativeImage>, FormatError> {
+    for side in [side, ""] {
+        for (width, height) in SIZES {
+            let keys = present(fields, &[width], side).zip(present(fields, &[height], side));
+            if let Some((width, height)) = keys {
+                return fields.image(width, height).map(Some);
+            }
+        }
+        if let Some(key) = present(fields, &SIZE_PAIRS, side) {
+            return fields.image_pair(key).map(Some);
+        }
     }
-    let pair = present(fields, &SIZE_PAIRS);
-    pair.map(|key| fields.image_pair(key)).transpose()
+    Ok(None)
 }
 
-fn present(fields: &Fields<'_>, names: &[&'static str]) -> Option<&'static str> {
-    names.iter().copied().find(|name| fields.has(name))
+/// The first of the names that the file has: as it is, or joined with that of a camera.
+fn present<'a>(fields: &Fields<'a>, names: &[&str], side: &str) -> Option<&'a str> {
+    let spellings = |name: &&str| {
+        [
+            format!("{name}{side}"),
+            format!("{name}_{side}"),
+            format!("{side}_{name}"),
+            format!("{side}{name}"),
+        ]
+    };
+    let mut spelled = names.iter().flat_map(spellings);
+    spelled.find_map(|key| Some(fields.map().get_key_value(&key)?.0.as_str()))
 }

@@ -22,7 +22,13 @@ pub(super) fn parse(text: &str, max_depth: usize, max_elements: usize) -> Result
     let mut open: Vec<Element> = Vec::new();
     let mut elements = 0;
     loop {
-        let event = reader.read_event().map_err(|error| error.to_string())?;
+        let event = reader.read_event();
+        let line = || {
+            let before = usize::try_from(reader.error_position()).unwrap_or(usize::MAX);
+            let before = text.as_bytes().get(..before).unwrap_or(text.as_bytes());
+            before.split(|byte| *byte == b'\n').count()
+        };
+        let event = event.map_err(|_| format!("it is not valid XML at line {}", line()))?;
         let closed = match event {
             Event::Start(start) => {
                 elements += 1;

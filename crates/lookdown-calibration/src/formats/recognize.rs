@@ -1,6 +1,6 @@
 //! Recognition of a file's format from its content alone.
 
-use super::{Format, fields::Fields};
+use super::{Format, fields::Fields, matlab, opencv, slam};
 
 /// The line-based format of a text, if it is in one.
 pub(super) fn recognize_lines(text: &str) -> Option<Format> {
@@ -40,6 +40,10 @@ pub(super) fn recognize_tree(fields: &Fields<'_>) -> Option<Format> {
         let mut entries = fields.map().values();
         entries.any(|entry| keys.iter().all(|key| entry.get(key).is_some()))
     };
+    let first_of = |list: &str, key: &str| {
+        let first = fields.map().get(list).and_then(|list| list.get(0));
+        first.is_some_and(|entry| entry.get(key).is_some())
+    };
     Some(if has("lens") || (has("id") && has("image")) {
         Format::Native
     } else if any_entry_has(&["camera_model", "intrinsics"]) {
@@ -64,9 +68,23 @@ pub(super) fn recognize_tree(fields: &Fields<'_>) -> Option<Format> {
         Format::FisheyeCalibAdapter
     } else if fields.map().len() == 1 && any_entry_has(&["fx", "width"]) {
         Format::CameraIntrinsicModel
+    } else if slam::is_settings(fields) {
+        Format::Slam
+    } else if has("fl_x") || first_of("frames", "fl_x") {
+        Format::Nerfstudio
+    } else if has("fisheye_params") || has("calibration_data") {
+        Format::Gyroflow
+    } else if has("cameraData") {
+        Format::DepthAi
+    } else if any_entry_has(&["projection_type"]) {
+        Format::OpenSfm
+    } else if has(matlab::POLYNOMIAL) || any_entry_has(&[matlab::POLYNOMIAL]) {
+        Format::Matlab
+    } else if first_of("intrinsics", "intrinsicId") {
+        Format::AliceVision
     } else if has("distortion_model") && (has("camera_matrix") || has("K") || has("k")) {
         Format::Ros
-    } else if super::opencv::is_storage(fields) {
+    } else if opencv::is_storage(fields) {
         Format::OpenCv
     } else {
         return None;

@@ -77,7 +77,8 @@ fn image(fields: &Fields<'_>) -> Result<Option<NativeImage>, FormatError> {
 
 #[cfg(test)]
 mod tests {
-    use crate::{Calibration, CalibrationFile};
+    use crate::Calibration;
+    use crate::CalibrationFile;
 
     fn read(size: &str, rest: &str) -> Result<Calibration, String> {
         let content = format!(

@@ -19,12 +19,26 @@ pub(super) fn is_heif(bytes: &[u8]) -> bool {
 
 /// Returns what clients send instead of the bytes of an image, as the end of a sentence.
 pub(super) fn name_of_text(bytes: &[u8]) -> &'static str {
-    const BASE64: [&[u8]; 4] = [b"data:image/", b"/9j/", b"iVBORw0", b"UklGR"];
+    /// The beginnings of images, also in the alphabet for URLs, and percent-encoded.
+    const BASE64: [&[u8]; 6] = [
+        b"data:image/",
+        b"/9j/",
+        b"_9j_",
+        b"%2F9j%2F",
+        b"iVBORw0",
+        b"UklGR",
+    ];
+    /// Bytes that are searched: names of form fields may come before.
+    const BEGIN: usize = 64;
     let text = bytes.trim_ascii_start();
-    if BASE64.iter().any(|start| text.starts_with(start)) {
-        "base64 text and not its bytes"
-    } else if text.starts_with(b"{") || text.starts_with(b"[") {
+    let begin = &text[..text.len().min(BEGIN)];
+    let contains = |part: &&[u8]| begin.windows(part.len()).any(|window| window == *part);
+    if text.starts_with(b"{") || text.starts_with(b"[") {
         "JSON and not the bytes of a file"
+    } else if BASE64.iter().any(contains) {
+        "base64 text and not its bytes"
+    } else if begin.starts_with(b"ffd8ff") || begin.starts_with(b"FFD8FF") {
+        "hexadecimal text and not its bytes"
     } else if bytes.starts_with(&[0x1F, 0x8B]) {
         "compressed with gzip"
     } else {
@@ -95,45 +109,6 @@ pub(super) fn exif_orientation(exif: &[u8]) -> Option<Orientation> {
         _ => return None,
     };
     Orientation::from_exif(number(entry + 8, length)?.try_into().ok()?)
-}
-
-/// Returns true if a JPEG reaches its end-of-image marker (ITU-T T.81, annex B).
-///
-/// Segments are skipped by their length, so that the end marker of a thumbnail inside one does not
-/// count. Bytes between segments are entropy-coded data or padding.
-pub(super) fn jpeg_is_whole(bytes: &[u8]) -> bool {
-    const STUFFED_ZERO: u8 = 0x00;
-    const TEMPORARY: u8 = 0x01;
-    const FIRST_RESTART: u8 = 0xD0;
-    const START_OF_IMAGE: u8 = 0xD8;
-    const END_OF_IMAGE: u8 = 0xD9;
-
-    let mut rest = bytes;
-    loop {
-        match rest {
-            [0xFF, END_OF_IMAGE, ..] => return true,
-            // Markers without a payload. 0xFF before a marker is a fill byte.
-            [
-                0xFF,
-                STUFFED_ZERO | TEMPORARY | FIRST_RESTART..=START_OF_IMAGE,
-                ..,
-            ] => rest = &rest[2..],
-            [0xFF, 0xFF, ..] => rest = &rest[1..],
-            // The length includes its own two bytes, but not the marker's.
-            [0xFF, _, high, low, ..] => {
-                let length = usize::from(u16::from_be_bytes([*high, *low]));
-                match rest.get(2 + length..) {
-                    Some(next) => rest = next,
-                    None => return false,
-                }
-            }
-            [0xFF, ..] | [] => return false,
-            [_, next @ ..] => {
-                let entropy_coded = next.iter().take_while(|byte| **byte != 0xFF).count();
-                rest = &next[entropy_coded..];
-            }
-        }
-    }
 }
 
 /// Returns true if a WebP has all the bytes announced by its RIFF header.

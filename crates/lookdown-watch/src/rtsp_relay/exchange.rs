@@ -101,6 +101,18 @@ impl<'a> Exchange<'a> {
         self.pending.push_back(request);
     }
 
+    /// Returns true if a request with the answer to a challenge has no response.
+    pub(super) fn awaits_login(&self) -> bool {
+        self.pending.iter().any(|request| request.attempts > 1)
+    }
+
+    /// Appends the requests without a response to the bytes for another connection.
+    pub(super) fn send_again(&mut self, to_camera: &mut BytesMut) {
+        for request in std::mem::take(&mut self.pending) {
+            self.send(request, to_camera);
+        }
+    }
+
     /// Appends a message of the camera to the bytes for `ffmpeg`, or an answer to those for the
     /// camera.
     pub(super) fn accept_answer(

@@ -16,6 +16,9 @@ const DIGEST: &str = "RTSP/1.0 401 Unauthorized\r\nWWW-Authenticate: Basic realm
 const BASIC: &str = "RTSP/1.0 401 Unauthorized\r\nWWW-Authenticate: Basic realm=\"c\"\r\n";
 const PATIENCE: Duration = Duration::from_secs(20);
 
+/// A header of the answers after which the camera closes the connection.
+const CLOSES: &str = "X-Closes: yes\r\n";
+
 /// The answers of a camera to its requests, one after another, without their `CSeq`. Returns the
 /// URL, and the requests at the end.
 async fn camera(answers: &[&str]) -> (Url, tokio::task::JoinHandle<Vec<String>>) {
@@ -37,6 +40,10 @@ async fn camera(answers: &[&str]) -> (Url, tokio::task::JoinHandle<Vec<String>>)
             let answer = format!("{start}\r\n{sequence}\r\n{rest}\r\n");
             requests.push(request);
             connection.write_all(answer.as_bytes()).await.unwrap();
+            if answer.contains(CLOSES) {
+                drop(connection);
+                (connection, _) = listener.accept().await.unwrap();
+            }
         }
         // What follows the answers.
         if let Ok(Some(request)) =
@@ -200,4 +207,24 @@ async fn connections_without_the_token_get_nothing() {
         answer = stranger => answer,
     };
     assert_eq!(answer, None);
+}
+
+#[tokio::test]
+async fn a_camera_that_closes_after_the_challenge_is_asked_again() {
+    let closes = format!("{DIGEST}{CLOSES}");
+    let request = "DESCRIBE URL RTSP/1.0\r\nCSeq: 1\r\n\r\n";
+    let (url, serving) = camera(&[&closes, "RTSP/1.0 200 OK\r\n"]).await;
+    let (answers, error) = exchange(&url, &mut login(), &[request]).await;
+    assert!(error.is_none(), "{error:?}");
+    assert!(answers[0].starts_with("RTSP/1.0 200 OK"), "{answers:?}");
+    let requests = serving.await.unwrap();
+    assert!(
+        requests[1].contains("Authorization: Digest"),
+        "{requests:?}"
+    );
+    // A camera that has gone then.
+    let (url, _serving) = camera(&[DIGEST]).await;
+    let (_, error) = exchange(&url, &mut login(), &[request]).await;
+    let is_closed = matches!(error, Some(SourceError::ClosedAfterChallenge));
+    assert!(is_closed, "{error:?}");
 }

@@ -1,7 +1,7 @@
 //! Images on standard input: one image, or JPEG files one after another.
 
 use bytes::Bytes;
-use lookdown_common::JPEG_START;
+use lookdown_common::{JPEG_START, jpeg_length};
 use tokio::io::{AsyncRead, AsyncReadExt};
 
 use super::sink::Sink;
@@ -48,7 +48,8 @@ impl<R: AsyncRead + Unpin> ImageReader<R> {
             }
             if read == 0 {
                 let rest = buffer.split();
-                let is_image = self.is_jpeg == Some(false);
+                // The last JPEG of the stream may lack its end marker.
+                let is_image = self.is_jpeg == Some(false) || jpeg_length(&rest).is_some();
                 return Ok((is_image && !rest.is_empty()).then(|| rest.freeze()));
             }
         }
@@ -82,6 +83,21 @@ mod tests {
     #[tokio::test]
     async fn concatenated_jpeg_files_are_separate_images() {
         assert_eq!(images(&[JPEG, JPEG, JPEG].concat()).await, [JPEG; 3]);
+    }
+
+    #[tokio::test]
+    async fn jpeg_files_may_lack_their_end_marker() {
+        let whole = include_bytes!("../../../../tests/fixtures/images/grey.jpg");
+        let unended = &whole[..whole.len() - 2];
+        let found = images(&[unended, b"dhav\0", unended].concat()).await;
+        assert_eq!(found.len(), 2);
+        for image in found {
+            assert!(image.starts_with(unended));
+            assert!(crate::Frame::new(image, jiff::Timestamp::UNIX_EPOCH).is_ok());
+        }
+        // Bytes of the image itself are missing.
+        let cut = &whole[..whole.len() - 3];
+        assert!(images(&[cut, cut].concat()).await.is_empty());
     }
 
     #[tokio::test]

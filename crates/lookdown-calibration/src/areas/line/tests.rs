@@ -1,5 +1,6 @@
 use super::super::tests::{file, read, refusal};
-use crate::{export::Target, native::NativeCalibration};
+use crate::export::Target;
+use crate::native::NativeCalibration;
 use lookdown_lens::geometry::LineEnds;
 
 const LINES: &str = r#""lines": [

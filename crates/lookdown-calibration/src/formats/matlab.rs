@@ -1,0 +1,50 @@
+//! `fisheyeIntrinsics` or `fisheyeParameters` of MATLAB as `jsonencode` writes them
+//! (<https://www.mathworks.com/help/vision/ref/fisheyeintrinsics.html>): Scaramuzza's model with x
+//! along the columns and z out of the lens.
+//!
+//! The polynomial has no linear term: `a0 a2 a3 a4`. The size is height, then width. The first
+//! pixel has its center at 1.
+
+use super::{
+    Camera, FormatError,
+    column_first::{ColumnFirst, negated},
+    fields::{Fields, whole_pixels},
+};
+use crate::native::NativeImage;
+
+/// The field that marks the format.
+pub(super) const POLYNOMIAL: &str = "MappingCoefficients";
+
+pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
+    let intrinsics = "Intrinsics";
+    let camera = if fields.has(intrinsics) {
+        fields.child(intrinsics)?
+    } else {
+        fields.clone()
+    };
+    let [a0, a2, a3, a4] = camera.exactly(POLYNOMIAL, "a0, a2, a3, a4")?;
+    let [cx, cy] = camera.exactly("DistortionCenter", "column and row")?;
+    let [c, d, e, one] = camera.exactly("StretchMatrix", "[[c, d], [e, 1]]")?;
+    if one != 1.0 {
+        let problem = format!("its last number is {one}: it must be 1");
+        return Err(camera.invalid("StretchMatrix", problem));
+    }
+    let size = "ImageSize";
+    let sides = camera.exactly(size, "height and width")?.map(whole_pixels);
+    let [Some(height), Some(width)] = sides else {
+        return Err(camera.invalid(size, "whole numbers of pixels are needed"));
+    };
+    let polynomial = negated(&[a0, 0.0, a2, a3, a4]);
+    let lens = ColumnFirst {
+        polynomial,
+        c,
+        d,
+        e,
+        cx: cx - 1.0,
+        cy: cy - 1.0,
+    };
+    Ok(Camera::new(
+        Some(NativeImage { width, height }),
+        lens.into_lens()?,
+    ))
+}
