@@ -1,4 +1,4 @@
-"""Composes many frames of each of some tilted cameras, with other people in each: a data set for `scripts/floor_places.py`.
+"""Composes many frames of each of some tilted cameras, with other people in each: a data set for `lab/calibration/floor_places.py`.
 
     python lab/training/make.py persons --work WORK --split unseen --first-seed 2100000 --count 70
     python lab/training/fixed_cameras.py --work WORK --split unseen --cameras 12 --people 200 --out OUT [--upright]

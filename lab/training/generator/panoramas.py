@@ -1,6 +1,6 @@
 """Writes rooms as frames of cameras that look straight down, with their calibrations: `WORK/panoramas/SPLIT`.
 
-The folder is a data set for `scripts/tilted_rooms.py`, which remaps its frames to tilted cameras.
+The folder is a data set for `lab/calibration/tilted_rooms.py`, which remaps its frames to tilted cameras.
 """
 
 import json

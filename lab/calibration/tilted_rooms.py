@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Make frames of tilted cameras from the rendered rooms of a data set, with their true calibrations.
 
-    python scripts/tilted_rooms.py DATASET OUT [--variants 4] [--frames 1] [--seed 1] [--first 0] [--step 1] [--tilt 25] [--wall]
+    python lab/calibration/tilted_rooms.py DATASET OUT [--variants 4] [--frames 1] [--seed 1] [--first 0] [--step 1] [--tilt 25] [--wall]
 
 Each frame of the data set is remapped to another lens: a model of five, a tilt of 0 to TILT degrees, a
 center off by up to 2 % of the width, a circle cut at 75 to 100 degrees. Some variants add noise, blur,
