@@ -30,12 +30,6 @@ def ratios(ours: Sequence[float], theirs: Sequence[float]) -> Spread:
     return spread([our / their for our, their in zip(ours, theirs, strict=True)])
 
 
-def growth(values: Sequence[float]) -> float:
-    """The median of the last quarter minus that of the second; the first is the warm-up."""
-    quarter = max(len(values) // 4, 1)
-    return median(values[-quarter:]) - median(values[quarter : 2 * quarter] or values[:1])
-
-
 def round_to(value: float, digits: int = 3) -> str:
     """Formats a number with `digits` significant digits and no further decimals."""
     if not math.isfinite(value):

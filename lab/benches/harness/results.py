@@ -30,7 +30,7 @@ def write(parts: dict[str, ModuleType]) -> None:
         if _file(part).is_file():
             raw = json.loads(_file(part).read_text(encoding="utf-8"))
             figures = raw["figures"]
-            sections += [f"## {title}", _description_of(raw["made"]), part.tell(figures), part.draw(figures)]
+            sections += [f"## {title}", _description_of(raw["made"]), part.tell(figures)]
     RESULTS.write_text("\n\n".join(section.strip() for section in sections if section) + "\n", encoding="utf-8")
 
 

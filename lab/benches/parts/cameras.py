@@ -62,8 +62,3 @@ def tell(raw: dict) -> str:
             for row in raw["cameras"]
         ],
     )
-
-
-def draw(_raw: dict) -> str:
-    """No chart: the table shows everything."""
-    return ""

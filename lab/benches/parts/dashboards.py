@@ -148,8 +148,3 @@ def tell(raw: dict) -> str:
         (f"… and after {REPORTS - REPORTS // 4} more reports, MiB", listening["mib_more"]),
     ]
     return table(("", ""), rows)
-
-
-def draw(_raw: dict) -> str:
-    """No chart: the table shows everything."""
-    return ""

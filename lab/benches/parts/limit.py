@@ -3,7 +3,6 @@
 import os
 import subprocess
 
-from harness.charts import bars
 from harness.effort import Effort
 from harness.figures import ratios, spread
 from harness.frames import frame
@@ -73,9 +72,3 @@ def tell(raw: dict) -> str:
         + "\nTested settings of bare ONNX Runtime (sessions × threads, views in a run):\n\n"
         + table(("setting", "frames/s"), tuning)
     )
-
-
-def draw(raw: dict) -> str:
-    """Server and bare settings as a chart."""
-    values = {"Lookdown /detect": spread(raw["ours"]).median, f"bare, {raw['best']}": spread(raw["bare"]).median}
-    return bars("limit", f"{PROFILE}: the server and the bare network", "frames per second", values)

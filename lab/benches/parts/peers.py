@@ -9,7 +9,6 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from harness import peers
-from harness.charts import bars
 from harness.effort import Effort
 from harness.figures import ratios, spread
 from harness.frames import frame
@@ -142,12 +141,3 @@ def told_agreement(rows: list[dict]) -> str:
     head = ("our refinement", "boxes we find", "boxes it finds with NMS", "the same ones", "mean IoU of those")
     found = [(row["refine"], row["ours"], row["theirs"], row["same"], row["mean_iou"]) for row in rows]
     return f"Agreement of the results, with the same plan and model:\n\n{table(head, found)}"
-
-
-def draw(raw: dict) -> str:
-    """The comparison as a chart."""
-    values = {
-        name.replace("`", ""): spread([result["succeeded_per_second"] for result in rounds]).median
-        for name, rounds in raw["rounds"].items()
-    }
-    return bars("peers", f"1680 × 1680 JPEG, {MODEL}", "frames per second", values)

@@ -2,7 +2,6 @@
 
 from statistics import median
 
-from harness.charts import lines
 from harness.effort import Effort
 from harness.frames import frame
 from harness.load import load, steady
@@ -96,13 +95,3 @@ def open_row(profile: str, result: dict) -> tuple:
         *(profile, result["percent"], result["succeeded_per_second"], *times),
         *(refused["count"], refused.get("p99_ms"), unanswered, result["cores"]),
     )
-
-
-def draw(raw: dict) -> str:
-    """Latency with clients as a chart."""
-    series = {
-        profile: [(result["clients"], result["succeeded"].get("p50_ms", float("nan"))) for result in part["closed"]]
-        for profile, part in raw.items()
-    }
-    labels = ("clients (closed loop)", "median latency, ms")
-    return lines("whole", "Latency with clients, 1680 × 1680 JPEG", labels, series, logarithmic=True)

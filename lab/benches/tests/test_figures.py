@@ -2,7 +2,7 @@
 
 import unittest
 
-from harness.figures import growth, ratios, round_to, spread
+from harness.figures import ratios, round_to, spread
 
 
 class Figures(unittest.TestCase):
@@ -17,10 +17,6 @@ class Figures(unittest.TestCase):
     def test_rounds_without_a_partner_are_refused(self):
         with self.assertRaises(ValueError):
             ratios([1.0, 2.0], [1.0])
-
-    def test_growth_leaves_the_warm_up_out(self):
-        self.assertEqual(growth([0.0, 50.0, 100.0, 100.0, 100.0, 101.0, 103.0, 103.0]), 3.0)
-        self.assertEqual(growth([7.0]), 0.0)
 
     def test_numbers_keep_three_digits_and_no_false_ones(self):
         values = (0.012345, 0.5, 12.34, 1234.5, 0.0, float("nan"))
