@@ -31,12 +31,12 @@ class Effort:
 
 FULL = Effort(
     name="full",
-    profiles=("fast", "balanced", "paper"),
+    profiles=("fast", "balanced"),
     seconds=30.0,
     rounds=5,
     tune_seconds=5.0,
-    clients=(1, 4, 16, 64),
-    loads=(50, 80, 120, 1000),
+    clients=(1, 4, 16),
+    loads=(80, 120, 1000),
     peer_clients=16,
     cameras=(1, 10, 100, 1000),
     frames=30,
@@ -57,7 +57,6 @@ MEDIUM = replace(
 SHORT = replace(
     FULL,
     name="short",
-    profiles=("fast", "balanced"),
     seconds=3.0,
     rounds=1,
     tune_seconds=1.5,

@@ -40,7 +40,6 @@ def _file(part: ModuleType):
 
 def _description_of(about: dict) -> str:
     return (
-        f"*{about['date']}, commit {about['commit']}, {about['effort']} run; {about['cpu']}, {about['cores']} cores, "
-        f"{about['memory_gib']:.0f} GiB, {about['system']}; ONNX Runtime {about['onnx_runtime']}, {about['rust']}; "
-        f"load of the machine before: {about['load_before']:.1f}*"
+        f"*{about['date']}, commit {about['commit']}, {about['effort']} run; {about['cpu']}, {about['cores']} cores; "
+        f"ONNX Runtime {about['onnx_runtime']}; load before: {about['load_before']:.1f}*"
     )

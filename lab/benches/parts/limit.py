@@ -59,16 +59,13 @@ def bare(views, sessions: int, threads: int, batch: int, seconds: float) -> floa
 
 
 def tell(raw: dict) -> str:
-    """The ratio and the settings as Markdown."""
+    """The ratio as Markdown."""
     rows = [
         ("`/detect`, frames/s", spread_cell(spread(raw["ours"]).as_json())),
         (f"bare ONNX Runtime ({raw['best']}), frames/s", spread_cell(spread(raw["bare"]).as_json())),
         ("**ratio, round by round**", spread_cell(ratios(raw["ours"], raw["bare"]).as_json())),
     ]
-    tuning = sorted(raw["tuning"].items(), key=lambda item: -item[1])
     return (
         f"`{PROFILE}`, {MODEL}, {raw['views']} views per frame, {CLIENTS} clients, {len(raw['ours'])} rounds:\n\n"
         + table(("", "median (range)"), rows)
-        + "\nTested settings of bare ONNX Runtime (sessions × threads, views in a run):\n\n"
-        + table(("setting", "frames/s"), tuning)
     )

@@ -9,7 +9,7 @@ from harness.lookdown import ROOMY, detect, lookdown, report
 from harness.processes import Server
 from harness.tables import table
 
-STAGES = ("decode", "calibrate", "queue", "remap", "inference", "refine", "total")
+STAGES = ("decode", "remap", "inference", "refine", "total")
 
 
 def measure(effort: Effort) -> dict:
@@ -58,12 +58,12 @@ def tell(raw: dict) -> str:
             table(("profile", *STAGES, "not the network"), [stage_row(name, part) for name, part in raw.items()]),
             "Closed loop: each client sends its next request after the response.\n",
             table(
-                ("profile", "clients", "frames/s", "p50, ms", "p95", "p99", "cores used", "memory, MiB"),
+                ("profile", "clients", "frames/s", "p50, ms", "p99", "cores used", "memory, MiB"),
                 [closed_row(name, result) for name, part in raw.items() for result in part["closed"]],
             ),
             open_loop,
             table(
-                ("profile", "load, % of capacity", "frames/s", "p50, ms", "p95", "p99")
+                ("profile", "load, % of capacity", "frames/s", "p50, ms", "p99")
                 + ("refused", "p99 of refusals, ms", "broken or late", "cores used"),
                 [open_row(name, result) for name, part in raw.items() for result in part["open"]],
             ),
@@ -81,7 +81,7 @@ def stage_row(profile: str, part: dict) -> tuple:
 def closed_row(profile: str, result: dict) -> tuple:
     """One closed loop."""
     late = result["succeeded"]
-    times = (late.get(name) for name in ("p50_ms", "p95_ms", "p99_ms"))
+    times = (late.get(name) for name in ("p50_ms", "p99_ms"))
     usage = result["cores"], round(result["resident_mib"])
     return profile, result["clients"], result["succeeded_per_second"], *times, *usage
 
@@ -89,7 +89,7 @@ def closed_row(profile: str, result: dict) -> tuple:
 def open_row(profile: str, result: dict) -> tuple:
     """One open loop."""
     late, refused = result["succeeded"], result["refused"]
-    times = (late.get(name) for name in ("p50_ms", "p95_ms", "p99_ms"))
+    times = (late.get(name) for name in ("p50_ms", "p99_ms"))
     unanswered = result["broken"] + result["timed_out"]
     return (
         *(profile, result["percent"], result["succeeded_per_second"], *times),
