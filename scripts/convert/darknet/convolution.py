@@ -5,9 +5,8 @@ import math
 import numpy
 
 from ..onnx_builder import OnnxBuilder
-from .activations import activate, activation_of
 from .cfg import Section
-from .layer import Layer, Shape, steps
+from .layer import Layer, Shape, activate, activation_of, steps
 
 # Added to the variance before its root is taken. Darknet adds this to the root itself, or 1e-5 to the variance on a
 # GPU; for trained networks with larger variances, the outputs differ by less than 0.1 %.

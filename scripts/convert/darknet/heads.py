@@ -8,7 +8,7 @@ from .layer import Layer, Shape
 
 
 class Head(Layer):
-    """A layer that decodes boxes in darknet. It returns the raw numbers; `yolo_boxes` decodes those of YOLOv3.
+    """A layer that decodes boxes in darknet. It returns the raw numbers; `detector` decodes those of YOLOv3.
 
     Per anchor the channels are t_x, t_y, t_w, t_h, t_o and one per class.
     """

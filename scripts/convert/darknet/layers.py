@@ -6,9 +6,8 @@ Shapes follow darknet's rules for rounding and padding, which its source states 
 import numpy
 
 from ..onnx_builder import OnnxBuilder
-from .activations import activate, activation_of
 from .cfg import Section
-from .layer import Layer, Shape, steps
+from .layer import Layer, Shape, activate, activation_of, steps
 
 
 class MaxPool(Layer):
