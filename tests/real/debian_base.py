@@ -1,17 +1,13 @@
 """A minimal Debian for the parts that need one: the base of the image, and the root of the package's tests."""
 
 import shutil
-import subprocess
 from pathlib import Path
 
+from commands import run
 from harness.places import ROOT
 
 RELEASE = "bookworm"
 PLACE = ROOT / ".setup" / "real"
-
-
-class DebianError(Exception):
-    """A failed creation of the folder, with the output of `debootstrap`."""
 
 
 def debian_base(*packages: str) -> Path:
@@ -22,10 +18,7 @@ def debian_base(*packages: str) -> Path:
         shutil.rmtree(unfinished, ignore_errors=True)
         unfinished.parent.mkdir(parents=True, exist_ok=True)
         more = [f"--include={','.join(packages)}"] if packages else []
-        command = ["debootstrap", "--variant=minbase", *more, RELEASE, unfinished]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        if done.returncode:
-            raise DebianError(f"debootstrap failed:\n{done.stdout[-3000:]}{done.stderr[-3000:]}")
+        run("debootstrap", "--variant=minbase", *more, RELEASE, unfinished, seconds=3600)
         for package in (unfinished / "var" / "cache" / "apt" / "archives").glob("*.deb"):
             package.unlink()
         unfinished.rename(place)

@@ -4,16 +4,17 @@ import contextlib
 import json
 import os
 import signal
-import subprocess
 import tempfile
 import unittest
 from pathlib import Path
 
+from commands import run
 from harness.places import ROOT, SAMPLES
 from mosquitto import PASSWORD, PASSWORD_IN_URL, broker
 from support.lookdown import TINY, lookdown
 from waiting import wait_until
 
+from cameras import office_calibration
 from metrics import metric
 
 OFFICE = (SAMPLES / "office.jpg").read_bytes()
@@ -44,10 +45,7 @@ class Mqtt(unittest.TestCase):
 
     def setUp(self):
         self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
-        calibration = json.loads((SAMPLES / "calibrations" / "office.json").read_text(encoding="utf-8"))
-        self.calibrations = self.folder / "calibrations"
-        self.calibrations.mkdir()
-        (self.calibrations / "office.json").write_text(json.dumps(calibration | {"zones": AREAS}), encoding="utf-8")
+        self.calibrations = office_calibration(self.folder / "calibrations", zones=AREAS)
         self.broker = self.enterContext(broker(self.folder))
 
     def lookdown(self, **settings: str):
@@ -208,7 +206,7 @@ class MqttOverTls(unittest.TestCase):
                 *("-days", "2", "-extfile", names, "-out", certificate),
             ],
         ):
-            subprocess.run(["openssl", *command], check=True, capture_output=True)
+            run("openssl", *command)
         tls = {"certfile": certificate, "keyfile": key, "cafile": authority}
         self.broker = self.enterContext(broker(self.folder, tls))
 

@@ -2,10 +2,10 @@
 
 import json
 import os
-import subprocess
 import unittest
 from pathlib import Path
 
+from commands import run
 from harness.places import ROOT, SAMPLES
 from support.lookdown import lookdown
 
@@ -22,17 +22,9 @@ class TritonClient(unittest.TestCase):
         frame = (SAMPLES / "office.jpg").read_bytes()
         with lookdown({}) as server:
             cls.report = json.loads(server.post("/detect?calibration=office&profile=fast", frame))
-            ran = subprocess.run(
-                [str(PYTHON), str(ASKING), server.address, str(SAMPLES / "office.jpg")],
-                capture_output=True,
-                text=True,
-                timeout=300,
-                env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"},
-                check=False,
-            )
-        if ran.returncode:
-            raise AssertionError(f"the client failed: {ran.stderr[-3000:]}")
-        cls.told = json.loads(ran.stdout)
+            environment = os.environ | {"PYTHONDONTWRITEBYTECODE": "1"}
+            said = run(PYTHON, ASKING, server.address, SAMPLES / "office.jpg", environment=environment)
+        cls.told = json.loads(said)
 
     def test_it_reports_a_live_and_ready_server(self) -> None:
         self.assertEqual(self.told["health"], [True, True, True, False])

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from commands import run
 from waiting import wait_until
 
 BOOT_SECONDS = 120.0
@@ -19,11 +20,7 @@ class Booted:
 
     def run(self, *command: str) -> str:
         """Returns the output of a command that must succeed."""
-        entered = ["nsenter", f"--target={self._first_process()}", "--all", *command]
-        done = subprocess.run(entered, capture_output=True, text=True, check=False, timeout=120)
-        if done.returncode != 0:
-            raise AssertionError(f"{command}:\n{done.stdout}{done.stderr}")
-        return done.stdout.strip()
+        return run("nsenter", f"--target={self._first_process()}", "--all", *command, seconds=120).strip()
 
     def show(self, unit: str, name: str) -> str:
         """A property of a unit, by its name in `systemctl show`."""
@@ -31,8 +28,7 @@ class Booted:
 
     def _first_process(self) -> int:
         """The process that has the number 1 inside."""
-        listed = subprocess.run(["ps", "-eo", "pid=,ppid=,comm="], capture_output=True, text=True, check=True).stdout
-        processes = [line.split() for line in listed.splitlines()]
+        processes = [line.split() for line in run("ps", "-eo", "pid=,ppid=,comm=").splitlines()]
         # systemd-nspawn has a child that becomes the systemd inside.
         return next(
             int(pid) for pid, parent, name, *_ in processes if (int(parent), name) == (self.process.pid, "systemd")

@@ -6,6 +6,7 @@ import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
+from commands import run
 from debian_base import debian_base
 
 UNITS = "usr/lib/systemd/system"
@@ -30,17 +31,8 @@ class Chroot:
     def run(self, *command: str | Path) -> str:
         """Returns the output of a command that must succeed."""
         environment = {"PATH": "/usr/sbin:/usr/bin:/sbin:/bin", "DEBIAN_FRONTEND": "noninteractive", "LC_ALL": "C"}
-        done = subprocess.run(
-            ["/usr/bin/unshare", "--mount", "/bin/sh", "-c", WITH_PROC, "sh", self.root, *command],
-            env=environment,
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=300,
-        )
-        if done.returncode != 0:
-            raise AssertionError(f"{command}:\n{done.stdout}{done.stderr}")
-        return done.stdout
+        isolated = ["/usr/bin/unshare", "--mount", "/bin/sh", "-c", WITH_PROC, "sh", self.root]
+        return run(*isolated, *command, environment=environment)
 
     def install(self, package: Path) -> None:
         """Installs a package file. The base has all of its dependencies."""
