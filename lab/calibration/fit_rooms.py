@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Measure `lookdown calibration fit` on frames with true calibrations: `fit_rooms.py DATASET [--binary PATH] [--people]`.
 
-DATASET is a folder of `tilted_rooms.py`, or of the generator of training frames, whose rooms two options use: `--half`
-takes every second group of four rooms, and `--rooms` names the folder of the rooms to report their kinds.
+DATASET is a folder of `tilted_rooms.py`, or of the generator of training frames: `--half` takes every second group of
+four of its rooms.
 
 Prints one line per camera, then median, 95 % quantile and greatest value of three errors: the radius at 20 to 80 degrees
 in percent, the center in percent of the width, the level in degrees. Cameras that the program refuses are counted by
@@ -27,10 +27,6 @@ LIMITS = {"radius": 2.0, "center": 0.7, "level": 1.0}
 WRONG = {"radius": 5.0, "level": 3.0}
 #: Upper ends of the groups of tilts, degrees.
 TILTS = [1, 5, 25, 36, 90]
-#: A narrower room is a corridor, meters.
-CORRIDOR = 5.0
-#: Objects in 100 square meters below which a room is sparse, and above which it is cluttered.
-SPARSE, CLUTTERED = 10, 25
 
 
 def errors(found, true):
@@ -77,27 +73,13 @@ def run(binary, *arguments):
     return None, re.sub(r"[\d.]+", "N", said), seconds
 
 
-def room_kind(path):
-    """The kind of a room of the generator, from its size and its objects."""
-    with np.load(path) as arrays:
-        about = json.loads(bytes(arrays["about"]))
-    width, depth = about["size"]
-    if min(width, depth) < CORRIDOR:
-        return "corridor"
-    density = 100 * len(about["occupied"]) / (width * depth)
-    return "sparse" if density < SPARSE else "cluttered" if density > CLUTTERED else "furnished"
-
-
-def groups(image, true, rooms):
+def groups(image, true):
     """The groups that a camera belongs to."""
     tilt = math.degrees(math.acos(min(1.0, -true["mount"]["world_up"][2])))
     names = [f"tilt up to {next(end for end in TILTS if tilt <= end)}°"]
     names += [f"lens {true['lens']['model']}"]
     names += [f"degradation {image['degradation']}"] if "degradation" in image else []
     names += [f"look {image['look']['kind']}"] if "look" in image else []
-    if rooms:
-        file = f"{image['room']}.npz"
-        names.append(f"room {room_kind(rooms / file)}")
     return names
 
 
@@ -122,7 +104,6 @@ def main():
     parser.add_argument("--binary", default="target/release/lookdown")
     parser.add_argument("--people", action="store_true", help="compare places on the floor")
     parser.add_argument("--half", type=int, choices=[0, 1], help="every second group of four rooms")
-    parser.add_argument("--rooms", type=Path, help="folder of the rooms of the generator")
     parser.add_argument("--lens", action="store_true", help="give the true model of ideal lenses, leave others out")
     arguments = parser.parse_args()
     images = json.loads((arguments.dataset / "annotations.json").read_text())["images"]
@@ -137,7 +118,7 @@ def main():
         if arguments.lens and "focal" not in true["lens"]:
             continue
         given = ["--lens", true["lens"]["model"]] if arguments.lens else []
-        names = groups(shots[0], true, arguments.rooms)
+        names = groups(shots[0], true)
         found, reason, seconds = run(arguments.binary, "fit", *given, *frames)
         for name in names:
             counts[name]["cameras"] += 1

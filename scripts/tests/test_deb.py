@@ -1,4 +1,4 @@
-"""The changelog and the copyright file of the Debian package."""
+"""The changelog, the copyright file and the units of the Debian package."""
 
 import tempfile
 import tomllib
@@ -31,6 +31,12 @@ class Deb(unittest.TestCase):
         for part in ("/usr/share/common-licenses/Apache-2.0", "the notices", "MIT License", "models/one"):
             self.assertIn(part, text)
         self.assertNotIn("models/two", text)
+
+    def test_each_unit_limits_its_memory(self):
+        units = sorted((ROOT / "packaging" / "debian").glob("*.service"))
+        self.assertEqual(len(units), 3)
+        for unit in units:
+            self.assertIn("\nMemoryMax=", unit.read_text(encoding="utf-8"), unit.name)
 
 
 if __name__ == "__main__":

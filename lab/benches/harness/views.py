@@ -1,6 +1,5 @@
 """The views of the frame for the networks of other servers, rendered with OpenCV."""
 
-import base64
 import json
 import sys
 from pathlib import Path
@@ -28,15 +27,4 @@ def view_file(plan: dict, size: int) -> Path:
     lens = Lens(json.loads(calibration().read_text(encoding="utf-8")), SIDE)
     rgb = cv2.cvtColor(cv2.imread(str(frame())), cv2.COLOR_BGR2RGB)
     np.save(file, np.stack([View(view, size, lens).render(rgb).transpose(2, 0, 1) for view in plan["views"]]))
-    return file
-
-
-def v2_request(views: Path) -> Path:
-    """The views as a V2 request in JSON."""
-    tensor = np.load(views)
-    data = base64.b64encode(tensor.tobytes()).decode("ascii")
-    parameters = {"content_type": "base64"}
-    wanted = {"name": "images", "shape": [1, 1], "datatype": "BYTES", "parameters": parameters, "data": [data]}
-    file = views.with_suffix(".json")
-    file.write_text(json.dumps({"inputs": [wanted]}), encoding="utf-8")
     return file

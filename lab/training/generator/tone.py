@@ -1,4 +1,4 @@
-"""From linear light to display values: a film-like curve, and its use for sheets."""
+"""From linear light to display values: a film-like curve, and its use for images."""
 
 import numpy as np
 
