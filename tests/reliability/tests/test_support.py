@@ -6,7 +6,6 @@ import threading
 import unittest
 
 from support.exchange import Lost, ask, connect
-from support.frames import png
 from support.holdings import growth
 
 
@@ -51,8 +50,3 @@ class Exchange(unittest.TestCase):
             port = listener.getsockname()[1]
         with self.assertRaises(ConnectionRefusedError):
             connect(f"127.0.0.1:{port}")
-
-
-class Frames(unittest.TestCase):
-    def test_an_image_of_many_pixels_is_small(self):
-        self.assertLess(len(png(2000, 2000)), 20_000)
