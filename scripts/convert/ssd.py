@@ -2,7 +2,7 @@
 
 import numpy
 
-from .errors import ConversionError
+from . import ConversionError
 from .onnx_builder import OnnxBuilder
 from .tfjs import TfGraph
 from .translate import Translator

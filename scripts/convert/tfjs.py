@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy
 
-from .errors import ConversionError
+from . import ConversionError
 
 ELEMENT_TYPES = {"float32": numpy.float32, "int32": numpy.int32, "float16": numpy.float16}
 

@@ -6,7 +6,7 @@ made here is of the second kind, so only weights and constants are ever turned r
 
 import numpy
 
-from .errors import ConversionError
+from . import ConversionError
 from .onnx_builder import OnnxBuilder
 from .tfjs import TfGraph, TfNode
 

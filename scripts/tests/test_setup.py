@@ -14,8 +14,7 @@ from unittest import mock
 import setup
 from assets import main
 from assets.console import SetupError
-from assets.machine import supported_cpu
-from assets.toolchain import check_toolchain
+from assets.machine import check_toolchain, supported_cpu
 from dist import ROOT
 
 from .support import InEmptyFolder

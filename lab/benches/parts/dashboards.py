@@ -11,11 +11,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from harness.effort import Effort
-from harness.figures import ratios, spread
+from harness.figures import ratios, spread, spread_cell, table
 from harness.frames import frame
 from harness.lookdown import detect, lookdown, report
 from harness.processes import BenchError, Server, free_ports, running
-from harness.tables import spread_cell, table
 
 POLLERS = 200
 LISTENERS = 1000

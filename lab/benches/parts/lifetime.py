@@ -5,10 +5,9 @@ import time
 from pathlib import Path
 
 from harness.effort import Effort
-from harness.figures import spread
+from harness.figures import spread, spread_cell, table
 from harness.frames import cameras, frame
 from harness.lookdown import detect, lookdown, report
-from harness.tables import spread_cell, table
 
 PROFILE = "balanced"
 CAMERAS = 100

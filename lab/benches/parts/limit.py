@@ -1,17 +1,23 @@
 """The limit: as many views through bare ONNX Runtime on ready tensors, alternating with the server."""
 
+import json
 import os
 import subprocess
+import sys
+from pathlib import Path
 
+import cv2
+import numpy as np
 from harness.effort import Effort
-from harness.figures import ratios, spread
-from harness.frames import frame
+from harness.figures import ratios, spread, spread_cell, table
+from harness.frames import SIDE, calibration, frame
 from harness.load import load
 from harness.lookdown import MODEL, ROOMY, detect, lookdown, report, view_plan
-from harness.places import BENCHES, model, python_of
+from harness.places import BENCHES, PEERS, WORK, model, python_of
 from harness.processes import BenchError
-from harness.tables import spread_cell, table
-from harness.views import view_file
+
+sys.path.insert(0, str(PEERS / "plain_python"))
+from views import Lens, View  # noqa: E402
 
 PROFILE = "balanced"
 INPUT_SIDE = 416
@@ -40,6 +46,15 @@ def measure(effort: Effort) -> dict:
             result = load(server, [path], frame(), clients=CLIENTS, warm_up=2.0, seconds=effort.seconds)
             ours.append(result["succeeded_per_second"])
     return {"views": count, "tuning": tuning, "best": best, "ours": ours, "bare": theirs}
+
+
+def view_file(plan: dict, size: int) -> Path:
+    """The views of the frame as bytes `[views, 3, size, size]`."""
+    file = WORK / f"views-{plan['profile']}-{size}.npy"
+    lens = Lens(json.loads(calibration().read_text(encoding="utf-8")), SIDE)
+    rgb = cv2.cvtColor(cv2.imread(str(frame())), cv2.COLOR_BGR2RGB)
+    np.save(file, np.stack([View(view, size, lens).render(rgb).transpose(2, 0, 1) for view in plan["views"]]))
+    return file
 
 
 def shares() -> list[tuple[int, int]]:

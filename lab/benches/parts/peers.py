@@ -7,17 +7,17 @@
 import json
 import time
 from contextlib import ExitStack
+from pathlib import Path
 
 from harness import peers
 from harness.boxes import boxes, matched
 from harness.effort import Effort
-from harness.figures import ratios, spread
+from harness.figures import ratios, spread, spread_cell, table
 from harness.frames import frame
 from harness.load import load, steady
 from harness.lookdown import MODEL, ROOMY, detect, lookdown, report, view_plan
+from harness.places import WORK
 from harness.processes import Server
-from harness.tables import spread_cell, table
-from harness.views import plan_file
 
 OURS, THEIRS = ("Lookdown, `balanced`", "Lookdown, `fast`"), "plain Python, "
 SLICE = 640
@@ -70,6 +70,13 @@ def measure(effort: Effort) -> dict:
             "rounds": rounds,
             "agreement": agreement(ours, servers["plain"]),
         }
+
+
+def plan_file(plan: dict) -> Path:
+    """A view plan as a file."""
+    file = WORK / f"plan-{plan['profile']}.json"
+    file.write_text(json.dumps(plan), encoding="utf-8")
+    return file
 
 
 def plain_body() -> dict:

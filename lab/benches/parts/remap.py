@@ -5,9 +5,9 @@ import subprocess
 import sys
 
 from harness.effort import Effort
+from harness.figures import table
 from harness.places import BENCHES
 from harness.processes import BenchError
-from harness.tables import table
 
 
 def measure(effort: Effort) -> list[dict]:

@@ -3,11 +3,11 @@
 from statistics import median
 
 from harness.effort import Effort
+from harness.figures import table
 from harness.frames import frame
 from harness.load import load, steady
 from harness.lookdown import ROOMY, detect, lookdown, report
 from harness.processes import Server
-from harness.tables import table
 
 STAGES = ("decode", "remap", "inference", "refine", "total")
 

@@ -4,8 +4,7 @@ import os
 import unittest
 
 from harness.boxes import boxes, iou, matched
-from harness.figures import ratios, round_to, spread
-from harness.tables import spread_cell, table
+from harness.figures import ratios, round_to, spread, spread_cell, table
 from harness.usage import usage_of
 
 HERE, THERE, NEARBY = [0.0, 0.0, 10.0, 10.0], [50.0, 0.0, 60.0, 10.0], [0.0, 0.0, 10.0, 8.0]

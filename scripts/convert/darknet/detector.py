@@ -9,9 +9,9 @@ import numpy
 
 from ..model_folder import person_class, write_model_folder
 from ..onnx_builder import OnnxBuilder
+from .files import read_weights
 from .heads import Region, Yolo
 from .network import Network, read_network
-from .weights import read_weights
 
 
 def convert_detector(cfg: Path, weights: Path, folder: Path, name: str, class_names: Path | None) -> str:

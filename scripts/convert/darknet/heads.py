@@ -3,7 +3,7 @@
 import numpy
 
 from ..onnx_builder import OnnxBuilder
-from .cfg import Section
+from .files import Section
 from .layer import Layer, Shape
 
 

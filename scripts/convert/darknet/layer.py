@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy
 
 from ..onnx_builder import OnnxBuilder
-from .cfg import Section
+from .files import Section
 
 LEAKY_SLOPE = 0.1
 

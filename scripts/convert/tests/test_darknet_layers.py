@@ -1,6 +1,6 @@
 """Each kind of layer equals the reference."""
 
-from ..errors import ConversionError
+from .. import ConversionError
 from .made_up_darknet import convolution, section
 from .support import WithDarknetFiles
 
