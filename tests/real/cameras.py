@@ -15,7 +15,7 @@ from pathlib import Path
 
 from harness.places import SAMPLES
 from harness.processes import free_ports
-from waiting import wait_until
+from state import wait_until
 
 HERE = Path(__file__).resolve().parent
 USER, PASSWORD = "viewer", "s@cret/of:gate"

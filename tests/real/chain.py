@@ -13,7 +13,7 @@ from harness.places import LOOKDOWN, ROOT
 from harness.processes import Server, running
 from hosts import Host, hosts
 from redis_server import RedisServer
-from waiting import wait_until
+from state import wait_until
 
 REPLICAS = ("r1", "r2", "r3")
 RECIPE = ROOT / "docker" / "haproxy.cfg"

@@ -12,10 +12,8 @@ from email.message import Message
 
 from harness.places import SAMPLES, model
 from harness.processes import Server, free_ports
+from state import metric, wait_until
 from support.lookdown import lookdown
-from waiting import wait_until
-
-from metrics import metric
 
 MODEL = "nanodet_g_views_416_fp16"
 """Every library computes it in FP32, and INT8 in its own way."""

@@ -9,11 +9,10 @@ import urllib.request
 from pathlib import Path
 
 from commands import run
-from deb.booted import booted
-from deb.chroot import UNIT, Chroot
+from debian import UNIT, Chroot, booted
 from harness.places import LOOKDOWN, ROOT, SAMPLES
 from harness.processes import free_ports
-from waiting import wait_until
+from state import wait_until
 
 SCRIPTS = ROOT / "scripts"
 LARGEST_EXPOSURE = 2.0

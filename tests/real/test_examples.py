@@ -18,9 +18,9 @@ from pathlib import Path
 from commands import run
 from harness.places import ROOT, SAMPLES
 from harness.processes import free_ports
+from state import wait_until
 from support.lookdown import lookdown
 from test_count import OTHER_SECRET, SECRET, CountedCamera
-from waiting import wait_until
 
 EXAMPLES = ROOT / "examples"
 OFFICE = SAMPLES / "office.jpg"

@@ -13,9 +13,9 @@ from pathlib import Path
 
 from harness.places import ROOT, SAMPLES
 from mosquitto import PASSWORD, USER, Broker, broker
+from state import wait_until
 from support.lookdown import lookdown
 from test_count import CountedCamera
-from waiting import wait_until
 
 from cameras import empty_frame, http_camera, office_calibration
 

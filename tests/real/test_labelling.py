@@ -14,8 +14,8 @@ from urllib.request import Request, urlopen
 from commands import run
 from harness.places import LOOKDOWN, ROOT, SAMPLES
 from harness.processes import free_ports
+from state import wait_until
 from support.lookdown import lookdown
-from waiting import wait_until
 
 from cameras import Handler, serving
 

@@ -13,8 +13,8 @@ from commands import run
 from harness.places import LOOKDOWN, ROOT, SAMPLES, model
 from harness.processes import free_ports, running
 from kubernetes.tools import kustomized, manifests, only, read_yaml
+from state import wait_until
 from support.lookdown import lookdown
-from waiting import wait_until
 
 from cameras import office_calibration
 

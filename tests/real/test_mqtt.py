@@ -11,11 +11,10 @@ from pathlib import Path
 from commands import run
 from harness.places import ROOT, SAMPLES
 from mosquitto import PASSWORD, PASSWORD_IN_URL, broker
+from state import metric, wait_until
 from support.lookdown import TINY, lookdown
-from waiting import wait_until
 
 from cameras import office_calibration
-from metrics import metric
 
 OFFICE = (SAMPLES / "office.jpg").read_bytes()
 DETECT = "/detect?calibration=office&profile=fast"

@@ -13,8 +13,8 @@ from pathlib import Path
 from commands import run
 from harness.places import ROOT, SAMPLES
 from harness.processes import free_ports
+from state import wait_until
 from support.lookdown import lookdown
-from waiting import wait_until
 
 from cameras import Handler, serving
 

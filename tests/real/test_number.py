@@ -21,8 +21,8 @@ from statistics import mean, pstdev
 from cpu_share import cpu_share
 from harness.places import ROOT, model
 from harness.processes import Server, free_ports, running
+from state import wait_until
 from support.lookdown import lookdown
-from waiting import wait_until
 
 from cameras import rtsp_camera
 

@@ -12,8 +12,8 @@ from pathlib import Path
 
 from harness.places import LOOKDOWN
 from harness.processes import Server
+from state import wait_until
 from support.lookdown import lookdown
-from waiting import wait_until
 
 from cameras import http_camera
 

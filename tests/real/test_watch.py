@@ -19,8 +19,8 @@ from statistics import median
 
 from harness.places import LOOKDOWN, SAMPLES
 from harness.processes import free_ports
+from state import wait_until
 from support.lookdown import TINY, lookdown
-from waiting import wait_until
 
 from cameras import CLOCK_BITS, PASSWORD, USER, http_camera, proxy, rtsp_camera, rtsp_clock, shown_milliseconds
 

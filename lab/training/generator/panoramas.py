@@ -11,7 +11,7 @@ import numpy as np
 
 from .crops import RoomFile
 from .geometry import Calibration
-from .light import display
+from .scene import display
 
 LARGEST = math.radians(100)
 """Angle from the nadir to which a frame reaches."""

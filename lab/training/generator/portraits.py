@@ -10,9 +10,9 @@ import numpy as np
 
 from . import blender as bl
 from .body import Body
-from .light import display
 from .pieces import Maker
 from .progress import Progress
+from .scene import display
 from .wardrobe import random_colours
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from commands import run
-from debian_base import debian_base
+from debian import debian_base
 from harness.places import LOOKDOWN, ROOT
 
 HERE = ROOT / ".setup" / "real" / "image"

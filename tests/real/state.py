@@ -1,7 +1,9 @@
-"""Waits for a state instead of a fixed time."""
+"""Waits for a state instead of a fixed time, and reads the metrics of a server."""
 
 import time
 from collections.abc import Callable
+
+from harness.processes import Server
 
 PATIENCE_SECONDS = 15.0
 LOOKS_PER_SECOND = 50.0
@@ -15,3 +17,9 @@ def wait_until(holds: Callable[[], object], what: str, seconds: float = PATIENCE
             raise AssertionError(f"waited {seconds:.0f} s in vain until {what}")
         time.sleep(1.0 / LOOKS_PER_SECOND)
     return found
+
+
+def metric(server: Server, series: str) -> float:
+    """The value of a series of Lookdown, `name` or `name{label="value"}`, without the common prefix."""
+    lines = server.get("/metrics").decode().splitlines()
+    return float(next(line.rsplit(" ", 1)[1] for line in lines if line.startswith(f"lookdown_{series} ")))
