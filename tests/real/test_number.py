@@ -18,10 +18,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from statistics import mean, pstdev
 
-from cpu_share import cpu_share
 from harness.places import ROOT, model
 from harness.processes import Server, free_ports, running
 from state import wait_until
+from support.control_group import cpu_share
 from support.lookdown import lookdown
 
 from cameras import rtsp_camera

@@ -6,10 +6,10 @@ import zlib
 from collections import Counter
 from collections.abc import Iterable
 
+from support.control_group import memory_group
 from support.effort import Effort
 from support.exchange import Lost, ask
 from support.lookdown import DETECT, TINY, lookdown
-from support.memory_group import memory_group
 from support.places import OFFICE
 from support.row import Row
 
