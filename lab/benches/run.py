@@ -11,16 +11,14 @@ import time
 from harness.effort import FULL, MEDIUM, SHORT
 from harness.processes import BenchError
 from harness.results import measure, write
-from parts import cameras, dashboards, growth, lifetime, limit, overload, peers, remap, whole
+from parts import cameras, dashboards, lifetime, limit, peers, remap, whole
 
 PARTS = {
     "The whole service": whole,
     "The limit: bare ONNX Runtime": limit,
     "Other servers": peers,
-    "Overload": overload,
     "Remap": remap,
-    "Start and memory": lifetime,
-    "Growth": growth,
+    "Start": lifetime,
     "Many cameras": cameras,
     "Dashboards": dashboards,
 }

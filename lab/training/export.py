@@ -24,8 +24,7 @@ sys.path.insert(0, str(ROOT / "scripts"))
 
 from networks.graph import OnnxGraph  # noqa: E402
 from networks.half import HALF, store_halves  # noqa: E402
-from networks.quantize import quantize  # noqa: E402
-from networks.ranges import sha256_of  # noqa: E402
+from networks.quantize import quantize, sha256_of  # noqa: E402
 
 NOTE = "Weights trained on rendered fisheye frames."
 

@@ -1,4 +1,4 @@
-"""The generator's commands: textures, persons, rooms, frames, panoramas, walks, sheets, statistics. Everything is made below --work and can be resumed.
+"""The generator's commands: textures, persons, rooms, frames, panoramas, walks. Everything is made below --work and can be resumed.
 
 nice -n 19 python lab/training/make.py persons --work WORK --first-seed 1000000 --count 200
 """
@@ -13,18 +13,7 @@ FIRST_SEED = 1_000_000
 
 def parse():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    items = (
-        "textures",
-        "portraits",
-        "persons",
-        "rooms",
-        "frames",
-        "empty",
-        "panoramas",
-        "walks",
-        "sheets",
-        "statistics",
-    )
+    items = ("textures", "portraits", "persons", "rooms", "frames", "empty", "panoramas", "walks")
     parser.add_argument("what", choices=items)
     parser.add_argument("--work", type=Path, default=Path(__file__).parent / "work")
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
@@ -78,18 +67,10 @@ def main():
         from generator.walks import make_walks
 
         make_walks(work)
-    elif options.what == "panoramas":
+    else:
         from generator.panoramas import write_panoramas
 
         write_panoramas(work, options.split)
-    elif options.what == "statistics":
-        from generator.statistics import print_statistics
-
-        print_statistics(work / "frames" / options.split)
-    else:
-        from generator.sheets import make_sheets
-
-        make_sheets(work, options.split)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from convert.errors import ConversionError
+from convert import ConversionError
 
 from .console import SetupError, environment
 from .environments import install_step

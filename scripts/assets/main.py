@@ -10,10 +10,9 @@ from pathlib import Path
 
 from .console import SetupError, say
 from .environments import FAMILIES, STEPS, install_step
-from .machine import supported_cpu
+from .machine import check_toolchain, supported_cpu
 from .runtime import install_runtime, pinned_runtime, require_loadable
 from .ssdlite import install_ssdlite
-from .toolchain import check_toolchain
 
 ROOT = Path(__file__).resolve().parents[2]
 BUILD = ("toolchain", "runtime")

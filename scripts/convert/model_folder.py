@@ -5,7 +5,7 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from .errors import ConversionError
+from . import ConversionError
 
 # The data sets COCO and Pascal VOC, identified by their number of classes, and their person class.
 PERSON_BY_CLASSES = {80: 0, 20: 14}

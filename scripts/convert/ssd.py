@@ -2,9 +2,9 @@
 
 import numpy
 
-from .errors import ConversionError
+from . import ConversionError
 from .onnx_builder import OnnxBuilder
-from .tf_graph import TfGraph
+from .tfjs import TfGraph
 from .translate import Translator
 
 # The network predicts offsets multiplied by these, for the center and for the logarithm of the size.

@@ -1,16 +1,48 @@
-"""Reads a TensorFlow.js graph model: a `model.json` and the weight shards it names, which lie beside it."""
+"""Reads a TensorFlow.js graph model: a `model.json` and the weight shards it names, which lie beside it.
+
+The inference graph in memory has nodes by name, and the values of its constants.
+"""
 
 import base64
 import json
 import math
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy
 
-from .errors import ConversionError
-from .tf_graph import TfGraph, TfNode
+from . import ConversionError
 
 ELEMENT_TYPES = {"float32": numpy.float32, "int32": numpy.int32, "float16": numpy.float16}
+
+
+@dataclass
+class TfNode:
+    """One operation; `inputs` are names of other nodes."""
+
+    operation: str
+    inputs: list[str]
+    attributes: dict
+
+
+@dataclass
+class TfGraph:
+    """Nodes and constant values, both by node name."""
+
+    nodes: dict[str, TfNode]
+    constants: dict[str, numpy.ndarray]
+
+    def node(self, name: str) -> TfNode:
+        """The node of that name."""
+        if name not in self.nodes:
+            raise ConversionError(f"the graph has no node '{name}'")
+        return self.nodes[name]
+
+    def constant(self, name: str) -> numpy.ndarray:
+        """The value of the constant of that name."""
+        if name not in self.constants:
+            raise ConversionError(f"the graph has no constant '{name}'")
+        return self.constants[name]
 
 
 def read_tfjs(model_json: Path) -> TfGraph:

@@ -6,9 +6,9 @@ made here is of the second kind, so only weights and constants are ever turned r
 
 import numpy
 
-from .errors import ConversionError
+from . import ConversionError
 from .onnx_builder import OnnxBuilder
-from .tf_graph import TfGraph, TfNode
+from .tfjs import TfGraph, TfNode
 
 # The index of a TensorFlow axis (N, height, width, channels) in N, channels, height, width.
 AXES_CHANNELS_FIRST = (0, 2, 3, 1)
@@ -41,25 +41,18 @@ class Translator:
         self._resize_factors = resize_factors or {}
         self._operations = {
             "Conv2D": self._convolution,
-            "_FusedConv2D": self._convolution,
             "DepthwiseConv2dNative": self._depthwise_convolution,
-            "FusedDepthwiseConv2dNative": self._depthwise_convolution,
             "FusedBatchNorm": self._batch_normalisation,
             "MaxPool": self._max_pool,
-            "Mean": self._mean,
             "Pad": self._pad,
             "PadV2": self._pad,
             "ConcatV2": self._concatenation,
             "ResizeBilinear": self._resize,
             "Transpose": self._transpose,
-            "Relu": self._elementwise("Relu"),
-            "Sigmoid": self._elementwise("Sigmoid"),
             "Relu6": self._relu6,
             "LeakyRelu": self._leaky_relu,
             "Mul": self._arithmetic("Mul"),
-            "Sub": self._arithmetic("Sub"),
             "Add": self._arithmetic("Add"),
-            "AddV2": self._arithmetic("Add"),
             "AddN": self._arithmetic("Add"),
             "BiasAdd": self._arithmetic("Add"),
         }
@@ -88,27 +81,20 @@ class Translator:
         return self._convolve(name, node, turned, groups=channels)
 
     def _convolve(self, name: str, node: TfNode, weights: numpy.ndarray, groups: int) -> str:
-        bias, activation = _fused(name, node)
-        inputs = [self.feature_map(node.inputs[0]), self.builder.constant(weights, f"{name}/weights")]
-        if bias:
-            inputs.append(self.builder.constant(self.graph.constant(node.inputs[2]), f"{name}/bias"))
-        convolved = self.builder.node(
+        if node.attributes.get("fused_ops"):
+            raise ConversionError(
+                f"node '{name}' is fused with {node.attributes['fused_ops']}, which has no translation"
+            )
+        return self.builder.node(
             "Conv",
-            inputs,
-            f"{name}/convolved" if activation else name,
+            [self.feature_map(node.inputs[0]), self.builder.constant(weights, f"{name}/weights")],
+            name,
             kernel_shape=list(weights.shape[2:]),
             strides=node.attributes["strides"][1:3],
             dilations=node.attributes.get("dilations", [1, 1, 1, 1])[1:3],
             group=groups,
             **_padding(name, node),
         )
-        match activation:
-            case None:
-                return convolved
-            case "Relu6":
-                return self.builder.node("Clip", [convolved, *self._zero_and_six(name)], name)
-            case _:
-                return self.builder.node(activation, [convolved], name)
 
     def _batch_normalisation(self, name: str, node: TfNode) -> str:
         parameters = [
@@ -127,11 +113,6 @@ class Translator:
             strides=node.attributes["strides"][1:3],
             **_padding(name, node),
         )
-
-    def _mean(self, name: str, node: TfNode) -> str:
-        image = self.feature_map(node.inputs[0])
-        axes = [self._axis(node.inputs[0], int(axis)) for axis in self.graph.constant(node.inputs[1])]
-        return self.builder.node("ReduceMean", [image], name, axes=axes, keepdims=int(node.attributes["keep_dims"]))
 
     def _pad(self, name: str, node: TfNode) -> str:
         image = self.feature_map(node.inputs[0])
@@ -169,21 +150,12 @@ class Translator:
         return image
 
     def _relu6(self, name: str, node: TfNode) -> str:
-        limits = self._zero_and_six(name)
+        limits = [self.builder.constant(0.0, f"{name}/low"), self.builder.constant(6.0, f"{name}/high")]
         return self.builder.node("Clip", [self.feature_map(node.inputs[0]), *limits], name)
-
-    def _zero_and_six(self, name: str) -> list[str]:
-        return [self.builder.constant(0.0, f"{name}/low"), self.builder.constant(6.0, f"{name}/high")]
 
     def _leaky_relu(self, name: str, node: TfNode) -> str:
         image = self.feature_map(node.inputs[0])
         return self.builder.node("LeakyRelu", [image], name, alpha=node.attributes["alpha"])
-
-    def _elementwise(self, operation: str):
-        def translate(name: str, node: TfNode) -> str:
-            return self.builder.node(operation, [self.feature_map(node.inputs[0])], name)
-
-        return translate
 
     def _arithmetic(self, operation: str):
         def translate(name: str, node: TfNode) -> str:
@@ -211,16 +183,3 @@ def _padding(name: str, node: TfNode) -> dict:
             return {}
         case other:
             raise ConversionError(f"node '{name}' pads {other}, only SAME and VALID are translated")
-
-
-def _fused(name: str, node: TfNode) -> tuple[bool, str | None]:
-    """The bias and the activation of a fused convolution."""
-    match node.attributes.get("fused_ops", []):
-        case []:
-            return False, None
-        case ["BiasAdd"]:
-            return True, None
-        case ["BiasAdd", ("Relu" | "Relu6") as activation]:
-            return True, activation
-        case other:
-            raise ConversionError(f"node '{name}' is fused with {other}, which has no translation yet")

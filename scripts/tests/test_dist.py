@@ -1,18 +1,25 @@
-"""The tarball is complete, verifiable and reproducible."""
+"""The tarball is complete, verifiable and reproducible. The Debian package, and the version in all files."""
 
 import hashlib
+import re
 import subprocess
 import tarfile
 import tempfile
+import tomllib
 import unittest
 from pathlib import Path
 
+from assets.runtime import pinned_runtime
+from deb import changelog, copyright_of
 from dist import ROOT, copy_files, describe_commands, files_of, pack, write_sums
 from sbom import MODELS
 
 PROGRAM = """#!/bin/sh
 if [ "$1" = manual ]; then mkdir -p "$2" && echo page > "$2/lookdown.1"; else echo "complete $2"; fi
 """
+
+OWN = ("docker/Dockerfile", "docker/Dockerfile.cuda", "docker/compose.yaml", "k8s/base/kustomization.yaml")
+STATED = re.compile(r"(?:lookdown(?:-cuda)?:|image\.version=\"|newTag: |kubernetes\.io/version: )(\d[\w.-]*)")
 
 
 class Dist(unittest.TestCase):
@@ -65,6 +72,50 @@ class Dist(unittest.TestCase):
                 entry = packed.getmember("lookdown-1-linux/lookdown")
                 self.assertEqual((entry.mode, entry.uid, entry.mtime), (0o755, 0, 1_000_000_000))
         self.assertEqual(sums[0], sums[1])
+
+
+class Deb(unittest.TestCase):
+    def test_changelog_has_version_maintainer_and_time(self):
+        manifest = tomllib.loads((ROOT / "Cargo.toml").read_text(encoding="utf-8"))["workspace"]["package"]
+        first, *_, last = changelog(ROOT, 1_000_000_000).strip().splitlines()
+        self.assertEqual(first, f"lookdown ({manifest['version']}-1) unstable; urgency=medium")
+        self.assertRegex(last, r"^ -- [\w ]+ <\S+@\S+>  Sun, 09 Sep 2001 01:46:40 -0000$")
+
+    def test_copyright_has_notices_and_licences_that_debian_lacks(self):
+        dist = Path(self.enterContext(tempfile.TemporaryDirectory()))
+        texts = {
+            "NOTICE": "the notices",
+            "runtime/LICENSE": "MIT License",
+            "models/one/LICENSE-package": "the license of a package",
+            "models/two/LICENSE-weights": (ROOT / "LICENSE").read_text(encoding="utf-8"),
+        }
+        for name, text in texts.items():
+            (dist / name).parent.mkdir(parents=True, exist_ok=True)
+            (dist / name).write_text(text, encoding="utf-8")
+        text = copyright_of(dist)
+        for part in ("/usr/share/common-licenses/Apache-2.0", "the notices", "MIT License", "models/one"):
+            self.assertIn(part, text)
+        self.assertNotIn("models/two", text)
+
+    def test_each_unit_limits_its_memory(self):
+        units = sorted((ROOT / "packaging" / "debian").glob("*.service"))
+        self.assertEqual(len(units), 3)
+        for unit in units:
+            self.assertIn("\nMemoryMax=", unit.read_text(encoding="utf-8"), unit.name)
+
+
+class OneVersion(unittest.TestCase):
+    def test_images_have_the_version_of_the_crate(self):
+        manifest = tomllib.loads((ROOT / "Cargo.toml").read_text(encoding="utf-8"))["workspace"]["package"]
+        for name in (*OWN, "README.md", "docs/deployment.md"):
+            stated = STATED.findall((ROOT / name).read_text(encoding="utf-8"))
+            self.assertEqual({*stated}, {manifest["version"]}, name)
+
+    def test_the_image_for_gpus_has_the_onnx_runtime_of_the_other(self):
+        text = (ROOT / "docker" / "Dockerfile.cuda").read_text(encoding="utf-8")
+        versions = {pinned_runtime("x86_64").version}
+        self.assertEqual({*re.findall(r"onnxruntime-gpu==([\d.]+)", text)}, versions)
+        self.assertEqual({*re.findall(r"libonnxruntime\.so\.([\d.]+\d)", text)}, versions)
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 import contextlib
 import hashlib
 import http.server
+import json
 import re
 import secrets
 import socket
@@ -12,8 +13,9 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from harness.places import SAMPLES
 from harness.processes import free_ports
-from waiting import wait_until
+from state import wait_until
 
 HERE = Path(__file__).resolve().parent
 USER, PASSWORD = "viewer", "s@cret/of:gate"
@@ -23,15 +25,41 @@ CLOCK_BITS = 24
 """Bits of the milliseconds that `rtsp_clock` shows: 4.6 hours."""
 
 
-class _Handler(http.server.BaseHTTPRequestHandler):
-    """`/stream` is MJPEG, `/snap` a snapshot behind Digest with an entity tag."""
+class Handler(http.server.BaseHTTPRequestHandler):
+    """Answers HTTP requests, and logs nothing."""
 
     protocol_version = "HTTP/1.1"
-    frames: list[bytes]
-    rate: float
 
     def log_message(self, *_):
         """Logs nothing."""
+
+    def answer(self, status: int, body: bytes = b"", *headers: tuple[str, str]) -> None:
+        """Sends a whole response."""
+        self.send_response(status)
+        for name, value in (*headers, ("Content-Length", str(len(body)))):
+            self.send_header(name, value)
+        self.end_headers()
+        self.wfile.write(body)
+
+
+@contextlib.contextmanager
+def serving(handler: type[Handler]) -> Iterator[int]:
+    """Serves requests in threads, and yields the port."""
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
+    server.daemon_threads = True
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    try:
+        yield server.server_port
+    finally:
+        server.shutdown()
+        server.server_close()
+
+
+class _Camera(Handler):
+    """`/stream` is MJPEG, `/snap` a snapshot behind Digest with an entity tag."""
+
+    frames: list[bytes]
+    rate: float
 
     def do_GET(self):
         """Answers a request."""
@@ -58,11 +86,8 @@ class _Handler(http.server.BaseHTTPRequestHandler):
     def _snapshot(self) -> None:
         if not self._is_authorized():
             challenge = f'Digest realm="{REALM}", qop="auth", nonce="{secrets.token_hex(8)}", algorithm=MD5'
-            self.send_response(401)
-            self.send_header("WWW-Authenticate", f'Basic realm="{REALM}"')
-            self.send_header("WWW-Authenticate", challenge)
-            self.send_header("Content-Length", "0")
-            self.end_headers()
+            basic = f'Basic realm="{REALM}"'
+            self.answer(401, b"", ("WWW-Authenticate", basic), ("WWW-Authenticate", challenge))
             return
         frame = self._frame()
         tag = f'"{hashlib.md5(frame).hexdigest()}"'
@@ -70,12 +95,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
             self.send_response(304)
             self.end_headers()
             return
-        self.send_response(200)
-        self.send_header("Content-Type", "image/jpeg")
-        self.send_header("Content-Length", str(len(frame)))
-        self.send_header("ETag", tag)
-        self.end_headers()
-        self.wfile.write(frame)
+        self.answer(200, frame, ("Content-Type", "image/jpeg"), ("ETag", tag))
 
     def _is_authorized(self) -> bool:
         header = self.headers.get("Authorization", "")
@@ -93,35 +113,42 @@ class _Handler(http.server.BaseHTTPRequestHandler):
 @contextlib.contextmanager
 def http_camera(frames: list[bytes], rate: float) -> Iterator[int]:
     """Serves a camera over HTTP, and yields its port."""
-    handler = type("Handler", (_Handler,), {"frames": frames, "rate": rate})
-    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
-    server.daemon_threads = True
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    try:
-        yield server.server_address[1]
-    finally:
-        server.shutdown()
-        server.server_close()
+    with serving(type("Camera", (_Camera,), {"frames": frames, "rate": rate})) as port:
+        yield port
+
+
+def empty_frame(side: int = 960) -> bytes:
+    """A gray JPEG without persons."""
+    gray = ["-f", "lavfi", "-i", f"color=gray:size={side}x{side}", "-frames:v", "1", "-f", "mjpeg", "-"]
+    return subprocess.run(["ffmpeg", "-v", "error", *gray], capture_output=True, check=True).stdout
+
+
+def office_calibration(folder: Path, **more: object) -> Path:
+    """Creates a folder with the calibration of the sample `office` and these keys, such as zones."""
+    folder.mkdir(exist_ok=True)
+    calibration = json.loads((SAMPLES / "calibrations" / "office.json").read_text(encoding="utf-8"))
+    (folder / "office.json").write_text(json.dumps(calibration | more), encoding="utf-8")
+    return folder
 
 
 @contextlib.contextmanager
 def rtsp_camera(folder: Path, rate: int, *login: str) -> Iterator[int]:
     """Serves the files `0.jpg`, `1.jpg` … of a folder over RTSP, and yields the port."""
-    with _rtsp_server("rtsp_server.py", folder, str(rate), *login) as port:
+    with _rtsp_server(folder, str(rate), *login) as port:
         yield port
 
 
 @contextlib.contextmanager
 def rtsp_clock(rate: int) -> Iterator[int]:
     """Serves images that show the time over RTSP, and yields the port."""
-    with _rtsp_server("rtsp_clock.py", str(rate), str(CLOCK_BITS)) as port:
+    with _rtsp_server("clock", str(rate), str(CLOCK_BITS)) as port:
         yield port
 
 
 @contextlib.contextmanager
-def _rtsp_server(script: str, *arguments: object) -> Iterator[int]:
+def _rtsp_server(*arguments: object) -> Iterator[int]:
     (port,) = free_ports(1)
-    command = ["/usr/bin/python3", HERE / script, str(port), *arguments]
+    command = ["/usr/bin/python3", HERE / "rtsp_server.py", str(port), *arguments]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
     def answers() -> bool:

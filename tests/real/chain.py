@@ -8,12 +8,12 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from cpu_share import cpu_share
 from harness.places import LOOKDOWN, ROOT
 from harness.processes import Server, running
 from hosts import Host, hosts
 from redis_server import RedisServer
-from waiting import wait_until
+from state import wait_until
+from support.control_group import cpu_share
 
 REPLICAS = ("r1", "r2", "r3")
 RECIPE = ROOT / "docker" / "haproxy.cfg"

@@ -1,10 +1,12 @@
 """docker/compose.yaml as Docker Compose reads it: validated, with the variables filled in."""
 
 import json
+import os
 import re
 
+from commands import run
 from harness.places import ROOT
-from kubernetes.tools import PYTHON, VALIDATE, run
+from kubernetes.tools import PYTHON, VALIDATE
 
 DOCKER = ROOT / "docker"
 COMMAND = ["docker-compose", "--file", "-", "--profile=monitoring", "config"]
@@ -15,10 +17,8 @@ def services(**variables: str) -> dict[str, dict]:
     text = (DOCKER / "compose.yaml").read_text(encoding="utf-8")
     # Debian's Docker Compose is of version 1, which knows no name of a project.
     nameless = re.sub(r"^name:.*\n", "", text, flags=re.MULTILINE)
-    filled = run(
-        ["env", f"--chdir={DOCKER}", *(f"{name}={value}" for name, value in variables.items()), *COMMAND], nameless
-    )
-    (document,) = json.loads(run([PYTHON / "python", VALIDATE, "--only-read"], filled))
+    filled = run(*COMMAND, given=nameless, cwd=DOCKER, environment=os.environ | variables)
+    (document,) = json.loads(run(PYTHON / "python", VALIDATE, "--only-read", given=filled))
     return document["services"]
 
 

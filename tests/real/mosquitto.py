@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from harness.processes import free_ports
-from waiting import PATIENCE_SECONDS, wait_until
+from state import PATIENCE_SECONDS, wait_until
 
 USER, PASSWORD = "lookdown", "s@cret/of:home"
 PASSWORD_IN_URL = "s%40cret%2Fof%3Ahome"

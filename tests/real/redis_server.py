@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from harness.processes import free_ports
-from waiting import wait_until
+from state import wait_until
 
 
 class RedisServer:

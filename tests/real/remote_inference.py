@@ -1,14 +1,19 @@
 """Helpers of the tests of inference on another server."""
 
+import contextlib
 import json
+import signal
+import time
 import unittest
 import urllib.error
 import urllib.request
+from collections.abc import Callable
 from email.message import Message
 
 from harness.places import SAMPLES, model
-from harness.processes import Server
-from waiting import wait_until
+from harness.processes import Server, free_ports
+from state import metric, wait_until
+from support.lookdown import lookdown
 
 MODEL = "nanodet_g_views_416_fp16"
 """Every library computes it in FP32, and INT8 in its own way."""
@@ -54,3 +59,48 @@ def assert_same(test: unittest.TestCase, report: dict, wanted: dict) -> None:
         test.assertEqual(person["views"], other["views"])
         for side, place in other["box"].items():
             test.assertAlmostEqual(person["box"][side], place, delta=0.02, msg=side)
+
+
+def assert_survives_a_restart(
+    test: unittest.TestCase,
+    start: Callable[[int], contextlib.AbstractContextManager[Server]],
+    settings: dict[str, str],
+    inferred: Callable[[Server], int] = lambda _: 0,
+) -> None:
+    """Asserts that the detections are those of a local network, also after the inference server was killed.
+
+    `start` starts it on a port, and `inferred` is the number of its views, where it counts them.
+    """
+    with lookdown(settings | {"MODEL__PATH": str(model(MODEL).parent)}) as here:
+        local = {path: json.loads(here.post(path, FRAME)) for path in (FAST, BALANCED)}
+    (port,) = free_ports(1)
+    with contextlib.ExitStack() as stack:
+        first = stack.enter_context(contextlib.ExitStack())
+        remote = first.enter_context(start(port))
+        server = stack.enter_context(lookdown(settings | asking(f"http://127.0.0.1:{port}", "people")))
+        before = inferred(remote)
+        for path, wanted in local.items():
+            assert_same(test, json.loads(server.post(path, FRAME)), wanted)
+        views = sum(report["views"]["inferred"] for report in local.values())
+        if counted := inferred(remote):
+            test.assertEqual(counted - before, views)
+        test.assertGreater(metric(server, 'remote_requests_total{result="answered"}'), 0)
+        test.assertEqual(metric(server, "remote_up"), 1)
+
+        remote.process.send_signal(signal.SIGKILL)
+        remote.process.wait()
+        status, headers, problem = answer(server, FAST, FRAME)
+        test.assertEqual((status, problem["type"]), (503, "/problems/inference-unavailable"))
+        test.assertGreaterEqual(int(headers["Retry-After"]), 1)
+        test.assertNotIn(str(port), problem["error"])
+        test.assertEqual(when_ready_is(server, 503)["type"], "/problems/inference-unavailable")
+        began = time.monotonic()
+        test.assertEqual(answer(server, FAST, FRAME)[0], 503)
+        test.assertLess(time.monotonic() - began, 1.0, "an open breaker answers at once")
+        test.assertEqual(metric(server, "remote_up"), 0)
+        test.assertEqual(answer(server, "/livez")[0], 200)
+        first.close()
+
+        stack.enter_context(start(port))
+        when_ready_is(server, 200)
+        assert_same(test, json.loads(server.post(FAST, FRAME)), local[FAST])

@@ -17,10 +17,10 @@ from pathlib import Path
 
 from chain import RECIPE, REPLICAS, Chain, chain
 from crowd import Crowd, crowd
+from state import wait_until
 from support.lookdown import TINY
 from support.places import OFFICE
 from test_replicas import HEADERS, office, put_everywhere
-from waiting import wait_until
 
 CAMERAS = tuple(f"camera-{number}" for number in range(12))
 DETECT = "/detect?calibration=office&profile=fast"

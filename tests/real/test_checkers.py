@@ -1,9 +1,9 @@
 """Checkers: Redocly for the OpenAPI documents, Biome for the JavaScript, schemas for the files of `.github`."""
 
-import subprocess
 import unittest
 from pathlib import Path
 
+from commands import run
 from harness.places import ROOT
 
 HERE = Path(__file__).resolve().parent / "checkers"
@@ -22,26 +22,22 @@ class Checkers(unittest.TestCase):
     def setUpClass(cls) -> None:
         """Installs the checkers according to the lock file."""
         command = ["npm", "ci", "--no-audit", "--no-fund", "--ignore-scripts", "--loglevel=error"]
-        subprocess.run(command, cwd=HERE, check=True)
+        run(*command, cwd=HERE)
 
     def test_the_openapi_documents_follow_the_recommended_rules(self) -> None:
         documents = ("openapi/openapi.json", "openapi/counts.json")
-        self.run_checker(HERE / "node_modules/.bin/redocly", "lint", *documents)
+        run(HERE / "node_modules/.bin/redocly", "lint", *documents)
 
     def test_the_scripts_of_the_page_have_no_lint(self) -> None:
         scripts = [*sorted(ROOT.glob("web/*.js")), *sorted(ROOT.glob("tests/real/page/*.js"))]
         (biome,) = HERE.glob("node_modules/@biomejs/cli-*/biome")
-        self.run_checker(biome, "lint", "--error-on-warnings", *map(str, scripts))
+        run(biome, "lint", "--error-on-warnings", *scripts)
 
     def test_the_files_of_the_forge_follow_their_schemas(self) -> None:
         for schema, pattern in OF_SCHEMA.items():
             files = sorted((ROOT / ".github").glob(pattern))
             self.assertTrue(files, pattern)
-            self.run_checker(CHECK, "--builtin-schema", f"vendor.{schema}", *map(str, files))
-
-    def run_checker(self, program: Path, *arguments: str) -> None:
-        done = subprocess.run([program, *arguments], cwd=ROOT, capture_output=True, text=True, check=False)
-        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+            run(CHECK, "--builtin-schema", f"vendor.{schema}", *files)
 
 
 if __name__ == "__main__":

@@ -1,11 +1,11 @@
 """docker/compose.yaml: the server accepts its settings, and its services are consistent."""
 
 import os
-import subprocess
 import tomllib
 import unittest
 from pathlib import Path
 
+from commands import run
 from compose_file import DOCKER, environment, services
 from harness.places import LOOKDOWN, ROOT
 from harness.processes import free_ports
@@ -22,10 +22,7 @@ class ComposeFile(unittest.TestCase):
         self.assertEqual((lookdown["command"], lookdown["volumes"]), (["run"], ["state:/var/lib/lookdown:rw"]))
         (port,) = free_ports(1)
         here = {"LOOKDOWN__SERVER__LISTEN": f"127.0.0.1:{port}"}
-        check = [LOOKDOWN, "serve", "--check"]
-        variables = os.environ | environment(lookdown) | here
-        checked = subprocess.run(check, env=variables, capture_output=True, text=True, check=False)
-        self.assertEqual(checked.returncode, 0, checked.stderr)
+        run(LOOKDOWN, "serve", "--check", environment=os.environ | environment(lookdown) | here)
 
     def test_one_variable_is_the_camera(self):
         self.assertEqual(environment(self.services["lookdown"])["LOOKDOWN_CAMERA"], "")

@@ -2,13 +2,11 @@
 
 import base64
 import contextlib
-import http.server
 import json
 import os
 import signal
 import subprocess
 import tempfile
-import threading
 import time
 import unittest
 import urllib.error
@@ -17,16 +15,22 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from harness.places import LOOKDOWN, ROOT, SAMPLES
-from harness.processes import free_ports, running
+from harness.processes import free_ports
 from mosquitto import PASSWORD, USER, broker
+from state import metric, wait_until
 from support.lookdown import lookdown
-from waiting import wait_until
 
-from cameras import http_camera
-from metrics import metric
+from cameras import Handler, empty_frame, http_camera, office_calibration, serving
 
 HERE = Path(__file__).resolve().parent
 VERIFIER = ROOT / ".setup" / "real" / "webhooks" / "bin" / "python"
+VERIFY = """
+import json, sys
+from standardwebhooks import Webhook
+given = json.load(sys.stdin)
+print(json.dumps(Webhook(given["secret"]).verify(given["body"], given["headers"])))
+"""
+"""Prints the payload of a webhook, and fails for a signature that does not fit."""
 SECRET = "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw"
 OTHER_SECRET = "whsec_QSBzZWNyZXQgdGhhdCBpcyBub3Qgb25l"
 OFFICE = (SAMPLES / "office.jpg").read_bytes()
@@ -67,10 +71,7 @@ def webhook_receiver() -> Iterator[tuple[str, list[dict]]]:
     """Receives webhooks. Yields its URL, and the headers and bodies of the requests."""
     received: list[dict] = []
 
-    class Handler(http.server.BaseHTTPRequestHandler):
-        def log_message(self, *_):
-            """Logs nothing."""
-
+    class Receiver(Handler):
         def do_POST(self):
             """Keeps a request."""
             body = self.rfile.read(int(self.headers["Content-Length"])).decode()
@@ -78,18 +79,13 @@ def webhook_receiver() -> Iterator[tuple[str, list[dict]]]:
             self.send_response(204)
             self.end_headers()
 
-    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    try:
-        yield f"http://127.0.0.1:{server.server_address[1]}/hook", received
-    finally:
-        server.shutdown()
-        server.server_close()
+    with serving(Receiver) as port:
+        yield f"http://127.0.0.1:{port}/hook", received
 
 
 def verified(secret: str, message: dict) -> subprocess.CompletedProcess:
     """The verification of a webhook by `standardwebhooks`."""
-    command = [VERIFIER, HERE / "verify_webhook.py"]
+    command = [VERIFIER, "-c", VERIFY]
     given = json.dumps({"secret": secret, **message})
     return subprocess.run(command, input=given, capture_output=True, text=True, check=False, timeout=60)
 
@@ -99,11 +95,7 @@ class CountedCamera(unittest.TestCase):
 
     def setUp(self):
         self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
-        calibration = json.loads((SAMPLES / "calibrations" / "office.json").read_text(encoding="utf-8"))
-        calibrations = self.folder / "calibrations"
-        calibrations.mkdir()
-        calibration |= {"zones": ZONES, "lines": LINES}
-        (calibrations / "office.json").write_text(json.dumps(calibration), encoding="utf-8")
+        calibrations = office_calibration(self.folder / "calibrations", zones=ZONES, lines=LINES)
         self.broker = self.enterContext(broker(self.folder))
         (self.port,) = free_ports(1)
         server = {"MODEL__PATH": "", "MQTT__URL": self.broker.url, "RESULTS__CAMERA_METRICS": "true"}
@@ -334,32 +326,21 @@ class KilledRun(unittest.TestCase):
 
     def setUp(self):
         self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
-        calibrations = self.folder / "calibrations"
-        calibrations.mkdir()
-        calibration = json.loads((SAMPLES / "calibrations" / "office.json").read_text(encoding="utf-8"))
-        content = json.dumps(calibration | {"zones": ZONES, "lines": LINES})
-        (calibrations / "office.json").write_text(content, encoding="utf-8")
-        gray = "color=gray:size=960x960"
-        made = ["ffmpeg", "-v", "error", *("-f", "lavfi", "-i", gray), *("-frames:v", "1", "-f", "mjpeg", "-")]
-        empty = subprocess.run(made, capture_output=True, check=True).stdout
+        self.calibrations = office_calibration(self.folder / "calibrations", zones=ZONES, lines=LINES)
         # Persons appear in the zone and are gone again, every twelve seconds.
-        self.camera = self.enterContext(http_camera([empty] * 24 + [OFFICE] * 24, 4.0))
+        self.camera = self.enterContext(http_camera([empty_frame()] * 24 + [OFFICE] * 24, 4.0))
 
     @contextlib.contextmanager
     def run_all(self):
         """Runs all parts, and kills them at the end."""
-        (port,) = free_ports(1)
         settings = {
-            "SERVER__LISTEN": f"127.0.0.1:{port}",
-            "CALIBRATIONS__PATH": str(self.folder / "calibrations"),
-            "COUNTS__PATH": str(self.folder / "counts.sqlite"),
+            "COUNTS__PATH": self.folder / "counts.sqlite",
             "COUNTS__COMMIT_EVERY": "500ms",
-            "STATE__PATH": str(self.folder / "state"),
+            "STATE__PATH": self.folder / "state",
         }
-        environment = {f"LOOKDOWN__{name}": value for name, value in settings.items()}
         source = f"http://127.0.0.1:{self.camera}/stream"
-        flags = ["--name", "hall", "--calibration", "office", "--profile", "fast", "--every", "250ms"]
-        with running("killed", [str(LOOKDOWN), "run", source, *flags], port, "/readyz", environment) as server:
+        command = ["run", source, "--name", "hall", "--calibration", "office", "--profile", "fast", "--every", "250ms"]
+        with lookdown(settings, calibrations=self.calibrations, command=command) as server:
             yield server
             os.kill(server.pid, signal.SIGKILL)
             server.process.wait(10)

@@ -2,11 +2,11 @@
 
 import json
 import shutil
-import subprocess
 import tempfile
 import unittest
 from pathlib import Path
 
+from commands import run
 from harness.places import LOOKDOWN, ROOT, SAMPLES
 
 TOOLS = Path(__file__).resolve().parent / "data_sets" / "tools.py"
@@ -40,14 +40,6 @@ class DataSets(unittest.TestCase):
                 (results,) = saved.glob("*.json")
                 row = json.loads(run(LOOKDOWN, "eval", data_set, "--from-detections", results, "--json"))
                 self.assertEqual((row["ap50"], row["persons"]), (1.0, len(self.persons)), row)
-
-
-def run(*command: object) -> str:
-    """Returns the output of a command that must succeed."""
-    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False, timeout=300, cwd=ROOT)
-    if done.returncode != 0:
-        raise AssertionError(f"{command}:\n{done.stdout}{done.stderr}")
-    return done.stdout
 
 
 if __name__ == "__main__":

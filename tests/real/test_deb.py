@@ -2,18 +2,17 @@
 
 import json
 import shutil
-import subprocess
 import sys
 import tempfile
 import unittest
 import urllib.request
 from pathlib import Path
 
-from deb.booted import booted
-from deb.chroot import UNIT, Chroot
+from commands import run
+from debian import UNIT, Chroot, booted
 from harness.places import LOOKDOWN, ROOT, SAMPLES
 from harness.processes import free_ports
-from waiting import wait_until
+from state import wait_until
 
 SCRIPTS = ROOT / "scripts"
 LARGEST_EXPOSURE = 2.0
@@ -29,8 +28,8 @@ class DebianPackage(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        run([sys.executable, SCRIPTS / "dist.py", LOOKDOWN])
-        run([sys.executable, SCRIPTS / "deb.py"])
+        run(sys.executable, SCRIPTS / "dist.py", LOOKDOWN)
+        run(sys.executable, SCRIPTS / "deb.py")
         (cls.package,) = (ROOT / "target" / "deb").glob("*.deb")
         cls.place = Path(cls.enterClassContext(tempfile.TemporaryDirectory()))
         cls.chroot = Chroot.create(cls.place / "installed")
@@ -38,20 +37,20 @@ class DebianPackage(unittest.TestCase):
         print(f"\n  package {cls.package.stat().st_size / 1e6:.1f} MB", flush=True)
 
     def test_lintian_finds_nothing(self):
-        self.assertEqual(run(["lintian", "--allow-root", "--fail-on=error,warning", self.package]), "")
+        self.assertEqual(run("lintian", "--allow-root", "--fail-on=error,warning", self.package), "")
 
     def test_systemd_accepts_the_unit(self):
         chroot = Chroot.create(self.place / "verified")
         chroot.install(self.package)
         for unit in ("lookdown.service", "lookdown-watch.service", "lookdown-count.service"):
             command = ["systemd-analyze", "verify", "--man=no", f"--root={chroot.root}", unit]
-            self.assertEqual(run(command), "")
+            self.assertEqual(run(*command), "")
 
     def test_the_service_is_confined(self):
         root = f"--root={self.chroot.root}"
         threshold = f"--threshold={LARGEST_EXPOSURE * 10:.0f}"
         command = ["systemd-analyze", "security", "--no-pager", "--offline=true", threshold, root, "lookdown.service"]
-        print(f"\n  {run(command).strip().splitlines()[-1]}", flush=True)
+        print(f"\n  {run(*command).strip().splitlines()[-1]}", flush=True)
 
     def test_the_command_has_manual_pages_and_completions(self):
         installed = self.chroot.run("dpkg", "--listfiles", "lookdown").split()
@@ -130,14 +129,6 @@ def send(url: str, file: Path, media_type: str, method: str) -> bytes:
     request = urllib.request.Request(url, file.read_bytes(), headers, method=method)
     with urllib.request.urlopen(request, timeout=60) as answer:
         return answer.read()
-
-
-def run(command: list[str | Path]) -> str:
-    """Returns the output of a command that must succeed."""
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=600)
-    if done.returncode != 0:
-        raise AssertionError(f"{command}:\n{done.stdout}{done.stderr}")
-    return done.stdout
 
 
 if __name__ == "__main__":

@@ -2,11 +2,11 @@
 
 import hashlib
 import json
-import subprocess
 import tempfile
 import unittest
 from pathlib import Path
 
+from commands import run
 from harness.places import ROOT, SAMPLES
 from support.lookdown import lookdown
 
@@ -22,9 +22,7 @@ KEY = "lookdown_of_home_assistant"
 def ask(client: str, server, image: Path = OFFICE, model: str = "", key: str = "", confidence: float = 0.4) -> dict:
     """The result of a client."""
     port = server.address.rpartition(":")[2]
-    command = [PYTHON, HERE / "deepstack_client.py", client, port, image, model, key, str(confidence)]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=120)
-    return json.loads(done.stdout)
+    return json.loads(run(PYTHON, HERE / "deepstack_client.py", client, port, image, model, key, confidence))
 
 
 class DeepStackClients(unittest.TestCase):

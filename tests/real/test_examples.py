@@ -15,24 +15,17 @@ import time
 import unittest
 from pathlib import Path
 
+from commands import run
 from harness.places import ROOT, SAMPLES
 from harness.processes import free_ports
+from state import wait_until
 from support.lookdown import lookdown
 from test_count import OTHER_SECRET, SECRET, CountedCamera
-from waiting import wait_until
 
 EXAMPLES = ROOT / "examples"
 OFFICE = SAMPLES / "office.jpg"
 METRIC = re.compile(r"\blookdown_\w+")
 SERIES = "# TYPE "
-
-
-def run(*command: object) -> str:
-    """The output of an example that succeeds."""
-    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False, timeout=60)
-    if done.returncode:
-        raise AssertionError(f"{command}: {done.stdout}{done.stderr}")
-    return done.stdout
 
 
 class Detect(unittest.TestCase):

@@ -3,11 +3,11 @@
 import json
 import os
 import shutil
-import subprocess
 import tempfile
 import unittest
 from pathlib import Path
 
+from commands import run
 from harness.places import ROOT, SAMPLES
 from support.lookdown import lookdown
 
@@ -29,7 +29,7 @@ class GeneratedClients(unittest.TestCase):
     def setUpClass(cls) -> None:
         """Installs the generator and the compiler according to the lock file."""
         command = ["npm", "ci", "--no-audit", "--no-fund", "--ignore-scripts", "--loglevel=error"]
-        subprocess.run(command, cwd=HERE, check=True)
+        run(*command, cwd=HERE)
 
     def setUp(self) -> None:
         self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
@@ -103,11 +103,9 @@ class GeneratedClients(unittest.TestCase):
 
     def succeeds(self, *command: object, cwd: Path = ROOT, **environment: object) -> str:
         """Returns the output of a program."""
-        variables = os.environ | {name: str(value) for name, value in environment.items()}
-        options = {"capture_output": True, "text": True, "check": False, "timeout": 240}
-        done = subprocess.run(list(map(str, command)), cwd=cwd, env=variables, **options)
-        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
-        return done.stdout
+        return run(
+            *command, cwd=cwd, environment=os.environ | {name: str(value) for name, value in environment.items()}
+        )
 
 
 if __name__ == "__main__":

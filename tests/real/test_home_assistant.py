@@ -11,14 +11,13 @@ import unittest
 from collections.abc import Iterator
 from pathlib import Path
 
-from harness.places import LOOKDOWN, ROOT, SAMPLES
-from harness.processes import free_ports, running
+from harness.places import ROOT, SAMPLES
 from mosquitto import PASSWORD, USER, Broker, broker
+from state import wait_until
 from support.lookdown import lookdown
 from test_count import CountedCamera
-from waiting import wait_until
 
-from cameras import http_camera
+from cameras import empty_frame, http_camera, office_calibration
 
 HERE = Path(__file__).resolve().parent
 PYTHON = ROOT / ".setup" / "real" / "home_assistant" / "bin" / "python"
@@ -102,17 +101,9 @@ class Entities(unittest.TestCase):
 
     def setUp(self):
         self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
-        self.calibrations = self.folder / "calibrations"
-        self.calibrations.mkdir()
-        self.write_calibration([LEFT_HALF])
+        self.calibrations = office_calibration(self.folder / "calibrations", zones=[LEFT_HALF])
         self.broker = self.enterContext(broker(self.folder))
         self.home = self.enterContext(home_assistant(self.folder / "home", self.broker))
-
-    def write_calibration(self, zones: list[dict]) -> None:
-        """Writes the calibration of the sample."""
-        calibration = json.loads((SAMPLES / "calibrations" / "office.json").read_text(encoding="utf-8"))
-        content = json.dumps(calibration | {"zones": zones})
-        (self.calibrations / "office.json").write_text(content, encoding="utf-8")
 
     def lookdown(self, **settings: str):
         """A server that publishes."""
@@ -154,7 +145,7 @@ class Entities(unittest.TestCase):
             server.post(NO_PERSONS, OFFICE)
             self.home.until({PERSONS: "0", OCCUPANCY: "off", LEFT: "0", LEFT_OCCUPANCY: "off"})
             # A zone that is removed.
-            self.write_calibration([])
+            office_calibration(self.calibrations, zones=[])
             wait_until(lambda: "zones" not in json.loads(server.post(DETECT, OFFICE)), "the zone is gone")
             wait_until(lambda: set(self.home.entities()) == {PERSONS, OCCUPANCY}, "the entities of the zone are gone")
             # A camera that is removed.
@@ -208,28 +199,20 @@ class RunEntities(unittest.TestCase):
 
     def start(self, camera: int):
         """Runs Lookdown with a camera."""
-        (port,) = free_ports(1)
         settings = {
-            "SERVER__LISTEN": f"127.0.0.1:{port}",
-            "SHUTDOWN__GRACE_MILLIS": "0",
-            "STATE__PATH": str(self.folder / "state"),
-            "COUNTS__PATH": str(self.folder / "counts.sqlite"),
+            "STATE__PATH": self.folder / "state",
+            "COUNTS__PATH": self.folder / "counts.sqlite",
             "MQTT__URL": self.broker.url,
             "MQTT__IMAGE_EVERY_SECONDS": "1",
             "RESULTS__IMAGES": "gate",
-            "CALIBRATIONS__PATH": str(SAMPLES / "calibrations"),
         }
-        environment = {f"LOOKDOWN__{name}": value for name, value in settings.items()}
         source = f"http://127.0.0.1:{camera}/stream"
-        command = [str(LOOKDOWN), "run", source, "--name", "gate", "--calibration", "office", "--profile", "fast"]
-        return running("run", command, port, "/readyz", environment)
+        command = ["run", source, "--name", "gate", "--calibration", "office", "--profile", "fast"]
+        return lookdown(settings, command=command)
 
     def test_a_camera_has_an_image_a_switch_and_events(self):
-        gray = "color=gray:size=960x960"
-        made = ["ffmpeg", "-v", "error", *("-f", "lavfi", "-i", gray), *("-frames:v", "1", "-f", "mjpeg", "-")]
-        empty = subprocess.run(made, capture_output=True, check=True).stdout
         # Half a minute without persons, and half a minute with some.
-        with http_camera([empty] * 30 + [OFFICE] * 30, 1.0) as camera:
+        with http_camera([empty_frame()] * 30 + [OFFICE] * 30, 1.0) as camera:
             with self.start(camera):
                 self.home.until({"lookdown_gate_detection": "on"}, START_SECONDS)
                 wait_until(lambda: self.home.shown()["images"].get("lookdown_gate_image", 0) > 1000, "an image", 60)

@@ -17,7 +17,7 @@ from compose_file import environment, services
 from harness.places import LOOKDOWN, ROOT, SAMPLES
 from harness.processes import free_ports, running
 from image.build import build, remove
-from waiting import wait_until
+from state import wait_until
 
 from cameras import rtsp_camera
 

@@ -1,27 +1,30 @@
 """Annotation files and the examples with the packages of labeling tools: supervision, Label Studio's and CVAT's SDK."""
 
+import contextlib
 import json
 import math
 import os
 import shutil
 import subprocess
 import tempfile
-import threading
-import time
 import unittest
-from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 from urllib.request import Request, urlopen
 
+from commands import run
 from harness.places import LOOKDOWN, ROOT, SAMPLES
 from harness.processes import free_ports
+from state import wait_until
 from support.lookdown import lookdown
+
+from cameras import Handler, serving
 
 HERE = Path(__file__).resolve().parent
 PYTHON = ROOT / ".setup" / "real" / "labelling" / "bin" / "python"
 EXAMPLES = ROOT / "examples"
 FAST = ("--profile", "fast", "--score-threshold", "0.3")
 TOKEN = "token-of-the-user"
+QUIET = os.environ | {"PYTHONDONTWRITEBYTECODE": "1", "MPLBACKEND": "agg"}
 
 
 class Labelling(unittest.TestCase):
@@ -36,7 +39,7 @@ class Labelling(unittest.TestCase):
             shutil.copy(SAMPLES / name, cls.images)
         for name in ("yolo", "labelstudio"):
             out = ["--format", name, "--oriented", "--out", str(cls.folder / name)]
-            run(str(LOOKDOWN), "detect", str(cls.images), *FAST, *out)
+            run(LOOKDOWN, "detect", cls.images, *FAST, *out)
         with lookdown({}) as server:
             address = f"http://{server.address}"
             cls.reports = {
@@ -48,7 +51,8 @@ class Labelling(unittest.TestCase):
             cls.calibrated = json.loads(calibrated)["persons"]
             cls.predicted = predictions(address, office)
             (cls.folder / "predictions.json").write_text(json.dumps(cls.predicted), encoding="utf-8")
-            read = run(str(PYTHON), str(HERE / "labelling" / "readers.py"), str(cls.folder), str(cls.images), address)
+            readers = HERE / "labelling" / "readers.py"
+            read = run(PYTHON, readers, cls.folder, cls.images, address, environment=QUIET)
             cls.read = json.loads(read.splitlines()[-1])
             # A line that the first person crosses on its way of 75 pixels.
             line = cls.calibrated[0]["oriented_box"]["cx"] + 35
@@ -108,15 +112,6 @@ class Labelling(unittest.TestCase):
                 self.assertAlmostEqual(found, expected, delta=0.1)
 
 
-def run(*command: str) -> str:
-    """The output of a program."""
-    environment = os.environ | {"PYTHONDONTWRITEBYTECODE": "1", "MPLBACKEND": "agg"}
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, env=environment, cwd=ROOT, check=False)
-    if done.returncode:
-        raise AssertionError(f"{command[:2]} failed: {done.stderr[-3000:]}")
-    return done.stdout
-
-
 def corners(box: dict) -> list[tuple[float, float]]:
     """The corners of an oriented box, clockwise from the upper left one."""
     sin, cos = math.sin(math.radians(box["angle_deg"])), math.cos(math.radians(box["angle_deg"]))
@@ -127,53 +122,46 @@ def corners(box: dict) -> list[tuple[float, float]]:
     return found
 
 
-class Images(BaseHTTPRequestHandler):
+class Images(Handler):
     """Serves an image to clients with the token, like Label Studio."""
 
     content = b""
 
     def do_GET(self) -> None:
         known = self.headers.get("Authorization") == f"Token {TOKEN}"
-        self.send_response(200 if known else 401)
-        self.end_headers()
-        self.wfile.write(self.content if known else b"")
-
-    def log_message(self, *_: object) -> None:
-        """Logs nothing."""
+        self.answer(200 if known else 401, self.content if known else b"")
 
 
 def predictions(server: str, image: bytes) -> dict:
     """The answer of the backend to Label Studio's request for predictions."""
     Images.content = image
-    tool = HTTPServer(("127.0.0.1", 0), Images)
-    threading.Thread(target=tool.serve_forever, daemon=True).start()
+    with serving(Images) as tool:
+        return answered(server, f"http://127.0.0.1:{tool}")
+
+
+def answered(server: str, label_studio: str) -> dict:
+    """The answer of the backend while Label Studio serves its image."""
     (port,) = free_ports(1)
-    label_studio = f"http://127.0.0.1:{tool.server_port}"
     environment = os.environ | {"LABEL_STUDIO_URL": label_studio, "LABEL_STUDIO_TOKEN": TOKEN}
     flags = ["--server", server, "--port", str(port), "--profile", "fast"]
     command = [str(PYTHON), str(EXAMPLES / "label_studio_backend.py"), *flags]
     with subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL) as backend:
         try:
-            wait_until_up(f"http://127.0.0.1:{port}/health")
+            wait_until(lambda: is_up(f"http://127.0.0.1:{port}/health"), "the backend answers")
             tasks = {"tasks": [{"id": 1, "data": {"image": "/data/upload/1/office.jpg"}}]}
             request = Request(f"http://127.0.0.1:{port}/predict", data=json.dumps(tasks).encode())
             with urlopen(request, timeout=60) as answer:
                 return json.load(answer)
         finally:
             backend.terminate()
-            tool.shutdown()
-            tool.server_close()
 
 
-def wait_until_up(address: str) -> None:
-    """Waits until a server answers."""
-    for _ in range(100):
-        try:
-            urlopen(address, timeout=5).close()
-            return
-        except OSError:
-            time.sleep(0.1)
-    raise AssertionError(f"{address} does not answer")
+def is_up(address: str) -> bool:
+    """Returns true if a server answers."""
+    with contextlib.suppress(OSError):
+        urlopen(address, timeout=5).close()
+        return True
+    return False
 
 
 def crossings(server: str, folder: Path, x: float) -> tuple[dict, bytes]:
@@ -182,12 +170,12 @@ def crossings(server: str, folder: Path, x: float) -> tuple[dict, bytes]:
         "import cv2, sys, numpy as np; frame = cv2.imread(sys.argv[1]); "
         "[cv2.imwrite(f'{sys.argv[2]}/moved-{step}.png', np.roll(frame, 25 * step, axis=1)) for step in range(4)]"
     )
-    run(str(PYTHON), "-c", shift, str(SAMPLES / "office.jpg"), str(folder))
+    run(PYTHON, "-c", shift, SAMPLES / "office.jpg", folder, environment=QUIET)
     frames = [str(folder / f"moved-{step}.png") for step in range(4)]
     heat_map = folder / "heat.png"
     flags = ["--server", server, "--calibration", "office", "--profile", "fast", "--max-step", "40"]
     flags += ["--line", f"{x},0,{x},960", "--heat-map", str(heat_map)]
-    printed = run(str(PYTHON), str(EXAMPLES / "supervision_lines.py"), *frames, *flags)
+    printed = run(PYTHON, EXAMPLES / "supervision_lines.py", *frames, *flags, environment=QUIET)
     return json.loads(printed), heat_map.read_bytes()
 
 

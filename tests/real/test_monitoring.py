@@ -9,10 +9,14 @@ import tempfile
 import unittest
 from pathlib import Path
 
+from commands import run
 from harness.places import LOOKDOWN, ROOT, SAMPLES, model
 from harness.processes import free_ports, running
-from kubernetes.tools import PYTHON, manifests, only, read_yaml, run
-from waiting import wait_until
+from kubernetes.tools import kustomized, manifests, only, read_yaml
+from state import wait_until
+from support.lookdown import lookdown
+
+from cameras import office_calibration
 
 MONITORING = ROOT / "k8s" / "monitoring"
 DASHBOARDS = ("dashboard.json", "occupancy.json", "counts.json")
@@ -44,14 +48,17 @@ class Monitoring(unittest.TestCase):
 
     def setUp(self):
         self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
+        zones = [{"name": "left", "frame_px": [[0, 0], [480, 0], [480, 960], [0, 960]]}]
+        lines = [{"name": "middle", "frame_px": [[480, 0], [480, 960]]}]
+        self.calibrations = office_calibration(self.folder / "calibrations", zones=zones, lines=lines)
 
     def test_alerts_fire_only_for_their_causes(self):
         self.write("rules.yaml", self.alerts)
-        run(["promtool", "check", "rules", self.folder / "rules.yaml"])
+        run("promtool", "check", "rules", self.folder / "rules.yaml")
         bare = [{part: rule[part] for part in rule if part != "annotations"} for rule in self.rules]
         self.write("rules.yaml", {"groups": [{"name": "lookdown", "rules": bare}]})
         shutil.copy(UNIT_TESTS, self.folder)
-        run(["promtool", "test", "rules", self.folder / UNIT_TESTS.name])
+        run("promtool", "test", "rules", self.folder / UNIT_TESTS.name)
         tested = UNIT_TESTS.read_text(encoding="utf-8")
         self.assertEqual([rule["alert"] for rule in self.rules if f"alertname: {rule['alert']}\n" not in tested], [])
 
@@ -67,7 +74,7 @@ class Monitoring(unittest.TestCase):
         alerts, address = folder / "alerts.yaml", "https://help.example/lookdown.html"
         given = alerts.read_text(encoding="utf-8").replace("runbooks: docs/observability.md", f"runbooks: {address}")
         alerts.write_text(given, encoding="utf-8")
-        shown = run([PYTHON / "kubectl", "kustomize", folder])
+        shown = kustomized(folder)
         self.assertEqual(shown.count(f"runbook_url: {address}#lookdown"), len(self.rules))
 
     def test_prometheus_accepts_the_dashboard(self):
@@ -77,7 +84,7 @@ class Monitoring(unittest.TestCase):
             for number, expression in enumerate(self.panels)
         ]
         self.write("panels.yaml", {"groups": [{"name": "panels", "rules": rules}]})
-        run(["promtool", "check", "rules", self.folder / "panels.yaml"])
+        run("promtool", "check", "rules", self.folder / "panels.yaml")
 
     def test_the_autoscalers_metric_is_the_mean_queue_time(self):
         query = self.adapter["metricsQuery"].replace("<<.GroupBy>>", "pod").replace("<<.LabelMatchers>>", 'pod=~"a|b"')
@@ -102,7 +109,7 @@ class Monitoring(unittest.TestCase):
             "promql_expr_test": [{"expr": query, "eval_time": "8m", "exp_samples": samples}],
         }
         self.write("test.yaml", {"tests": [test]})
-        run(["promtool", "test", "rules", self.folder / "test.yaml"])
+        run("promtool", "test", "rules", self.folder / "test.yaml")
 
     def test_every_queried_metric_and_label_is_in_a_scrape(self):
         scrape = self.scrape() + self.scrape_without_the_inference_server() + self.scrape_of_all_parts()
@@ -118,25 +125,14 @@ class Monitoring(unittest.TestCase):
                     self.assertTrue(any(f'{label}="{value}"' in line for line in lines), f"{name}: {label}={value}")
 
     def test_prometheus_accepts_the_settings_for_compose(self):
-        run(["promtool", "check", "config", ROOT / "docker" / "prometheus.yaml"])
+        run("promtool", "check", "config", ROOT / "docker" / "prometheus.yaml")
 
     def scrape(self) -> str:
         """The metrics of a server that has answered a frame over TLS."""
         key, certificate = self.folder / "key.pem", self.folder / "certificate.pem"
-        made = ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes"]
-        run(
-            [
-                *made,
-                "-subj",
-                "/CN=localhost",
-                "-addext",
-                "subjectAltName=DNS:localhost",
-                "-keyout",
-                key,
-                "-out",
-                certificate,
-            ]
-        )
+        key_of = ["-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-keyout", key]
+        name = ["-subj", "/CN=localhost", "-addext", "subjectAltName=DNS:localhost"]
+        run("openssl", "req", "-x509", *key_of, *name, "-out", certificate)
         port, metrics_port = free_ports(2)
         settings = {
             "SERVER__LISTEN": f"127.0.0.1:{port}",
@@ -144,7 +140,7 @@ class Monitoring(unittest.TestCase):
             "SERVER__TLS__CERTIFICATE": str(certificate),
             "SERVER__TLS__PRIVATE_KEY": str(key),
             "SHUTDOWN__GRACE_MILLIS": "0",
-            "CALIBRATIONS__PATH": str(self.calibrations()),
+            "CALIBRATIONS__PATH": str(self.calibrations),
             "CALIBRATIONS__ZONE_METRICS": "true",
             "RESULTS__CAMERA_METRICS": "true",
         }
@@ -158,47 +154,25 @@ class Monitoring(unittest.TestCase):
 
     def scrape_of_all_parts(self) -> str:
         """The metrics of `lookdown run` that has counted a frame of a camera."""
-        (port,) = free_ports(1)
         frames = self.folder / "frames"
         frames.mkdir()
-        settings = {
-            "SERVER__LISTEN": f"127.0.0.1:{port}",
-            "SHUTDOWN__GRACE_MILLIS": "0",
-            "CALIBRATIONS__PATH": str(self.folder / "calibrations"),
-            "COUNTS__PATH": str(self.folder / "counts.sqlite"),
-            "STATE__PATH": str(self.folder / "state"),
-        }
-        environment = {f"LOOKDOWN__{name}": value for name, value in settings.items()}
-        command = [str(LOOKDOWN), "run", str(frames), "--calibration", "office", "--profile", "fast"]
-        with running("counting", command, port, "/readyz", environment) as server:
+        settings = {"COUNTS__PATH": self.folder / "counts.sqlite", "STATE__PATH": self.folder / "state"}
+        command = ["run", frames, "--calibration", "office", "--profile", "fast"]
+        with lookdown(settings, calibrations=self.calibrations, command=command) as server:
             shutil.copy(SAMPLES / "office.jpg", frames)
             wait_until(lambda: b"lookdown_count_crossings_total{" in server.get("/metrics"), "the frame is counted")
             return server.get("/metrics").decode()
 
-    def calibrations(self) -> Path:
-        """A folder with the calibration of the sample, which has a zone and a line."""
-        folder = self.folder / "calibrations"
-        folder.mkdir()
-        calibration = json.loads((SAMPLES / "calibrations" / "office.json").read_text(encoding="utf-8"))
-        zones = [{"name": "left", "frame_px": [[0, 0], [480, 0], [480, 960], [0, 960]]}]
-        lines = [{"name": "middle", "frame_px": [[480, 0], [480, 960]]}]
-        content = calibration | {"zones": zones, "lines": lines}
-        (folder / "office.json").write_text(json.dumps(content), encoding="utf-8")
-        return folder
-
     def scrape_without_the_inference_server(self) -> str:
         """The metrics of a server whose inference server does not answer."""
-        port, unused = free_ports(2)
+        (unused,) = free_ports(1)
         settings = {
-            "SERVER__LISTEN": f"127.0.0.1:{port}",
             "INFERENCE__BACKEND": "v2",
             "INFERENCE__URL": f"http://127.0.0.1:{unused}",
             "INFERENCE__MODEL": "nanodet_g_views_416",
-            "MODEL__PATH": str(model("nanodet_g_views_416").parent),
-            "SHUTDOWN__GRACE_MILLIS": "0",
+            "MODEL__PATH": model("nanodet_g_views_416").parent,
         }
-        environment = {f"LOOKDOWN__{name}": value for name, value in settings.items()}
-        with running("cut-off", [str(LOOKDOWN), "serve"], port, "/livez", environment) as server:
+        with lookdown(settings, probe="/livez") as server:
             wait_until(lambda: b"\nlookdown_remote_up 0\n" in server.get("/metrics"), "the outage is detected")
             return server.get("/metrics").decode()
 

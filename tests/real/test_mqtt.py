@@ -4,17 +4,17 @@ import contextlib
 import json
 import os
 import signal
-import subprocess
 import tempfile
 import unittest
 from pathlib import Path
 
+from commands import run
 from harness.places import ROOT, SAMPLES
 from mosquitto import PASSWORD, PASSWORD_IN_URL, broker
+from state import metric, wait_until
 from support.lookdown import TINY, lookdown
-from waiting import wait_until
 
-from metrics import metric
+from cameras import office_calibration
 
 OFFICE = (SAMPLES / "office.jpg").read_bytes()
 DETECT = "/detect?calibration=office&profile=fast"
@@ -44,10 +44,7 @@ class Mqtt(unittest.TestCase):
 
     def setUp(self):
         self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
-        calibration = json.loads((SAMPLES / "calibrations" / "office.json").read_text(encoding="utf-8"))
-        self.calibrations = self.folder / "calibrations"
-        self.calibrations.mkdir()
-        (self.calibrations / "office.json").write_text(json.dumps(calibration | {"zones": AREAS}), encoding="utf-8")
+        self.calibrations = office_calibration(self.folder / "calibrations", zones=AREAS)
         self.broker = self.enterContext(broker(self.folder))
 
     def lookdown(self, **settings: str):
@@ -208,7 +205,7 @@ class MqttOverTls(unittest.TestCase):
                 *("-days", "2", "-extfile", names, "-out", certificate),
             ],
         ):
-            subprocess.run(["openssl", *command], check=True, capture_output=True)
+            run("openssl", *command)
         tls = {"certfile": certificate, "keyfile": key, "cafile": authority}
         self.broker = self.enterContext(broker(self.folder, tls))
 

@@ -1,21 +1,22 @@
 """The flow of examples/node-red.json in Node-RED: it sends snapshots of a camera and counts the persons."""
 
 import contextlib
-import http.server
 import json
 import os
 import re
 import subprocess
 import tempfile
-import threading
 import unittest
 from collections.abc import Iterator
 from pathlib import Path
 
+from commands import run
 from harness.places import ROOT, SAMPLES
 from harness.processes import free_ports
+from state import wait_until
 from support.lookdown import lookdown
-from waiting import wait_until
+
+from cameras import Handler, serving
 
 HERE = Path(__file__).resolve().parent / "node_red"
 RECIPE = ROOT / "examples" / "node-red.json"
@@ -25,33 +26,14 @@ PROBLEM = re.compile(r"\[debug:problem\]")
 START_SECONDS = 60.0
 
 
-class Snapshots(http.server.BaseHTTPRequestHandler):
+class Snapshots(Handler):
     """A camera whose snapshot is the sample."""
 
     snapshot = OFFICE.read_bytes()
 
-    def log_message(self, *_):
-        """Logs nothing."""
-
     def do_GET(self):
         """Sends the snapshot."""
-        self.send_response(200)
-        self.send_header("Content-Type", "image/jpeg")
-        self.send_header("Content-Length", str(len(self.snapshot)))
-        self.end_headers()
-        self.wfile.write(self.snapshot)
-
-
-@contextlib.contextmanager
-def camera() -> Iterator[str]:
-    """The address of the snapshot."""
-    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Snapshots)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    try:
-        yield f"http://127.0.0.1:{server.server_port}/snapshot.jpg"
-    finally:
-        server.shutdown()
-        server.server_close()
+        self.answer(200, self.snapshot, ("Content-Type", "image/jpeg"))
 
 
 @contextlib.contextmanager
@@ -81,11 +63,12 @@ class NodeRed(unittest.TestCase):
     def setUpClass(cls) -> None:
         """Installs Node-RED according to the lock file."""
         command = ["npm", "ci", "--no-audit", "--no-fund", "--ignore-scripts", "--loglevel=error"]
-        subprocess.run(command, cwd=HERE, check=True)
+        run(*command, cwd=HERE)
 
     def test_the_flow_counts_persons_and_shows_problems(self) -> None:
         folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
-        server, snapshot = self.enterContext(lookdown({})), self.enterContext(camera())
+        server, port = self.enterContext(lookdown({})), self.enterContext(serving(Snapshots))
+        snapshot = f"http://127.0.0.1:{port}/snapshot.jpg"
         detect = f"http://{server.address}/detect?camera=hall&calibration=office&profile=fast"
         output = self.enterContext(node_red(folder, {"CAMERA_URL": snapshot, "LOOKDOWN_URL": detect}))
         wait_until(lambda: COUNT.search(output.read_text()), "the flow has counted", START_SECONDS)

@@ -18,10 +18,11 @@ from datetime import UTC, datetime
 from pathlib import Path
 from statistics import mean, pstdev
 
-from cpu_share import cpu_share
-from harness.places import LOOKDOWN, ROOT, model
+from harness.places import ROOT, model
 from harness.processes import Server, free_ports, running
-from waiting import wait_until
+from state import wait_until
+from support.control_group import cpu_share
+from support.lookdown import lookdown
 
 from cameras import rtsp_camera
 
@@ -145,14 +146,13 @@ class Number(unittest.TestCase):
     @contextlib.contextmanager
     def lookdown_run(self, condition: Condition, url: str) -> Iterator[Server]:
         """`lookdown run URL --name hall` under a condition."""
-        (port,) = free_ports(1)
         folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
         with contextlib.ExitStack() as stack:
             settings = stack.enter_context(slow_network(condition.search_seconds))
-            settings |= {"CALIBRATIONS__PATH": str(folder / "calibrations"), "STATE__PATH": str(folder / "state")}
+            settings |= {"STATE__PATH": folder / "state"}
             (folder / "calibrations").mkdir()
-            command = [LOOKDOWN, "run"]
-            store = ["--store", folder / "counts.sqlite", "--port", port]
+            command = ["run"]
+            store = ["--store", folder / "counts.sqlite"]
             if condition.cameras == 1:
                 command += [url, "--name", CAMERA, *condition.flags, *store]
             else:
@@ -160,11 +160,9 @@ class Number(unittest.TestCase):
                 file = folder / "lookdown.toml"
                 file.write_text("".join(f'[[cameras]]\nname = "{name}"\nurl = "{url}"\n' for name in names))
                 command += [file, *store]
-            if condition.cores:
-                command = [*stack.enter_context(cpu_share("number", condition.cores)), *command]
-            environment = {f"LOOKDOWN__{name}": value for name, value in settings.items()}
-            command = [str(word) for word in command]
-            server = stack.enter_context(running("number", command, port, "/readyz", environment))
+            cores = stack.enter_context(cpu_share("number", condition.cores)) if condition.cores else ()
+            own = {"calibrations": folder / "calibrations", "command": command, "inside": cores}
+            server = stack.enter_context(lookdown(settings, **own))
             stack.enter_context(busy(condition.busy))
             yield server
 

@@ -6,7 +6,6 @@
 import base64
 import contextlib
 import hashlib
-import http.server
 import json
 import os
 import shutil
@@ -18,13 +17,14 @@ import unittest
 from collections.abc import Iterator
 from pathlib import Path
 
-from harness.places import LOOKDOWN
-from harness.processes import free_ports, running
+from harness.processes import free_ports
 from rendered_room import rendered_room
 from support.exchange import ask
 from support.lookdown import lookdown
 from support.places import FIXTURES, ROOT, SAMPLES
 from test_count import Count
+
+from cameras import Handler, serving
 
 HERE = Path(__file__).resolve().parent / "page"
 KEY = "a key that only this test knows"
@@ -38,7 +38,7 @@ STILL_SECONDS = 2.0
 ZONE = {"name": "middle", "floor_m": [[-2, -1], [2, -1], [2, 3], [-2, 3]]}
 
 
-class Camera(http.server.BaseHTTPRequestHandler):
+class Camera(Handler):
     """A camera with snapshots for the user `viewer`. The URL has a query that belongs to it."""
 
     def do_GET(self) -> None:
@@ -46,16 +46,9 @@ class Camera(http.server.BaseHTTPRequestHandler):
         is_allowed = self.headers.get("Authorization") == f"Basic {login}"
         images = {"/snapshot.jpg?token=1": OFFICE, "/room.png": ROOM}
         is_found = self.path in images
-        self.send_response(200 if is_allowed and is_found else 404 if is_allowed else 401)
-        self.send_header("WWW-Authenticate", 'Basic realm="camera"')
-        self.send_header("Content-Type", "image/jpeg")
-        body = images[self.path] if is_allowed and is_found else b""
-        self.send_header("Content-Length", str(len(body)))
-        self.end_headers()
-        self.wfile.write(body)
-
-    def log_message(self, *_) -> None:
-        """Logs nothing."""
+        status = 200 if is_allowed and is_found else 404 if is_allowed else 401
+        challenge = ("WWW-Authenticate", 'Basic realm="camera"')
+        self.answer(status, images[self.path] if status == 200 else b"", challenge, ("Content-Type", "image/jpeg"))
 
 
 class Page(unittest.TestCase):
@@ -156,40 +149,27 @@ class Page(unittest.TestCase):
 
         Yields variables of the tests.
         """
-        port, settings_port, camera_port = free_ports(3)
-        (folder / "run").mkdir()
+        runs = folder / "run"
+        runs.mkdir()
         settings = {
-            "SERVER__LISTEN": f"127.0.0.1:{port}",
-            "CALIBRATIONS__PATH": folder / "run",
-            "STATE__PATH": folder / "run" / "state",
-            "COUNTS__PATH": folder / "run" / "counts.sqlite",
+            "STATE__PATH": runs / "state",
+            "COUNTS__PATH": runs / "counts.sqlite",
             "DETECT__PROFILE": "fast",
             "LOG__FILTER": "warn",
         }
-        others = {
-            "SERVER__LISTEN": f"127.0.0.1:{settings_port}",
-            "STATE__PATH": folder / "run" / "others",
-            "COUNTS__PATH": folder / "run" / "others.sqlite",
-        }
-        environment, other_environment = (
-            {f"LOOKDOWN__{name}": str(value) for name, value in chosen.items()}
-            for chosen in (settings, settings | others)
-        )
-        run = [str(LOOKDOWN), "run"]
-        run_with_camera = [*run, f"http://127.0.0.1:{camera_port}/snapshot.jpg", "--name", "gate"]
-        with (
-            http.server.ThreadingHTTPServer(("127.0.0.1", camera_port), Camera) as camera,
-            running("lookdown", run, port, "/readyz", environment),
-            running("lookdown", run_with_camera, settings_port, "/readyz", other_environment),
-        ):
-            threading.Thread(target=camera.serve_forever, daemon=True).start()
-            yield {
-                "LOOKDOWN_RUN_URL": f"http://127.0.0.1:{port}",
-                "LOOKDOWN_SETTINGS_RUN_URL": f"http://127.0.0.1:{settings_port}",
-                "LOOKDOWN_CAMERA_URL": f"http://127.0.0.1:{camera_port}",
-                "LOOKDOWN_CAMERA_PASSWORD": KEY,
-            }
-            camera.shutdown()
+        others = {"STATE__PATH": runs / "others", "COUNTS__PATH": runs / "others.sqlite"}
+        with serving(Camera) as camera:
+            with_camera = ["run", f"http://127.0.0.1:{camera}/snapshot.jpg", "--name", "gate"]
+            with (
+                lookdown(settings, calibrations=runs, command=["run"]) as run,
+                lookdown(settings | others, calibrations=runs, command=with_camera) as settings_run,
+            ):
+                yield {
+                    "LOOKDOWN_RUN_URL": f"http://{run.address}",
+                    "LOOKDOWN_SETTINGS_RUN_URL": f"http://{settings_run.address}",
+                    "LOOKDOWN_CAMERA_URL": f"http://127.0.0.1:{camera}",
+                    "LOOKDOWN_CAMERA_PASSWORD": KEY,
+                }
 
     def run_node(self, tests: str, settings: dict[str, str]) -> None:
         """Runs tests that are written in JavaScript."""

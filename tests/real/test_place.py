@@ -11,8 +11,9 @@ import urllib.error
 from pathlib import Path
 
 from harness.places import LOOKDOWN
-from harness.processes import Server, free_ports, running
-from waiting import wait_until
+from harness.processes import Server
+from state import wait_until
+from support.lookdown import lookdown
 
 from cameras import http_camera
 
@@ -63,19 +64,12 @@ class Place(unittest.TestCase):
         return file
 
     def test_a_turned_camera_at_the_same_place_is_placed(self):
-        (port,) = free_ports(1)
-        variables = {
-            "LOOKDOWN__SERVER__LISTEN": f"127.0.0.1:{port}",
-            "LOOKDOWN__CALIBRATIONS__PATH": str(self.folder / "calibrations"),
-            "LOOKDOWN__COUNTS__PATH": str(self.folder / "counts.sqlite"),
-            "LOOKDOWN__STATE__PATH": str(self.folder / "state"),
-            "LOOKDOWN__SHUTDOWN__GRACE_MILLIS": "0",
-        }
-        server = f"http://127.0.0.1:{port}"
-        command = [str(LOOKDOWN), "run", str(self.settings())]
-        with running("place", command, port, "/readyz", variables) as process:
+        settings = {"COUNTS__PATH": self.folder / "counts.sqlite", "STATE__PATH": self.folder / "state"}
+        command = ["run", self.settings()]
+        with lookdown(settings, calibrations=self.folder / "calibrations", command=command) as process:
             wait_until(lambda: all(tracks(process, name) for name in CAMERAS), "both cameras have tracks")
-            place = [LOOKDOWN, "calibration", "place", *CAMERAS, "--minutes", "1", "--server", server]
+            place = [LOOKDOWN, "calibration", "place", *CAMERAS, "--minutes", "1"]
+            place += ["--server", f"http://{process.address}"]
             placed = subprocess.run(place, capture_output=True, text=True, timeout=120)
         print(placed.stdout, placed.stderr, flush=True)
         self.assertEqual(placed.returncode, 0, placed.stderr)

@@ -11,6 +11,7 @@ import unittest
 from pathlib import Path
 from urllib.request import Request, urlopen
 
+from commands import run
 from harness.places import ROOT, SAMPLES
 from rendered_room import plain_disc, rendered_room
 from support.lookdown import lookdown
@@ -30,11 +31,13 @@ class PythonPackage(unittest.TestCase):
         folder = Path(cls.enterClassContext(tempfile.TemporaryDirectory()))
         cls.folder = folder
         started = time.monotonic()
-        run([sys.executable, "-m", "venv", folder / "venv"])
+        run(sys.executable, "-m", "venv", folder / "venv", environment=clean())
         cls.bin = folder / "venv" / "bin"
-        run([cls.bin / "pip", "install", "--quiet", "--disable-pip-version-check", wheel])
+        pip = [cls.bin / "pip", "install", "--quiet", "--disable-pip-version-check"]
+        run(*pip, wheel, environment=clean())
         installed = time.monotonic()
-        report = run([cls.bin / "lookdown", "detect", OFFICE, "--calibration", CALIBRATION], cwd=folder)
+        command = [cls.bin / "lookdown", "detect", OFFICE, "--calibration", CALIBRATION]
+        report = run(*command, cwd=folder, environment=clean())
         cls.report = json.loads(report)
         print(
             f"\n  wheel {wheel.stat().st_size / 1e6:.1f} MB; pip install {installed - started:.1f} s; "
@@ -44,8 +47,8 @@ class PythonPackage(unittest.TestCase):
     def checked(self, program: str, *arguments: str | Path) -> str:
         """Runs a program with the installed wheel and the libraries that it is compared with."""
         (packages,) = self.bin.parent.glob("lib/python*/site-packages")
-        environment = {"PYTHONPATH": str(packages)}
-        return run([CHECKED, HERE / program, *arguments], cwd=self.folder, environment=environment)
+        environment = clean() | {"PYTHONPATH": str(packages)}
+        return run(CHECKED, HERE / program, *arguments, cwd=self.folder, environment=environment)
 
     def test_the_command_detects_without_a_compiler_or_a_download(self):
         self.assertGreaterEqual(len(self.report["persons"]), 4)
@@ -56,7 +59,8 @@ class PythonPackage(unittest.TestCase):
             "detections = lookdown.Detector().detect(sys.argv[1], sys.argv[2])\n"
             "print(json.dumps(detections.report))\n"
         )
-        report = json.loads(run([self.bin / "python", "-c", program, OFFICE, CALIBRATION], cwd=self.folder))
+        command = [self.bin / "python", "-c", program, OFFICE, CALIBRATION]
+        report = json.loads(run(*command, cwd=self.folder, environment=clean()))
         with lookdown({}, calibrations=SAMPLES / "calibrations") as server:
             headers = {"Content-Type": "image/jpeg"}
             request = Request(f"http://{server.address}/detect?calibration=office", OFFICE.read_bytes(), headers)
@@ -99,7 +103,8 @@ class PythonPackage(unittest.TestCase):
         path = self.folder / "typed"
         path.mkdir()
         (path / "lookdown").symlink_to(package)
-        said = run([CHECKED, "-m", "mypy", "--strict", HERE / "example.py"], environment={"MYPYPATH": str(path)})
+        environment = clean() | {"MYPYPATH": str(path)}
+        said = run(CHECKED, "-m", "mypy", "--strict", HERE / "example.py", environment=environment)
         self.assertIn("no issues found", said)
 
     def test_the_example_runs(self):
@@ -124,16 +129,6 @@ class PythonPackage(unittest.TestCase):
 def clean() -> dict[str, str]:
     """The environment without what Python or Lookdown would take from it."""
     return {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "LOOKDOWN"))}
-
-
-def run(command: list[str | Path], cwd: Path | None = None, environment: dict[str, str] | None = None) -> str:
-    """Returns the output of a command that must succeed."""
-    done = subprocess.run(
-        command, cwd=cwd, env=clean() | (environment or {}), capture_output=True, text=True, check=False, timeout=300
-    )
-    if done.returncode != 0:
-        raise AssertionError(f"{command}:\n{done.stdout}{done.stderr}")
-    return done.stdout
 
 
 def _listening(line: str) -> str | None:

@@ -18,11 +18,9 @@ from harness.places import LOOKDOWN, ROOT
 from harness.places import WORK as LOGS
 from harness.processes import Server, free_ports, running
 from redis_server import RedisServer
+from state import PATIENCE_SECONDS, metric, wait_until
 from support.exchange import Answer, ask
 from support.places import OFFICE, SAMPLES, TINY_MODEL
-from waiting import PATIENCE_SECONDS, wait_until
-
-from metrics import metric
 
 FRAME = OFFICE.read_bytes()
 SCRIPTS = ROOT / "src" / "results" / "redis"

@@ -11,9 +11,9 @@ import urllib.request
 from chain import KEY, LEASTCONN, REPLICAS, Chain, chain
 from crowd import crowd, rate
 from harness.processes import Server
+from state import wait_until
 from support.lookdown import TINY
 from support.places import OFFICE, SAMPLES
-from waiting import wait_until
 
 CLIENTS = 12
 DETECT = "/detect?calibration=office&profile=fast"

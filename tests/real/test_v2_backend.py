@@ -2,19 +2,15 @@
 
 import contextlib
 import json
-import signal
 import tempfile
-import time
 import unittest
 from collections.abc import Iterator
 from pathlib import Path
 
-from harness.places import ROOT, SAMPLES, model
+from harness.places import ROOT, model
 from harness.processes import Server, free_ports, running
-from remote_inference import BALANCED, FAST, FRAME, MODEL, answer, asking, assert_same, when_ready_is
+from remote_inference import FAST, FRAME, MODEL, answer, asking, assert_survives_a_restart, when_ready_is
 from support.lookdown import lookdown
-
-from metrics import metric
 
 HERE = Path(__file__).resolve().parent
 MLSERVER = ROOT / ".setup" / "real" / "v2_backend" / "bin" / "mlserver"
@@ -50,44 +46,11 @@ class RemoteInference(unittest.TestCase):
     """Detections do not depend on the location of the network, and outages are reported and recovered from."""
 
     def test_mlserver_gives_the_same_detections_and_may_restart(self) -> None:
-        with lookdown({"MODEL__PATH": str(model(MODEL).parent)}) as here:
-            local = {path: json.loads(here.post(path, FRAME)) for path in (FAST, BALANCED)}
-        (port,) = free_ports(1)
-        with contextlib.ExitStack() as stack:
-            first = contextlib.ExitStack()
-            stack.enter_context(first)
-            remote = first.enter_context(mlserver(port))
-            server = stack.enter_context(lookdown(asking(f"http://127.0.0.1:{port}", "people")))
-            for path, wanted in local.items():
-                assert_same(self, json.loads(server.post(path, FRAME)), wanted)
-            self.assertGreater(metric(server, 'remote_requests_total{result="answered"}'), 0)
-            self.assertEqual(metric(server, "remote_up"), 1)
-
-            remote.process.send_signal(signal.SIGKILL)
-            remote.process.wait()
-            status, headers, problem = answer(server, FAST, FRAME)
-            self.assertEqual((status, problem["type"]), (503, "/problems/inference-unavailable"))
-            self.assertGreaterEqual(int(headers["Retry-After"]), 1)
-            self.assertNotIn(str(port), problem["error"])
-            self.assertEqual(when_ready_is(server, 503)["type"], "/problems/inference-unavailable")
-            began = time.monotonic()
-            self.assertEqual(answer(server, FAST, FRAME)[0], 503)
-            self.assertLess(time.monotonic() - began, 1.0, "an open breaker answers at once")
-            self.assertEqual(metric(server, "remote_up"), 0)
-            self.assertEqual(answer(server, "/livez")[0], 200)
-            first.close()
-
-            stack.enter_context(mlserver(port))
-            when_ready_is(server, 200)
-            assert_same(self, json.loads(server.post(FAST, FRAME)), local[FAST])
+        assert_survives_a_restart(self, mlserver, {})
 
     def test_a_server_that_starts_first_waits_for_mlserver(self) -> None:
-        (port, own) = free_ports(2)
-        variables = asking(f"http://127.0.0.1:{port}", "people") | {"SERVER__LISTEN": f"127.0.0.1:{own}"}
-        variables |= {"CALIBRATIONS__PATH": str(SAMPLES / "calibrations"), "SHUTDOWN__GRACE_MILLIS": "0"}
-        command = [str(ROOT / "target" / "release" / "lookdown"), "serve"]
-        environment = {f"LOOKDOWN__{name}": value for name, value in variables.items()}
-        with running("lookdown", command, own, "/livez", environment) as server:
+        (port,) = free_ports(1)
+        with lookdown(asking(f"http://127.0.0.1:{port}", "people"), probe="/livez") as server:
             status, _, problem = answer(server, FAST, FRAME)
             self.assertEqual((status, problem["type"]), (503, "/problems/warming-up"))
             with mlserver(port):

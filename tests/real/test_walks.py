@@ -21,10 +21,10 @@ from pathlib import Path
 from harness.places import LOOKDOWN
 from harness.processes import Server, free_ports
 from harness.usage import usage_of
+from state import wait_until
 from support.lookdown import lookdown
 from test_count import Count
 from test_watch import Watch
-from waiting import wait_until
 
 from cameras import rtsp_camera
 

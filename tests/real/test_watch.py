@@ -19,8 +19,8 @@ from statistics import median
 
 from harness.places import LOOKDOWN, SAMPLES
 from harness.processes import free_ports
+from state import wait_until
 from support.lookdown import TINY, lookdown
-from waiting import wait_until
 
 from cameras import CLOCK_BITS, PASSWORD, USER, http_camera, proxy, rtsp_camera, rtsp_clock, shown_milliseconds
 
@@ -260,25 +260,11 @@ class Cameras(unittest.TestCase):
 
     def test_one_command_serves_watches_and_counts(self):
         http = self.enterContext(http_camera(self.frames, RATE))
-        (port,) = free_ports(1)
-        settings = {f"LOOKDOWN__{name}": value for name, value in TINY.items()}
-        settings["LOOKDOWN__SERVER__LISTEN"] = f"127.0.0.1:{port}"
-        settings["LOOKDOWN__COUNTS__PATH"] = str(self.folder / "counts.sqlite")
-        command = [LOOKDOWN, "run", f"http://127.0.0.1:{http}/stream", "--name", "hall"]
-        with open(self.folder / "serve.log", "wb") as log:
-            process = subprocess.Popen(command, env=os.environ | settings, stderr=log)
-        try:
-
-            def has_result() -> bool:
-                with (
-                    contextlib.suppress(OSError),
-                    urllib.request.urlopen(f"http://127.0.0.1:{port}/results/hall/latest"),
-                ):
-                    return True
-                return False
-
-            wait_until(has_result, "there is a result", 30)
-            origin = f"http://127.0.0.1:{port}"
+        settings = TINY | {"COUNTS__PATH": self.folder / "counts.sqlite"}
+        command = ["run", f"http://127.0.0.1:{http}/stream", "--name", "hall"]
+        with lookdown(settings, command=command) as server:
+            wait_until(lambda: json.loads(server.get("/results")), "there is a result", 30)
+            origin = f"http://{server.address}"
             with urllib.request.urlopen(f"{origin}/", timeout=10) as page:
                 self.assertEqual(page.headers.get_content_type(), "text/html")
                 self.assertIn("<h1", page.read().decode())
@@ -287,10 +273,8 @@ class Cameras(unittest.TestCase):
                 lines = iter(events.readline, b"")
                 data = next(line for line in lines if line.startswith(b"data:"))
             self.assertEqual(json.loads(data.removeprefix(b"data:"))["camera"], "hall")
-            process.send_signal(signal.SIGINT)
-            self.assertEqual(process.wait(timeout=20), 0)
-        finally:
-            process.kill()
+            server.process.send_signal(signal.SIGINT)
+            self.assertEqual(server.process.wait(timeout=20), 0)
 
     def clip(self) -> Path:
         """A video of the frames, one per second."""

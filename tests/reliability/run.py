@@ -1,7 +1,6 @@
-"""Proves that the server survives faults: `run.py short|long|tell [PART...]`, all parts by default.
+"""Proves that the server survives faults: `run.py short|long [PART...]`, all parts by default.
 
-Each part prints and stores a row for each result; `tell` prints the stored rows as Markdown. Exits
-with 1 when a proof fails.
+Each part prints and stores a row for each result. Exits with 1 when a proof fails.
 """
 
 import json
@@ -33,7 +32,6 @@ from proofs import (  # noqa: E402
 from support.effort import LONG, SHORT  # noqa: E402
 from support.places import WORK  # noqa: E402
 from support.row import Row  # noqa: E402
-from support.tell import markdown  # noqa: E402
 
 PARTS = (
     contract,
@@ -61,12 +59,9 @@ def main(arguments: list[str]) -> int:
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     wanted, *parts = arguments or [""]
     unknown = [name for name in parts if name not in named]
-    if wanted not in (*EFFORTS, "tell") or unknown:
-        print(f"usage: run.py short|long|tell [{'|'.join(named)}]...", file=sys.stderr)
+    if wanted not in EFFORTS or unknown:
+        print(f"usage: run.py short|long [{'|'.join(named)}]...", file=sys.stderr)
         return 2
-    if wanted == "tell":
-        print(markdown(WORK, named))
-        return 0
     try:
         rows = [row for name in parts or named for row in _prove(name, named[name], EFFORTS[wanted])]
     except KeyboardInterrupt:

@@ -51,20 +51,14 @@ def count(reports, ends, score, anchor):
     return {"clockwise": zone.out_count, "anticlockwise": zone.in_count}
 
 
-def inputs(description):
-    """The reports of the command line, the ends of each line in the frame, and its true crossings."""
-    parser = argparse.ArgumentParser(description=description)
+def main() -> None:
+    """Prints a row for each choice of score and anchor."""
+    parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("reports", type=Path, help="one report per line")
-    reports = parser.parse_args().reports.read_text(encoding="utf-8").splitlines()
+    reports = [json.loads(line) for line in parser.parse_args().reports.read_text(encoding="utf-8").splitlines()]
     calibration = json.loads((CLIP / "calibration.json").read_text(encoding="utf-8"))
     ends = {line["name"]: [pixel_of(calibration, place) for place in line["floor_m"]] for line in calibration["lines"]}
     truth = json.loads((CLIP / "truth.json").read_text(encoding="utf-8"))["crossings"]
-    return [json.loads(report) for report in reports], ends, truth
-
-
-def main() -> None:
-    """Prints a row for each choice of score and anchor."""
-    reports, ends, truth = inputs(__doc__)
     print("| from score | anchor | counted | wrong |\n|---|---|---:|---:|")
     for score, (name, anchor) in itertools.product(SCORES, ANCHORS.items()):
         counted = wrong = 0

@@ -21,35 +21,26 @@ class Effort:
     """The rates of open loops, percent of the capacity."""
     peer_clients: int
     """The number of clients for comparisons of servers."""
-    many_clients: tuple[int, ...]
-    """The numbers of clients for growth."""
-    sides: tuple[int, ...]
-    """The frame sides for growth, pixels."""
     cameras: tuple[int, ...]
-    """The numbers of cameras for growth."""
+    """The numbers of cameras."""
     frames: int
     """The number of consecutive frames for timings of single frames."""
     starts: int
     """The number of server starts."""
-    memory_minutes: float
-    """The duration of steady load for the measurement of memory."""
 
 
 FULL = Effort(
     name="full",
-    profiles=("fast", "balanced", "paper"),
+    profiles=("fast", "balanced"),
     seconds=30.0,
     rounds=5,
     tune_seconds=5.0,
-    clients=(1, 4, 16, 64),
-    loads=(50, 80, 120, 1000),
+    clients=(1, 4, 16),
+    loads=(80, 120, 1000),
     peer_clients=16,
-    many_clients=(1, 2, 4, 8, 16, 32, 64, 128, 256),
-    sides=(600, 960, 1280, 1680, 2240, 3000, 4000),
     cameras=(1, 10, 100, 1000),
     frames=30,
     starts=7,
-    memory_minutes=30.0,
 )
 
 MEDIUM = replace(
@@ -58,28 +49,21 @@ MEDIUM = replace(
     seconds=10.0,
     rounds=3,
     tune_seconds=3.0,
-    many_clients=(1, 4, 16, 64, 256),
-    sides=(600, 960, 1680, 2240, 4000),
     cameras=(1, 100, 1000),
     frames=15,
     starts=5,
-    memory_minutes=5.0,
 )
 
 SHORT = replace(
     FULL,
     name="short",
-    profiles=("fast", "balanced"),
     seconds=3.0,
     rounds=1,
     tune_seconds=1.5,
     clients=(1, 4),
     loads=(80, 1000),
     peer_clients=4,
-    many_clients=(1, 16),
-    sides=(600, 1680, 4000),
     cameras=(1, 20),
     frames=5,
     starts=3,
-    memory_minutes=0.25,
 )

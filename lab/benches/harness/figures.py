@@ -1,9 +1,11 @@
-"""Statistics over repeated measurements."""
+"""Statistics over repeated measurements, and Markdown tables of them."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from statistics import median
+
+ABSENT = "–"
 
 
 @dataclass(frozen=True)
@@ -30,12 +32,6 @@ def ratios(ours: Sequence[float], theirs: Sequence[float]) -> Spread:
     return spread([our / their for our, their in zip(ours, theirs, strict=True)])
 
 
-def growth(values: Sequence[float]) -> float:
-    """The median of the last quarter minus that of the second; the first is the warm-up."""
-    quarter = max(len(values) // 4, 1)
-    return median(values[-quarter:]) - median(values[quarter : 2 * quarter] or values[:1])
-
-
 def round_to(value: float, digits: int = 3) -> str:
     """Formats a number with `digits` significant digits and no further decimals."""
     if not math.isfinite(value):
@@ -44,3 +40,31 @@ def round_to(value: float, digits: int = 3) -> str:
         return "0"
     decimals = max(digits - 1 - math.floor(math.log10(abs(value))), 0)
     return f"{value:.{decimals}f}"
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """Formats a table with words in the first column and figures in the others."""
+    lines = [_line(head), "|---|" + "---:|" * (len(head) - 1)]
+    for row in rows:
+        if len(row) != len(head):
+            raise ValueError(f"a row of {len(row)} cells under a head of {len(head)}: {row}")
+        lines.append(_line([_cell(value) for value in row]))
+    return "\n".join(lines) + "\n"
+
+
+def spread_cell(spread: dict) -> str:
+    """A median with its range."""
+    parts = (round_to(spread[name]) for name in ("median", "least", "greatest"))
+    return "{} ({} to {})".format(*parts)
+
+
+def _cell(value: object) -> str:
+    if value is None:
+        return ABSENT
+    if isinstance(value, float):
+        return round_to(value)
+    return str(value).replace("|", "\\|")
+
+
+def _line(cells: Iterable[str]) -> str:
+    return "| " + " | ".join(cells) + " |"

@@ -2,7 +2,6 @@
 
 import contextlib
 import itertools
-import json
 import os
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
@@ -10,7 +9,7 @@ from pathlib import Path
 
 from .frames import calibration
 from .lookdown import MODEL
-from .places import PEERS, WORK, model, python_of
+from .places import PEERS, model, python_of
 from .processes import Server, free_ports, running
 
 
@@ -37,12 +36,10 @@ class Setting:
         return {name.upper(): str(value) for name, value in asdict(self).items()} | {"MODEL": str(model(MODEL))}
 
 
-def settings(parallel: bool) -> list[Setting]:
-    """The settings to search; `parallel` if the peer handles several frames in one process."""
+def settings() -> list[Setting]:
+    """The settings to search."""
     cores = len(os.sched_getaffinity(0))
-    shares = [(1, 1, cores), (cores, 1, 1)]
-    if parallel:
-        shares += [(1, cores, 1), (1, 2, cores)]
+    shares = [(1, 1, cores), (cores, 1, 1), (1, cores, 1), (1, 2, cores)]
     return [Setting(*share, batch) for share, batch in itertools.product(dict.fromkeys(shares), (1, 8))]
 
 
@@ -69,22 +66,4 @@ def python_server(name: str, setting: Setting, **own: object) -> Iterator[Server
     environment = setting.environment() | {key: str(value) for key, value in own.items()}
     environment["PYTHONPATH"] = str(PEERS / name)
     with running(name, command, port, "/ready", environment, PEERS) as server:
-        yield server
-
-
-@contextlib.contextmanager
-def v2_server(setting: Setting) -> Iterator[Server]:
-    """MLServer with the model only."""
-    http, grpc, metrics = free_ports(3)
-    folder = WORK / "detector"
-    folder.mkdir(parents=True, exist_ok=True)
-    wanted = {"host": "127.0.0.1", "http_port": http, "grpc_port": grpc, "metrics_port": metrics, "debug": False}
-    # One process: the model runs in the server process. Several: it runs in workers.
-    wanted["parallel_workers"] = 0 if setting.processes == 1 else setting.processes
-    (folder / "settings.json").write_text(json.dumps(wanted), encoding="utf-8")
-    described = {"name": "detector", "implementation": "model.Detector"}
-    (folder / "model-settings.json").write_text(json.dumps(described), encoding="utf-8")
-    command = [str(python_of("v2_server").with_name("mlserver")), "start", str(folder)]
-    environment = setting.environment() | {"PYTHONPATH": str(PEERS / "v2_server")}
-    with running("v2_server", command, http, "/v2/models/detector/ready", environment, folder) as server:
         yield server

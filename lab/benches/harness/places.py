@@ -6,7 +6,6 @@ from pathlib import Path
 BENCHES = Path(__file__).resolve().parents[1]
 ROOT = BENCHES.parents[1]
 RAW = BENCHES / "raw"
-CHARTS = BENCHES / "charts"
 RESULTS = BENCHES / "RESULTS.md"
 PEERS = BENCHES / "peers"
 SAMPLES = ROOT / "samples"

@@ -30,7 +30,7 @@ def write(parts: dict[str, ModuleType]) -> None:
         if _file(part).is_file():
             raw = json.loads(_file(part).read_text(encoding="utf-8"))
             figures = raw["figures"]
-            sections += [f"## {title}", _description_of(raw["made"]), part.tell(figures), part.draw(figures)]
+            sections += [f"## {title}", _description_of(raw["made"]), part.tell(figures)]
     RESULTS.write_text("\n\n".join(section.strip() for section in sections if section) + "\n", encoding="utf-8")
 
 
@@ -40,7 +40,6 @@ def _file(part: ModuleType):
 
 def _description_of(about: dict) -> str:
     return (
-        f"*{about['date']}, commit {about['commit']}, {about['effort']} run; {about['cpu']}, {about['cores']} cores, "
-        f"{about['memory_gib']:.0f} GiB, {about['system']}; ONNX Runtime {about['onnx_runtime']}, {about['rust']}; "
-        f"load of the machine before: {about['load_before']:.1f}*"
+        f"*{about['date']}, commit {about['commit']}, {about['effort']} run; {about['cpu']}, {about['cores']} cores; "
+        f"ONNX Runtime {about['onnx_runtime']}; load before: {about['load_before']:.1f}*"
     )

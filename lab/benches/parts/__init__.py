@@ -1,1 +1,1 @@
-"""The parts of the benchmarks: each has `measure`, `tell` (Markdown) and `draw` (charts)."""
+"""The parts of the benchmarks: each has `measure` and `tell` (Markdown)."""

@@ -4,11 +4,10 @@ import tempfile
 from pathlib import Path
 
 from harness.effort import Effort
-from harness.figures import ratios, round_to, spread
+from harness.figures import ratios, round_to, spread, spread_cell, table
 from harness.frames import cameras, frame
 from harness.load import load
 from harness.lookdown import ROOMY, detect, lookdown, report
-from harness.tables import spread_cell, table
 
 PROFILE = "fast"
 
@@ -62,8 +61,3 @@ def tell(raw: dict) -> str:
             for row in raw["cameras"]
         ],
     )
-
-
-def draw(_raw: dict) -> str:
-    """No chart: the table shows everything."""
-    return ""

@@ -1,18 +1,23 @@
 """The limit: as many views through bare ONNX Runtime on ready tensors, alternating with the server."""
 
+import json
 import os
 import subprocess
+import sys
+from pathlib import Path
 
-from harness.charts import bars
+import cv2
+import numpy as np
 from harness.effort import Effort
-from harness.figures import ratios, spread
-from harness.frames import frame
+from harness.figures import ratios, spread, spread_cell, table
+from harness.frames import SIDE, calibration, frame
 from harness.load import load
 from harness.lookdown import MODEL, ROOMY, detect, lookdown, report, view_plan
-from harness.places import BENCHES, model, python_of
+from harness.places import BENCHES, PEERS, WORK, model, python_of
 from harness.processes import BenchError
-from harness.tables import spread_cell, table
-from harness.views import view_file
+
+sys.path.insert(0, str(PEERS / "plain_python"))
+from views import Lens, View  # noqa: E402
 
 PROFILE = "balanced"
 INPUT_SIDE = 416
@@ -43,6 +48,15 @@ def measure(effort: Effort) -> dict:
     return {"views": count, "tuning": tuning, "best": best, "ours": ours, "bare": theirs}
 
 
+def view_file(plan: dict, size: int) -> Path:
+    """The views of the frame as bytes `[views, 3, size, size]`."""
+    file = WORK / f"views-{plan['profile']}-{size}.npy"
+    lens = Lens(json.loads(calibration().read_text(encoding="utf-8")), SIDE)
+    rgb = cv2.cvtColor(cv2.imread(str(frame())), cv2.COLOR_BGR2RGB)
+    np.save(file, np.stack([View(view, size, lens).render(rgb).transpose(2, 0, 1) for view in plan["views"]]))
+    return file
+
+
 def shares() -> list[tuple[int, int]]:
     """The divisions of the cores: sessions and threads of each."""
     cores = len(os.sched_getaffinity(0))
@@ -60,22 +74,13 @@ def bare(views, sessions: int, threads: int, batch: int, seconds: float) -> floa
 
 
 def tell(raw: dict) -> str:
-    """The ratio and the settings as Markdown."""
+    """The ratio as Markdown."""
     rows = [
         ("`/detect`, frames/s", spread_cell(spread(raw["ours"]).as_json())),
         (f"bare ONNX Runtime ({raw['best']}), frames/s", spread_cell(spread(raw["bare"]).as_json())),
         ("**ratio, round by round**", spread_cell(ratios(raw["ours"], raw["bare"]).as_json())),
     ]
-    tuning = sorted(raw["tuning"].items(), key=lambda item: -item[1])
     return (
         f"`{PROFILE}`, {MODEL}, {raw['views']} views per frame, {CLIENTS} clients, {len(raw['ours'])} rounds:\n\n"
         + table(("", "median (range)"), rows)
-        + "\nTested settings of bare ONNX Runtime (sessions × threads, views in a run):\n\n"
-        + table(("setting", "frames/s"), tuning)
     )
-
-
-def draw(raw: dict) -> str:
-    """Server and bare settings as a chart."""
-    values = {"Lookdown /detect": spread(raw["ours"]).median, f"bare, {raw['best']}": spread(raw["bare"]).median}
-    return bars("limit", f"{PROFILE}: the server and the bare network", "frames per second", values)

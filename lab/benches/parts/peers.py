@@ -1,36 +1,33 @@
 """Other servers in the same run, alternating with Lookdown.
 
-(a) plain Python as one writes it, with the paper's plan and with ours; (b) the views of our plan posted to a V2
-server, which decodes, renders and merges nothing; (c) sliced inference over the frame itself with `supervision`.
+(a) plain Python as one writes it, with the paper's plan and with ours; (b) sliced inference over the frame itself with
+`supervision`.
 """
 
+import json
 import time
 from contextlib import ExitStack
 from pathlib import Path
 
 from harness import peers
-from harness.charts import bars
+from harness.boxes import boxes, matched
 from harness.effort import Effort
-from harness.figures import ratios, spread
+from harness.figures import ratios, spread, spread_cell, table
 from harness.frames import frame
 from harness.load import load, steady
-from harness.lookdown import MODEL, ROOMY, detect, lookdown, view_plan
+from harness.lookdown import MODEL, ROOMY, detect, lookdown, report, view_plan
+from harness.places import WORK
 from harness.processes import Server
-from harness.sanity import agreement
-from harness.tables import spread_cell, table
-from harness.views import plan_file, v2_request, view_file
 
-INPUT_SIDE = 416
 OURS, THEIRS = ("Lookdown, `balanced`", "Lookdown, `fast`"), "plain Python, "
 SLICE = 640
 """Side of a slice in pixels, the default of `supervision`. No other side finds many more people (NOTES.md)."""
 NAMES = {
     "plain": f"{THEIRS}our `balanced` plan",
     "paper": f"{THEIRS}the paper's plan",
-    "v2": "MLServer (V2), ready views of `balanced`",
     "slicer": f"supervision's InferenceSlicer, {SLICE} px",
 }
-TUNED = ("plain", "v2", "slicer")
+TUNED = ("plain", "slicer")
 """The peers whose settings are searched; the paper's plan takes those of ours."""
 SLOW_CLIENTS = 4
 """Clients of the paper's plan in plain Python, enough to keep all cores busy at many seconds per frame."""
@@ -38,7 +35,6 @@ SLOW_CLIENTS = 4
 PAIRS = (
     (OURS[0], NAMES["plain"]),
     (OURS[1], NAMES["paper"]),
-    (OURS[0], NAMES["v2"]),
     (OURS[1], NAMES["slicer"]),
 )
 
@@ -48,22 +44,20 @@ def measure(effort: Effort) -> dict:
     with ExitStack() as stack:
         ours = stack.enter_context(lookdown(ROOMY))
         plan, paper_plan = view_plan(ours, "balanced"), view_plan(ours, "paper")
-        request = v2_request(view_file(plan, INPUT_SIDE))
         starts = {
             "plain": lambda setting: peers.plain_python(setting, plan_file(plan), "nms"),
             "paper": lambda setting: peers.plain_python(setting, plan_file(paper_plan), "soft_nms"),
-            "v2": peers.v2_server,
             "slicer": lambda setting: peers.slicer(setting, SLICE),
         }
-        asked = dict.fromkeys(starts, plain_body()) | {"v2": v2_body(request)}
-        tuned = {name: tune(effort, starts[name], asked[name], name != "v2") for name in TUNED}
+        asked = plain_body()
+        tuned = {name: tune(effort, starts[name], asked) for name in TUNED}
         tuned["paper"] = tuned["plain"]
         setting = {name: peers.Setting(**best(rows)["setting"]) for name, rows in tuned.items()}
         servers = {name: stack.enter_context(start(setting[name])) for name, start in starts.items()}
         turns = {
             OURS[0]: (ours, plain_body() | {"paths": [detect("balanced", model=MODEL)]}),
             OURS[1]: (ours, plain_body() | {"paths": [detect("fast", model=MODEL)]}),
-        } | {NAMES[name]: (server, asked[name]) for name, server in servers.items()}
+        } | {NAMES[name]: (server, asked) for name, server in servers.items()}
         clients = dict.fromkeys(turns, effort.peer_clients) | {NAMES["paper"]: SLOW_CLIENTS}
         rounds = {name: [] for name in turns}
         for _ in range(effort.rounds):
@@ -78,14 +72,16 @@ def measure(effort: Effort) -> dict:
         }
 
 
+def plan_file(plan: dict) -> Path:
+    """A view plan as a file."""
+    file = WORK / f"plan-{plan['profile']}.json"
+    file.write_text(json.dumps(plan), encoding="utf-8")
+    return file
+
+
 def plain_body() -> dict:
     """The request to a plain Python server."""
     return {"paths": ["/detect"], "body": frame(), "content_type": "image/jpeg"}
-
-
-def v2_body(request: Path) -> dict:
-    """The request to a V2 server."""
-    return {"paths": ["/v2/models/detector/infer"], "body": request, "content_type": "application/json"}
 
 
 def window(server: Server, what: dict, clients: int, seconds: float) -> dict:
@@ -96,10 +92,10 @@ def window(server: Server, what: dict, clients: int, seconds: float) -> dict:
     return steady(server, clients=clients, seconds=seconds, frame_seconds=alone, **what)
 
 
-def tune(effort: Effort, start, what: dict, parallel: bool) -> list[dict]:
+def tune(effort: Effort, start, what: dict) -> list[dict]:
     """Frames per second under each setting."""
     rows = []
-    for setting in peers.settings(parallel)[:: 1 if effort.name == "full" else 3]:
+    for setting in peers.settings()[:: 1 if effort.name == "full" else 3]:
         with start(setting) as server:
             result = load(server, clients=4, warm_up=2.0, seconds=2.0 * effort.tune_seconds, **what)
         rows.append({"setting": vars(setting), "frames_per_second": result["succeeded_per_second"]})
@@ -137,17 +133,22 @@ def tell(raw: dict) -> str:
     )
 
 
+def agreement(ours: Server, theirs: Server) -> list[dict]:
+    """Compares the boxes of both servers with one plan and model, for two refinements of Lookdown."""
+    other = boxes(json.loads(theirs.post("/detect", frame().read_bytes())))
+    rows = []
+    for refine in ("fusion", "nms"):
+        mine = boxes(report(ours, f"{detect('balanced', model=MODEL)}&refine={refine}", frame()))
+        overlaps = matched(mine, other)
+        mean = sum(overlaps) / max(len(overlaps), 1)
+        rows.append(
+            {"refine": refine, "ours": len(mine), "theirs": len(other), "same": len(overlaps), "mean_iou": mean}
+        )
+    return rows
+
+
 def told_agreement(rows: list[dict]) -> str:
     """The agreement of the plain server's persons with Lookdown's."""
     head = ("our refinement", "boxes we find", "boxes it finds with NMS", "the same ones", "mean IoU of those")
     found = [(row["refine"], row["ours"], row["theirs"], row["same"], row["mean_iou"]) for row in rows]
     return f"Agreement of the results, with the same plan and model:\n\n{table(head, found)}"
-
-
-def draw(raw: dict) -> str:
-    """The comparison as a chart."""
-    values = {
-        name.replace("`", ""): spread([result["succeeded_per_second"] for result in rounds]).median
-        for name, rounds in raw["rounds"].items()
-    }
-    return bars("peers", f"1680 × 1680 JPEG, {MODEL}", "frames per second", values)

@@ -4,11 +4,10 @@ import json
 import subprocess
 import sys
 
-from harness.charts import bars
 from harness.effort import Effort
+from harness.figures import table
 from harness.places import BENCHES
 from harness.processes import BenchError
-from harness.tables import table
 
 
 def measure(effort: Effort) -> list[dict]:
@@ -28,11 +27,3 @@ def tell(raw: list[dict]) -> str:
     ]
     head = ("view", "rounds", "ours, µs", "remap + blobFromImages, µs", "of it remap, µs", "ratio, median")
     return f"One view, one thread, OpenCV {raw[0]['opencv']}:\n\n{table(head, rows)}"
-
-
-def draw(raw: list[dict]) -> str:
-    """Both sides as a chart."""
-    values = {}
-    for row in raw:
-        values |= {f"Lookdown, {row['view']}": row["ours_us"], f"OpenCV, {row['view']}": row["opencv_us"]}
-    return bars("remap", "Remap, normalize and lay out a view, one thread", "µs", values)

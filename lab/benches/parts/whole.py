@@ -2,15 +2,14 @@
 
 from statistics import median
 
-from harness.charts import lines
 from harness.effort import Effort
+from harness.figures import table
 from harness.frames import frame
 from harness.load import load, steady
 from harness.lookdown import ROOMY, detect, lookdown, report
 from harness.processes import Server
-from harness.tables import table
 
-STAGES = ("decode", "calibrate", "queue", "remap", "inference", "refine", "total")
+STAGES = ("decode", "remap", "inference", "refine", "total")
 
 
 def measure(effort: Effort) -> dict:
@@ -59,12 +58,12 @@ def tell(raw: dict) -> str:
             table(("profile", *STAGES, "not the network"), [stage_row(name, part) for name, part in raw.items()]),
             "Closed loop: each client sends its next request after the response.\n",
             table(
-                ("profile", "clients", "frames/s", "p50, ms", "p95", "p99", "cores used", "memory, MiB"),
+                ("profile", "clients", "frames/s", "p50, ms", "p99", "cores used", "memory, MiB"),
                 [closed_row(name, result) for name, part in raw.items() for result in part["closed"]],
             ),
             open_loop,
             table(
-                ("profile", "load, % of capacity", "frames/s", "p50, ms", "p95", "p99")
+                ("profile", "load, % of capacity", "frames/s", "p50, ms", "p99")
                 + ("refused", "p99 of refusals, ms", "broken or late", "cores used"),
                 [open_row(name, result) for name, part in raw.items() for result in part["open"]],
             ),
@@ -82,7 +81,7 @@ def stage_row(profile: str, part: dict) -> tuple:
 def closed_row(profile: str, result: dict) -> tuple:
     """One closed loop."""
     late = result["succeeded"]
-    times = (late.get(name) for name in ("p50_ms", "p95_ms", "p99_ms"))
+    times = (late.get(name) for name in ("p50_ms", "p99_ms"))
     usage = result["cores"], round(result["resident_mib"])
     return profile, result["clients"], result["succeeded_per_second"], *times, *usage
 
@@ -90,19 +89,9 @@ def closed_row(profile: str, result: dict) -> tuple:
 def open_row(profile: str, result: dict) -> tuple:
     """One open loop."""
     late, refused = result["succeeded"], result["refused"]
-    times = (late.get(name) for name in ("p50_ms", "p95_ms", "p99_ms"))
+    times = (late.get(name) for name in ("p50_ms", "p99_ms"))
     unanswered = result["broken"] + result["timed_out"]
     return (
         *(profile, result["percent"], result["succeeded_per_second"], *times),
         *(refused["count"], refused.get("p99_ms"), unanswered, result["cores"]),
     )
-
-
-def draw(raw: dict) -> str:
-    """Latency with clients as a chart."""
-    series = {
-        profile: [(result["clients"], result["succeeded"].get("p50_ms", float("nan"))) for result in part["closed"]]
-        for profile, part in raw.items()
-    }
-    labels = ("clients (closed loop)", "median latency, ms")
-    return lines("whole", "Latency with clients, 1680 × 1680 JPEG", labels, series, logarithmic=True)

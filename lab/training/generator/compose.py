@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from .geometry import nadir_angles, panorama_xy
-from .light import floor_irradiance
+from .scene import floor_irradiance
 from .shadow import FloorShadow, sun_patches
 
 SUPERSAMPLING = 2

@@ -14,10 +14,10 @@ from .boxes import person_boxes
 from .compose import compose
 from .crops import CropFile, RoomFile
 from .geometry import Calibration, camera_rotation, make_lens
-from .indices import DISTRACTORS
 from .look import apply_look, random_look
 from .placement import place
 from .progress import Progress
+from .scene import DISTRACTORS
 
 SMALLEST_AREA, SMALLEST_SHARE = 40, 0.2
 """Persons with fewer visible pixels, or a smaller visible share, are marked `ignore`."""

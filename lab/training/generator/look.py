@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 
 from .geometry import circle_radius
-from .tone import curve
+from .scene import curve
 
 KINDS = {"day": 0.58, "dim": 0.14, "infrared": 0.18, "monochrome": 0.10}
 

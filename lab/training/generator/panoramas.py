@@ -1,6 +1,6 @@
 """Writes rooms as frames of cameras that look straight down, with their calibrations: `WORK/panoramas/SPLIT`.
 
-The folder is a data set for `scripts/tilted_rooms.py`, which remaps its frames to tilted cameras.
+The folder is a data set for `lab/calibration/tilted_rooms.py`, which remaps its frames to tilted cameras.
 """
 
 import json
@@ -11,7 +11,7 @@ import numpy as np
 
 from .crops import RoomFile
 from .geometry import Calibration
-from .tone import display
+from .scene import display
 
 LARGEST = math.radians(100)
 """Angle from the nadir to which a frame reaches."""

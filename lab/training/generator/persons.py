@@ -17,10 +17,9 @@ from . import blender as bl
 from .body import Body
 from .crops import encode_radiance
 from .geometry import panorama_bounds, panorama_of
-from .heights import HEIGHT_SHARES, HEIGHTS
-from .light import floor_irradiance
 from .pieces import Maker, make_piece
 from .progress import Progress
+from .scene import HEIGHT_SHARES, HEIGHTS, floor_irradiance
 from .wardrobe import random_colours
 
 VIEWS = 10

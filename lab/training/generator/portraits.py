@@ -12,7 +12,7 @@ from . import blender as bl
 from .body import Body
 from .pieces import Maker
 from .progress import Progress
-from .tone import display
+from .scene import display
 from .wardrobe import random_colours
 
 

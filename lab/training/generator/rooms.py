@@ -12,12 +12,10 @@ from . import furniture as f
 from .body import Body
 from .crops import encode_radiance
 from .figures import add_figure
-from .heights import HEIGHT_SHARES, HEIGHTS
-from .indices import COATS, IMAGE_OF_PERSON, MANNEQUIN
-from .light import floor_irradiance
 from .plan import front, is_within, parts
 from .portraits import portrait_name
 from .progress import Progress
+from .scene import COATS, HEIGHT_SHARES, HEIGHTS, IMAGE_OF_PERSON, MANNEQUIN, floor_irradiance
 from .wardrobe import random_colours, random_person
 from .zones import ZONES
 

@@ -3,7 +3,7 @@
 import math
 
 from . import furniture as f
-from .indices import CHAIR_WITH_JACKET, COATS, IMAGE_OF_PERSON, PRAM
+from .scene import CHAIR_WITH_JACKET, COATS, IMAGE_OF_PERSON, PRAM
 
 
 def chair(room, b, height=0.45, style=None):

@@ -10,7 +10,7 @@ from onnx import TensorProto, helper
 
 from .folding import fold
 from .graph import OnnxGraph
-from .ranges import ActivationRanges
+from .quantize import ActivationRanges
 from .regions import int8_tensors, moved_tensors
 from .views import sample_views
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import numpy
-from convert.errors import ConversionError
+from convert import ConversionError
 from onnx import NodeProto, TensorProto, helper
 
 from .graph import OnnxGraph

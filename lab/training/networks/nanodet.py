@@ -9,8 +9,7 @@ from pathlib import Path
 
 import numpy
 from convert.onnx_builder import OnnxBuilder
-from convert.tf_graph import TfGraph
-from convert.tfjs import read_tfjs
+from convert.tfjs import TfGraph, read_tfjs
 from convert.translate import Translator
 
 SIZE = 416

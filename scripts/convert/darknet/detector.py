@@ -1,13 +1,17 @@
-"""A darknet detector as a model folder for Lookdown: YOLOv2 as its raw map, YOLOv3 with decoded boxes."""
+"""A darknet detector as a model folder for Lookdown: YOLOv2 as its raw map, YOLOv3 with decoded boxes.
+
+Redmon and Farhadi, YOLOv3: An Incremental Improvement, 2018.
+"""
 
 from pathlib import Path
 
+import numpy
+
 from ..model_folder import person_class, write_model_folder
 from ..onnx_builder import OnnxBuilder
-from .heads import Region
+from .files import read_weights
+from .heads import Region, Yolo
 from .network import Network, read_network
-from .weights import read_weights
-from .yolo_boxes import decoded
 
 
 def convert_detector(cfg: Path, weights: Path, folder: Path, name: str, class_names: Path | None) -> str:
@@ -42,7 +46,7 @@ def _outputs(builder: OnnxBuilder, network: Network, maps: list[str], person: in
     head = network.heads[0]
     if isinstance(head, Region):
         return {"raw": (maps[0], [head.shape.channels, head.shape.height, head.shape.width])}
-    boxes, scores, candidates = decoded(builder, network, maps, person)
+    boxes, scores, candidates = _decoded(builder, network, maps, person)
     return {"boxes": (boxes, [candidates, 4]), "scores": (scores, [candidates])}
 
 
@@ -53,3 +57,38 @@ def _tables(network: Network, person: int) -> list[str]:
         return lines
     anchors = network.heads[0].anchors
     return [*lines, "", "[output]", 'head = "yolo_v2"', f"person_class = {person}", f"anchors = {anchors}  # in cells"]
+
+
+def _decoded(builder: OnnxBuilder, network: Network, maps: list[str], person: int) -> tuple[str, str, int]:
+    """Adds the decoding of all maps; returns boxes `[N, A, 4]` in pixels, scores `[N, A]`, and A."""
+    boxes, scores, candidates = [], [], 0
+    for tensor, head in zip(maps, network.heads, strict=True):
+        cells = head.shape.width * head.shape.height
+        parted = builder.reshape(tensor, [0, len(head.mask), 5 + head.classes, cells])
+        centre, extent, objectness, classes = builder.split(parted, [2, 2, 1, head.classes], axis=2)
+        boxes.append(_boxes(builder, centre, extent, head, network.input_shape.width / head.shape.width))
+        scores.append(_scores(builder, objectness, classes, head.classes, person))
+        candidates += len(head.mask) * cells
+    return builder.node("Concat", boxes, axis=1), builder.node("Concat", scores, axis=1), candidates
+
+
+def _boxes(builder: OnnxBuilder, centre: str, extent: str, head: Yolo, stride: float) -> str:
+    """Corners in pixels `[N, anchors x cells, 4]` of a map's `[N, anchors, 2, cells]`, section 2.1 of the paper."""
+    rows, columns = numpy.divmod(numpy.arange(head.shape.width * head.shape.height), head.shape.width)
+    corner = numpy.stack([columns, rows]).astype(numpy.float32).reshape(1, 1, 2, -1) * numpy.float32(stride)
+    inside = builder.node("Mul", [builder.node("Sigmoid", [centre]), builder.constant(float(stride))])
+    middle = builder.node("Add", [inside, builder.constant(corner)])
+    anchors = numpy.array(head.anchors)[head.mask]
+    half_anchors = builder.constant((anchors / 2).astype(numpy.float32).reshape(1, -1, 2, 1))
+    half = builder.node("Mul", [builder.node("Exp", [extent]), half_anchors])
+    corners = [builder.node("Sub", [middle, half]), builder.node("Add", [middle, half])]
+    by_cell = builder.node("Transpose", [builder.node("Concat", corners, axis=2)], perm=[0, 1, 3, 2])
+    return builder.reshape(by_cell, [0, -1, 4])
+
+
+def _scores(builder: OnnxBuilder, objectness: str, classes: str, count: int, person: int) -> str:
+    """The scores of the person `[N, anchors x cells]`: objectness times the sigmoid of the class."""
+    sizes = [person, 1, count - person - 1]
+    pieces = builder.split(classes, [size for size in sizes if size], axis=2)
+    factors = [builder.node("Sigmoid", [part]) for part in (objectness, pieces[1 if person else 0])]
+    return builder.reshape(builder.node("Mul", factors), [0, -1])

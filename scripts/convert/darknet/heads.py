@@ -3,12 +3,12 @@
 import numpy
 
 from ..onnx_builder import OnnxBuilder
-from .cfg import Section
+from .files import Section
 from .layer import Layer, Shape
 
 
 class Head(Layer):
-    """A layer that decodes boxes in darknet. It returns the raw numbers; `yolo_boxes` decodes those of YOLOv3.
+    """A layer that decodes boxes in darknet. It returns the raw numbers; `detector` decodes those of YOLOv3.
 
     Per anchor the channels are t_x, t_y, t_w, t_h, t_o and one per class.
     """

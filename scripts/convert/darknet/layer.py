@@ -1,4 +1,4 @@
-"""The interface of all layers of a darknet network: inputs, shape, weights, ONNX nodes."""
+"""The interface of all layers of a darknet network: inputs, shape, weights, ONNX nodes. And their activations."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -6,7 +6,9 @@ from typing import ClassVar
 import numpy
 
 from ..onnx_builder import OnnxBuilder
-from .cfg import Section
+from .files import Section
+
+LEAKY_SLOPE = 0.1
 
 
 @dataclass(frozen=True)
@@ -43,3 +45,27 @@ def steps(section: Section, extent: int, size: int, stride: int) -> int:
     if extent < size:
         raise section.refusal(f"has a window of {size} pixels where {extent} are left; is the input too small?")
     return (extent - size) // stride + 1
+
+
+def activation_of(section: Section, default: str) -> str:
+    """The name of the activation of a section."""
+    name = section.options.get("activation", default)
+    if name not in ("linear", "leaky", "relu", "logistic", "mish"):
+        raise section.refusal(f"has activation={name}, which has no translation")
+    return name
+
+
+def activate(builder: OnnxBuilder, activation: str, tensor: str) -> str:
+    """Adds the activation of a tensor to the graph."""
+    match activation:
+        case "leaky":
+            return builder.node("LeakyRelu", [tensor], alpha=LEAKY_SLOPE)
+        case "relu":
+            return builder.node("Relu", [tensor])
+        case "logistic":
+            return builder.node("Sigmoid", [tensor])
+        case "mish":
+            # x tanh(ln(1 + e^x)): Misra, Mish: A Self Regularized Non-Monotonic Activation Function, 2019.
+            return builder.node("Mul", [tensor, builder.node("Tanh", [builder.node("Softplus", [tensor])])])
+        case _:
+            return tensor

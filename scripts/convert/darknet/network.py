@@ -5,13 +5,12 @@ from pathlib import Path
 
 import numpy
 
-from ..errors import ConversionError
+from .. import ConversionError
 from ..onnx_builder import OnnxBuilder
-from .cfg import read_cfg
-from .convolution import Convolution
+from .files import read_cfg
 from .heads import Head, Region, Yolo
 from .layer import Layer, Shape
-from .layers import MaxPool, Reorg, Route, Shortcut, Upsample
+from .layers import Convolution, MaxPool, Reorg, Route, Shortcut, Upsample
 
 KINDS = {kind.kind: kind for kind in (Convolution, MaxPool, Route, Shortcut, Upsample, Reorg, Region, Yolo)}
 COLOURS = 3

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy
 
-from ..darknet.convolution import Convolution
+from ..darknet.layers import Convolution
 from ..darknet.network import Network
 
 # Width and height in cells, of the anchors that YOLOv2 was trained with on Pascal VOC and COCO.

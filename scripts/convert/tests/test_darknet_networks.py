@@ -3,8 +3,8 @@
 import functools
 import tomllib
 
+from .. import ConversionError
 from ..darknet.network import read_network
-from ..errors import ConversionError
 from . import reference
 from .made_up_darknet import COCO_ANCHORS, VOC_ANCHORS, yolov2_cfg, yolov2_tiny_cfg, yolov3_tiny_cfg
 from .support import WithDarknetFiles

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy
 
-from ..errors import ConversionError
+from .. import ConversionError
 from ..tfjs import read_tfjs
 
 HALVES = numpy.array([[0.5, -2], [3, 0.25]], numpy.float16)

@@ -2,12 +2,12 @@
 
 import json
 import shutil
-import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from debian_base import debian_base
+from commands import run
+from debian import debian_base
 from harness.places import LOOKDOWN, ROOT
 
 HERE = ROOT / ".setup" / "real" / "image"
@@ -21,10 +21,6 @@ BUILD_ARGUMENTS = {
     "CREATED": "2026-11-22T12:00:00Z",
     "SOURCE_URL": "https://forge.example/lookdown",
 }
-
-
-class BuildError(Exception):
-    """A step that failed, with its output."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +50,7 @@ class Image:
 def build(*targets: str) -> list[Image]:
     """Builds an image for each target of the Dockerfile. They stay until `remove` is called."""
     remove()
-    _run([sys.executable, ROOT / "scripts" / "dist.py", LOOKDOWN])
+    run(sys.executable, ROOT / "scripts" / "dist.py", LOOKDOWN)
     _import_base("debian:12-slim")
     return [_build(target) for target in targets]
 
@@ -86,11 +82,4 @@ def _import_base(name: str) -> None:
 
 
 def _buildah(*arguments) -> str:
-    return _run([*BUILDAH, *arguments])
-
-
-def _run(command: list) -> str:
-    answer = subprocess.run(list(map(str, command)), cwd=ROOT, capture_output=True, text=True, check=False)
-    if answer.returncode:
-        raise BuildError(f"{command[0]} failed:\n{answer.stdout[-3000:]}{answer.stderr[-3000:]}")
-    return answer.stdout.strip()
+    return run(*BUILDAH, *arguments, seconds=3600).strip()

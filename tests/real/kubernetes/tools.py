@@ -1,35 +1,28 @@
 """The tools of a cluster: kustomize (in kubectl), the schemas of Kubernetes, promtool."""
 
 import json
-import subprocess
 from pathlib import Path
 
+from commands import run
 from harness.places import ROOT
 
 PYTHON = ROOT / ".setup" / "real" / "kubernetes" / "bin"
 VALIDATE = Path(__file__).with_name("validate.py")
 
 
-class Refused(AssertionError):
-    """A tool refuses its input. The message is its output."""
-
-
-def run(command: list, stdin: str | None = None) -> str:
-    """The output of a tool."""
-    answer = subprocess.run(list(map(str, command)), input=stdin, capture_output=True, text=True, check=False)
-    if answer.returncode:
-        raise Refused(f"{Path(command[0]).name}: {answer.stdout}{answer.stderr}")
-    return answer.stdout
+def kustomized(folder: Path) -> str:
+    """The manifests that kustomize makes of a folder."""
+    return run(PYTHON / "kubectl", "kustomize", folder)
 
 
 def manifests(folder: str) -> list[dict]:
     """The manifests of a folder of `k8s`, each validated."""
-    return json.loads(run([PYTHON / "python", VALIDATE], run([PYTHON / "kubectl", "kustomize", ROOT / "k8s" / folder])))
+    return json.loads(run(PYTHON / "python", VALIDATE, given=kustomized(ROOT / "k8s" / folder)))
 
 
 def read_yaml(file: Path) -> dict:
     """A YAML file that is not a manifest."""
-    return json.loads(run([PYTHON / "python", VALIDATE, "--only-read"], file.read_text(encoding="utf-8")))[0]
+    return json.loads(run(PYTHON / "python", VALIDATE, "--only-read", given=file.read_text(encoding="utf-8")))[0]
 
 
 def only(documents: list[dict], kind: str) -> dict:

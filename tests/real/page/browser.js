@@ -14,6 +14,8 @@ export const SERVER = process.env.LOOKDOWN_URL;
 export const SAMPLES = process.env.LOOKDOWN_SAMPLES;
 /** The folder of screenshots. None are taken if it is unset. */
 const IMAGES = process.env.LOOKDOWN_PAGE_IMAGES;
+/** The screenshots that the documentation shows. */
+const SHOWN = ["cameras-wide", "counts-wide", "views-wide", "zones-wide"];
 export const WIDE = { width: 1440, height: 900 };
 export const PHONE = { width: 390, height: 844 };
 
@@ -99,9 +101,9 @@ export async function assertFits(page) {
   assert.ok(beyond <= 0, `${beyond} pixels beyond the right edge`);
 }
 
-/** Takes a screenshot of the whole page, if screenshots are enabled. */
+/** Takes a screenshot of the whole page, if screenshots are enabled and the documentation shows it. */
 export async function screenshot(page, name) {
-  if (!IMAGES) return;
+  if (!IMAGES || !SHOWN.includes(name)) return;
   await page.mouse.move(0, 0);
   await page.screenshot({ path: `${IMAGES}/page-${name}.jpg`, type: "jpeg", quality: 80, fullPage: true });
 }

@@ -88,11 +88,7 @@ def refused(client: InferenceServerClient, frame: bytes) -> dict:
     requests = {
         "unknown model": ("unknown", good, {}),
         "no image": (MODEL, [image(b"no image")], {}),
-        "no image in a batch": (MODEL, [images(frame, b"no image")], {"parameters": FAST}),
         "too many frames": (MODEL, [images(*[b"no image"] * 17)], {}),
-        "unknown parameter": (MODEL, good, {"parameters": {"colour": "red"}}),
-        "unknown calibration": (MODEL, good, {"parameters": {"calibration": "unknown-id"}}),
-        "score out of range": (MODEL, good, {"parameters": {"score_threshold": 1.5}}),
         "sequence": (MODEL, good, {"sequence_id": 7, "sequence_start": True}),
         "shared memory": (MODEL, [shared], {}),
         "classes": (MODEL, good, {"outputs": [InferRequestedOutput("scores", class_count=2)]}),

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from harness.places import LOOKDOWN, WORK
 from harness.processes import free_ports, running
+from support.cameras import http_camera
 from support.companion import metric
 from support.effort import Effort
-from support.http_camera import http_camera
 from support.lookdown import TINY, lookdown
 from support.row import Row
 

@@ -9,10 +9,10 @@ import time
 from pathlib import Path
 
 from harness.places import LOOKDOWN
+from support.cameras import RtspServer, rtsp_server
 from support.effort import Effort
 from support.lookdown import TINY, lookdown
 from support.row import Row
-from support.rtsp_server import RtspServer, rtsp_server
 
 MEBIBYTE = 1 << 20
 MAX_MEBIBYTES = 1100

@@ -19,22 +19,22 @@ TINY = {"MODEL__PATH": str(TINY_MODEL)}
 
 @contextlib.contextmanager
 def lookdown(
-    settings: dict[str, str],
+    settings: dict[str, object],
     *,
+    command: Sequence[object] = ("serve",),
+    probe: str = "/readyz",
     calibrations: Path = SAMPLES / "calibrations",
     inside: Sequence[str] = (),
-    environment: dict[str, str] | None = None,
-    port: int = 0,
 ) -> Iterator[Server]:
-    """Starts a server, waits until it is ready, and stops it at the end.
+    """Starts a server, waits until its probe answers, and stops it at the end. `command` may be that of `run`.
 
-    `inside` is a command that runs it in a separate environment, such as `prlimit`. `port` is that of a server
-    before; without it, the port is a free one.
+    `inside` is a command that runs it in a separate environment, such as `prlimit`.
     """
-    port = port or free_ports(1)[0]
+    (port,) = free_ports(1)
     wanted = {"SERVER__LISTEN": f"127.0.0.1:{port}", "CALIBRATIONS__PATH": str(calibrations), **AT_ONCE, **settings}
-    variables = {f"LOOKDOWN__{name}": value for name, value in wanted.items()} | (environment or {})
-    with running("lookdown", [*inside, str(LOOKDOWN), "serve"], port, "/readyz", variables) as server:
+    variables = {f"LOOKDOWN__{name}": str(value) for name, value in wanted.items()}
+    words = [*inside, str(LOOKDOWN), *map(str, command)]
+    with running("lookdown", words, port, probe, variables) as server:
         yield server
 
 

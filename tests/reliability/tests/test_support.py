@@ -1,18 +1,12 @@
-"""Tests of the measurements: growth, lost answers, and the Markdown of a run."""
+"""Tests of the measurements: growth and lost answers."""
 
 import contextlib
-import json
 import socket
-import tempfile
 import threading
 import unittest
-from pathlib import Path
 
 from support.exchange import Lost, ask, connect
-from support.frames import png
 from support.holdings import growth
-from support.row import Row
-from support.tell import markdown
 
 
 def answering(sent: bytes):
@@ -56,22 +50,3 @@ class Exchange(unittest.TestCase):
             port = listener.getsockname()[1]
         with self.assertRaises(ConnectionRefusedError):
             connect(f"127.0.0.1:{port}")
-
-
-class Frames(unittest.TestCase):
-    def test_an_image_of_many_pixels_is_small(self):
-        self.assertLess(len(png(2000, 2000)), 20_000)
-
-
-class Told(unittest.TestCase):
-    def test_the_long_form_of_a_part_is_preferred(self):
-        made = dict.fromkeys(("commit", "cpu", "system", "onnx_runtime", "rust"), "x") | {"date": "2026-11-21 10:00"}
-        made |= {"cores": 2, "memory_gib": 24.0}
-        with tempfile.TemporaryDirectory() as name:
-            for effort in ("short", "long"):
-                row = Row("kill", effort, "all|well")
-                kept = {"made": made | {"effort": effort}, "seconds": 1.0, "rows": [row.as_json()]}
-                (Path(name) / f"{effort}-kill.json").write_text(json.dumps(kept), encoding="utf-8")
-            table = markdown(Path(name), ["kill", "stop"])
-        self.assertIn("| kill | long | all\\|well | 0 |", table)
-        self.assertNotIn("short", table)

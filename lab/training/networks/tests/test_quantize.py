@@ -7,7 +7,7 @@ from unittest import mock
 
 import numpy
 import onnx
-from convert.errors import ConversionError
+from convert import ConversionError
 from convert.onnx_builder import OnnxBuilder
 from convert.tests.support import MaxPool
 from onnx.reference import ReferenceEvaluator
@@ -15,8 +15,7 @@ from onnx.reference import ReferenceEvaluator
 from ..folding import fold
 from ..graph import OnnxGraph
 from ..half import store_halves
-from ..quantize import write_int8
-from ..ranges import ActivationRanges
+from ..quantize import ActivationRanges, write_int8
 from ..regions import FLOAT_CONVOLUTIONS, int8_tensors, moved_tensors
 from ..weights import quantize_weights
 

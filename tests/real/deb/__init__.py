@@ -1,1 +1,0 @@
-"""The Debian package in a minimal Debian, for `test_deb.py`."""
