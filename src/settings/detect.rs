@@ -39,8 +39,7 @@ impl Table for DetectDefaults {
         let entries = KEYS.iter().map(|(spec, key)| {
             let name = spec.name;
             let help = format!(
-                "The default of the parameter `{name}` for requests and calibrations without one \
-                 (docs/parameters.md). Empty: that of the parameter."
+                "The default of the parameter `{name}` (docs/parameters.md). Empty: that of the parameter."
             );
             Entry::new(key, &[&help], &value(spec), &None)
         });
