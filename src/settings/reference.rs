@@ -24,8 +24,8 @@ Every setting with its key, environment variable, type and default. This page is
 
 * All commands read the same settings. Defaults apply first, then the file of `--config FILE`, then
   environment variables, then flags: `--set KEY=VALUE`, such as `--set limits.max_frames_in_flight=8`,
-  and `--listen ADDRESS:PORT` for `server.listen`. [config/lookdown.toml](../config/lookdown.toml) is a
-  file with every key at its default.
+  and `--listen ADDRESS:PORT` for `server.listen`. [config/lookdown.toml](../config/lookdown.toml) is
+  a file with every key at its default.
 * `lookdown serve --check` reports whether a server can start with the chosen settings.
 * The lists `[[cameras]]` with `[camera_defaults]`, and `[[webhooks]]`, are in the file only:
   [watch.md](watch.md#several-cameras) and [count.md](count.md#webhooks) describe their keys.
@@ -34,8 +34,8 @@ Every setting with its key, environment variable, type and default. This page is
 * A variable that is set to nothing counts as not set, except `LOOKDOWN__ACCESS__KEYS_FILE`, which
   is refused.
 * Unknown keys are refused. So are variables with one underscore where two belong, such as
-  `LOOKDOWN_ACCESS__KEYS_FILE`. Other variables that begin with `LOOKDOWN_` are ignored, with a warning in
-  the log.
+  `LOOKDOWN_ACCESS__KEYS_FILE`. Other variables that begin with `LOOKDOWN_` are ignored, with a warning
+  in the log.
 ";
 
 fn settings_file() -> String {
