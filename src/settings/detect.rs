@@ -38,10 +38,7 @@ impl Table for DetectDefaults {
     fn entries() -> Vec<Entry> {
         let entries = KEYS.iter().map(|(spec, key)| {
             let name = spec.name;
-            let help = format!(
-                "The default of the parameter `{name}` for requests and calibrations without one \
-                 (docs/parameters.md). Empty: that of the parameter."
-            );
+            let help = format!("The default of the parameter `{name}` (docs/parameters.md).");
             Entry::new(key, &[&help], &value(spec), &None)
         });
         entries.collect()

@@ -86,22 +86,14 @@ pub(in crate::api) async fn get_problem(
     })
 }
 
-/// Returns the table of all problem types as Markdown.
+/// Returns the table of all problem types with their remedies as Markdown.
 #[must_use]
 pub fn problem_table() -> String {
-    let mut table =
-        "| type | status | title | cause | remedy |\n|---|---|---|---|---|\n".to_owned();
+    let mut table = "| type | status | remedy |\n|---|---|---|\n".to_owned();
     for kind in ProblemKind::ALL {
+        let (path, status, remedy) = (kind.path(), kind.status().as_u16(), kind.remedy());
         // Writing to a string cannot fail.
-        let _ = writeln!(
-            table,
-            "| `{}` | {} | {} | {} | {} |",
-            kind.path(),
-            kind.status().as_u16(),
-            kind.title(),
-            kind.description(),
-            kind.remedy(),
-        );
+        let _ = writeln!(table, "| `{path}` | {status} | {remedy} |");
     }
     table
 }
