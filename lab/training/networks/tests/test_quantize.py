@@ -19,6 +19,7 @@ from ..quantize import ActivationRanges, write_int8
 from ..regions import FLOAT_CONVOLUTIONS, int8_tensors, moved_tensors
 from ..weights import quantize_weights
 
+ROOT = Path(__file__).resolve().parents[4]
 SIZE, CHANNELS = 12, 4
 RANDOM_SEED = 3
 
@@ -141,13 +142,26 @@ class Weights(unittest.TestCase):
         self.assertLessEqual(numpy.abs((integers * steps - self.weights) / steps).max(), 0.5001)
         numpy.testing.assert_allclose(bias * scales * 0.02, self.bias, atol=1e-3)
 
+    def assert_pairs_fit_in_16_bits(self, integers: numpy.ndarray) -> None:
+        pairs = integers.astype(int).transpose(0, 2, 3, 1).reshape(-1, 2)
+        self.assertLessEqual(255 * numpy.maximum(pairs, 0).sum(axis=1).max(), 2**15 - 1)
+        self.assertGreaterEqual(255 * numpy.minimum(pairs, 0).sum(axis=1).min(), -(2**15))
+
     def test_weight_pairs_do_not_saturate_16_bits(self):
         self.weights[0, :2] = 1.0
         self.weights[1, 4:6] = -1.0
         integers, _, _ = quantize_weights(self.weights, self.bias, 0.02)
-        pairs = integers.astype(int).transpose(0, 2, 3, 1).reshape(-1, 2)
-        self.assertLessEqual(255 * numpy.maximum(pairs, 0).sum(axis=1).max(), 2**15 - 1)
-        self.assertGreaterEqual(255 * numpy.minimum(pairs, 0).sum(axis=1).min(), -(2**15))
+        self.assert_pairs_fit_in_16_bits(integers)
+
+    def test_pairs_of_the_committed_networks_do_not_saturate(self):
+        for name in ("nanodet_g_views_416", "nanodet_g_fisheye_416"):
+            constants = OnnxGraph(ROOT / "models" / name / "model.onnx").constants.values()
+            weights = [value for value in constants if value.dtype == numpy.int8 and value.ndim == 4]
+            self.assertGreater(len(weights), 20)
+            for value in weights:
+                # Depthwise convolutions have no neighboring inputs.
+                if value.shape[1] > 1:
+                    self.assert_pairs_fit_in_16_bits(value)
 
     def test_depthwise_weights_use_all_of_the_8_bits(self):
         integers, _, _ = quantize_weights(self.weights[:, :1], self.bias, 0.02)
