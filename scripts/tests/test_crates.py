@@ -27,8 +27,8 @@ class Crates(unittest.TestCase):
         cls.crates = published()
 
     def test_the_libraries_for_others_are_published(self):
-        libraries = {"lookdown-common", "lookdown-calibration", "lookdown-lens", "lookdown-imaging", "lookdown-detect", "lookdown-tracking"}
-        libraries |= {"lookdown-eval"}
+        names = ("common", "lens", "calibration", "imaging", "detect", "tracking", "eval")
+        libraries = {f"lookdown-{name}" for name in names}
         self.assertLessEqual(libraries, {*self.crates})
 
     def test_metadata_of_published_crates_is_complete(self):
