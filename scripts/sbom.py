@@ -52,7 +52,7 @@ def bill_of_materials(root: Path, cpu: str, metadata: dict) -> dict:
     runtime = onnx_runtime(cpu)
     models = [model(root, name) for name in MODELS]
     application = identity("application", reference(own), own["name"], own["version"])
-    application["licenses"] = licences(own["license"])
+    application["licenses"] = licenses(own["license"])
     dependencies = {
         reference(packages[needing]): {reference(packages[needed]) for needed in needs[needing]} for needing in needs
     }
@@ -106,7 +106,7 @@ def crate(package: dict, sums: dict[tuple[str, str], str]) -> dict:
     return identity("library", reference(package), name, version) | {
         **({"hashes": hashes(sum_)} if sum_ else {}),
         # Cargo's old form of OR.
-        "licenses": licences((package["license"] or NOT_STATED).replace("/", " OR ")),
+        "licenses": licenses((package["license"] or NOT_STATED).replace("/", " OR ")),
         "purl": reference(package),
     }
 
@@ -117,7 +117,7 @@ def onnx_runtime(cpu: str) -> dict:
     package = purl("pypi", "onnxruntime", pinned.version)
     return identity("library", package, "onnxruntime", pinned.version) | {
         "hashes": hashes(pinned.sha256),
-        "licenses": licences("MIT"),
+        "licenses": licenses("MIT"),
         "purl": package,
     }
 
@@ -128,7 +128,7 @@ def model(root: Path, name: str) -> dict:
     return identity("machine-learning-model", f"model:{name}", name, manifest["sha256"][:12]) | {
         "description": manifest["source"],
         "hashes": hashes(manifest["sha256"]),
-        "licenses": licences(manifest["licence"]),
+        "licenses": licenses(manifest["license"]),
     }
 
 
@@ -147,7 +147,7 @@ def hashes(sha256: str) -> list[dict]:
     return [{"alg": "SHA-256", "content": sha256}]
 
 
-def licences(expression: str) -> list[dict]:
+def licenses(expression: str) -> list[dict]:
     """An SPDX expression, or the statement that none is given."""
     if expression == NOT_STATED:
         return [{"license": {"name": "not stated"}}]

@@ -35,7 +35,7 @@ def write_model_folder(
     os.replace(unfinished, folder / "model.onnx")
     lines = [
         "# The converter cannot know the license of the weights; write its SPDX identifier here.",
-        'licence = "NOASSERTION"',
+        'license = "NOASSERTION"',
         f"name = {json.dumps(name, ensure_ascii=False)}",
         'onnx = "model.onnx"',
         f"source = {json.dumps(source, ensure_ascii=False)}",

@@ -6,7 +6,7 @@ import unittest
 
 from assets.machine import supported_cpu
 from assets.runtime import pinned_runtime, sha256_of
-from sbom import MODELS, ROOT, bill_of_materials, cargo_metadata, licences, needed_crates, purl
+from sbom import MODELS, ROOT, bill_of_materials, cargo_metadata, licenses, needed_crates, purl
 
 
 class ShippedBill(unittest.TestCase):
@@ -81,8 +81,8 @@ class Parts(unittest.TestCase):
         self.assertEqual(needs, {"own": {"used", "build"}, "used": set(), "build": {"used"}})
 
     def test_unstated_licence_is_no_spdx_expression(self):
-        self.assertEqual(licences("MIT OR Apache-2.0"), [{"expression": "MIT OR Apache-2.0"}])
-        self.assertEqual(licences("NOASSERTION"), [{"license": {"name": "not stated"}}])
+        self.assertEqual(licenses("MIT OR Apache-2.0"), [{"expression": "MIT OR Apache-2.0"}])
+        self.assertEqual(licenses("NOASSERTION"), [{"license": {"name": "not stated"}}])
 
     def test_what_has_a_meaning_in_a_package_name_is_encoded(self):
         self.assertEqual(purl("npm", "@vladmandic/human", "3.3.6"), "pkg:npm/%40vladmandic/human@3.3.6")

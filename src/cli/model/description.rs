@@ -17,7 +17,7 @@ impl fmt::Display for Lines<'_> {
             Some(_) => "as in the manifest",
             None => "not in the manifest",
         };
-        let licence = model.licence.clone().unwrap_or_else(unknown);
+        let license = model.license.clone().unwrap_or_else(unknown);
         let source = manifest.source.clone().unwrap_or_else(unknown);
         writeln!(f, "name         {}", manifest.name)?;
         writeln!(
@@ -28,7 +28,7 @@ impl fmt::Display for Lines<'_> {
         )?;
         writeln!(f, "sha256       {} ({checked})", model.sha256)?;
         writeln!(f, "revision     {}", model.revision)?;
-        writeln!(f, "license      {licence}")?;
+        writeln!(f, "license      {license}")?;
         writeln!(f, "source       {source}")?;
         for (what, tensors) in [("input", &model.inputs), ("output", &model.outputs)] {
             for OnnxTensor {

@@ -25,10 +25,10 @@ pub(super) fn run(settings_file: &SettingsFile) -> anyhow::Result<ExitCode> {
         let manifest = ModelManifest::locate(&folder.join(&name));
         let line = match &manifest {
             Ok(manifest) => {
-                let licence = manifest.licence.as_deref().unwrap_or("-");
+                let license = manifest.license.as_deref().unwrap_or("-");
                 let size = size(&manifest.onnx);
                 let size = size.as_deref().unwrap_or("missing");
-                format!("{size:>10}  {licence}")
+                format!("{size:>10}  {license}")
             }
             Err(error) => format!("{:>10}  {}", "invalid", explain(error)),
         };

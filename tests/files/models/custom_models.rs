@@ -88,11 +88,12 @@ fn metadata_of_the_onnx_file_is_used_as_default() {
     let detector = OnnxDetector::load(&library(), &fixture("with_metadata"), &options()).unwrap();
     let description = detector.description();
     assert_eq!((detector.input().width, detector.input().height), (96, 64));
-    assert_eq!(description.licence.as_deref(), Some("AGPL-3.0 License"));
+    assert_eq!(description.license.as_deref(), Some("AGPL-3.0 License"));
     assert_eq!(detector.name(), "with_metadata");
+    // The key of manifests of earlier versions.
     let other = load("with_metadata", "licence = \"MIT\"\n[input]\nwidth = 64\n").unwrap();
     assert_eq!((other.input().width, other.input().height), (64, 64));
-    assert_eq!(other.description().licence.as_deref(), Some("MIT"));
+    assert_eq!(other.description().license.as_deref(), Some("MIT"));
 }
 
 #[test]

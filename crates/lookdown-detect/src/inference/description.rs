@@ -19,7 +19,7 @@ pub struct ModelDescription {
     /// Its manifest, `onnx` as a path that can be opened.
     pub manifest: ModelManifest,
     /// The license from the manifest, or else from the ONNX file's metadata.
-    pub licence: Option<String>,
+    pub license: Option<String>,
     /// The ONNX file's SHA-256, hexadecimal.
     pub sha256: String,
     /// Identifier that changes with the file or the manifest's settings.
@@ -55,7 +55,7 @@ pub(super) const FLOAT: &str = "f32";
 /// Metadata of the ONNX file, as far as exporters write it.
 #[derive(Debug, Default)]
 pub(super) struct Metadata {
-    pub(super) licence: Option<String>,
+    pub(super) license: Option<String>,
     /// Height and width.
     pub(super) size: Option<[u32; 2]>,
     pub(super) stride: Option<u32>,
@@ -74,7 +74,7 @@ pub(super) fn metadata(session: &Session) -> Metadata {
             .collect::<Vec<u32>>()
     };
     Metadata {
-        licence: metadata.custom("license").filter(|text| !text.is_empty()),
+        license: metadata.custom("license").filter(|text| !text.is_empty()),
         size: numbers("imgsz").try_into().ok(),
         stride: numbers("stride").first().copied(),
     }

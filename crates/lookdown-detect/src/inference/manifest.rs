@@ -27,9 +27,9 @@ pub struct ModelManifest {
     /// The ONNX file's SHA-256, hexadecimal. A file with a different one is refused.
     #[serde(default)]
     pub sha256: Option<String>,
-    /// SPDX identifier of the weights' license.
-    #[serde(default)]
-    pub licence: Option<String>,
+    /// SPDX identifier of the weights' license. Manifests of earlier versions call it `licence`.
+    #[serde(default, alias = "licence")]
+    pub license: Option<String>,
     /// Origin of the weights.
     #[serde(default)]
     pub source: Option<String>,
@@ -71,7 +71,7 @@ impl ModelManifest {
             name: name_from(&stem.to_string_lossy()),
             onnx: model.to_owned(),
             sha256: None,
-            licence: None,
+            license: None,
             source: None,
             input: ManifestInput::default(),
             output: Head::default(),

@@ -121,7 +121,7 @@ impl OnnxDetector {
             outputs,
             layout: signature.layout,
             views_per_run: signature.views_per_run,
-            licence: manifest.licence.clone().or(metadata.licence),
+            license: manifest.license.clone().or(metadata.license),
             manifest,
         };
         let detector = |session| Self {
