@@ -177,13 +177,13 @@ impl Cameras {
         let configured: BTreeMap<_, _> = named.collect();
         let paused = self.paused()?;
         let file = self.file()?;
-        self.own.set(
-            configured
-                .keys()
-                .chain(file.cameras.keys())
-                .cloned()
-                .collect(),
-        );
+        let stored = file.cameras.iter();
+        let mut own: BTreeMap<_, _> = stored
+            .map(|(name, camera)| (name.clone(), camera.paused))
+            .collect();
+        let names = configured.keys();
+        own.extend(names.map(|name| (name.clone(), paused.contains(name))));
+        self.own.set(own);
         cameras.retain(|camera| !paused.contains(&camera.name));
         let malformed = |name| {
             (

@@ -28,11 +28,12 @@ export function addCard(camera, { onchange, reread }) {
   const manage = element("span", { class: "manage" });
   const node = element("article", { class: "card", "aria-label": `Camera ${camera}`, "data-camera": camera });
   const card = { camera, node, now, age, state, suggestion, day, strip, manage, onchange, reread, info: null, isSingle: false };
-  Object.assign(card, { id: "0", history: [], reportedAt: 0, report: null, drawn: 0, image: null, suggestedAt: 0, suggested: "", hasImage: true, isAsking: false, message: null });
+  Object.assign(card, { id: "0", history: [], reportedAt: 0, report: null, drawn: 0, image: null, suggestedAt: 0, suggested: "", hasImage: true, isAsking: false, isTooLow: false, message: null });
   const use = (section) => shown(() => withProgress(strip, "Reading the frame", () => useFrame(card, section)));
   const tools = TOOLS.map((name) => element("button", { type: "button", onclick: use(name.toLowerCase()) }, name));
   const group = element("div", { class: "use-frame", role: "group", "aria-label": `Use this frame of ${camera}` }, element("span", { class: "muted", "aria-hidden": "true" }, "Use this frame:"), ...tools);
-  node.append(element("header", {}, element("h2", {}, link), age), now, state, suggestion, day, element("footer", {}, group, manage, strip));
+  card.remedy = element("button", { type: "button", class: "quiet", hidden: true, onclick: chooseAutomatically(card) }, "Set Rate and Profile to automatic");
+  node.append(element("header", {}, element("h2", {}, link), age), now, state, card.remedy, suggestion, day, element("footer", {}, group, manage, strip));
   return card;
 }
 
@@ -97,6 +98,7 @@ export async function drawTools(card, info) {
   showSuggestion(card);
   const { can_change: may } = await options();
   const isManaged = Boolean(may && info);
+  card.remedy.hidden = !(isManaged && info.stored && info.warning && (info.every || info.profile));
   if (Boolean(card.manage.firstChild) === isManaged && before?.paused === info?.paused) return;
   card.manage.replaceChildren(...(isManaged ? managing(card) : []));
 }
@@ -108,19 +110,31 @@ function stateOf(info) {
   return info.warning ?? info.choice ?? "";
 }
 
+const pathOf = ({ camera }) => `cameras/${encodeURIComponent(camera)}`;
+
+/** Does something with a camera, with its progress in the card, and reads its state again. */
+const acting = (card) => (label, work) => shown(async () => {
+  await withProgress(card.strip, label, work);
+  await card.reread();
+});
+
+/** Saves the camera without its rate and profile. Its URL and password stay. */
+const chooseAutomatically = (card) => acting(card)("Saving", () => {
+  const { user, calibration } = card.info;
+  return ask(pathOf(card), { method: "PUT", body: JSON.stringify({ user, calibration }) });
+});
+
 function managing(card) {
   const { camera, info } = card;
-  const path = `cameras/${encodeURIComponent(camera)}`;
-  const act = (label, work) => shown(async () => {
-    await withProgress(card.strip, label, work);
-    await card.reread();
-  });
+  const [path, act] = [pathOf(card), acting(card)];
   const pause = () => ask(path, { method: "PATCH", body: JSON.stringify({ paused: !card.info.paused }) });
-  const remove = () => confirm(`Remove the camera ${camera}? Its reports and counts stay.`) && act("Removing", () => ask(path, { method: "DELETE" }))();
+  const remove = () => confirm(`Remove the camera ${camera}? The history of its counts stays.`) && act("Removing", () => ask(path, { method: "DELETE" }))();
+  const clear = () => confirm(`Delete the history of the counts of ${camera}? It is counted on from now.`) && act("Deleting", () => ask(`counts/${encodeURIComponent(camera)}`, { method: "DELETE" }))();
   const button = (label, onclick) => element("button", { type: "button", class: "quiet", onclick }, label);
   const pausing = button(info.paused ? "Resume" : "Pause", act("Saving", pause));
   // A camera of the settings is changed and removed there.
-  return info.stored ? [button("Settings", () => card.onchange(card.info)), pausing, button("Remove", remove)] : [pausing];
+  const clearing = button("Delete its history", clear);
+  return info.stored ? [button("Settings", () => card.onchange(card.info)), pausing, button("Remove", remove), clearing] : [pausing, clearing];
 }
 
 export function tellAge({ age, reportedAt }) {

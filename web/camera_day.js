@@ -11,19 +11,25 @@ const [WIDTH, HEIGHT, BOTTOM, TOP] = [320, 84, 18, 6];
 
 /** Shows the day of a card that fills the page, if the server counts. */
 export async function showDay(card) {
-  card.day.hidden = !card.isSingle || !card.day.firstChild;
+  drawDay(card);
   if (!card.isSingle || Date.now() - (card.dayAt ?? 0) < MILLIS) return;
   card.dayAt = Date.now();
   const { has_counts: hasCounts } = await options();
   if (!hasCounts) return;
   const query = new URLSearchParams({ from: "today", step: "1h" });
-  const counts = await askJson(`counts/${encodeURIComponent(card.camera)}?${query}`).catch(() => null);
-  card.day.replaceChildren(...(counts ? drawn(counts) : []));
-  card.day.hidden = !card.isSingle || !counts;
+  card.dayCounts = await askJson(`counts/${encodeURIComponent(card.camera)}?${query}`).catch(() => null);
+  drawDay(card);
 }
 
-function drawn({ from, steps }) {
-  const most = Math.max(0, ...steps.map(({ persons }) => persons?.max ?? 0));
+/** Draws the day. Its most persons are those of the plot as well, which has newer numbers. */
+function drawDay(card) {
+  card.day.hidden = !card.isSingle || !card.dayCounts;
+  card.day.replaceChildren(...(card.day.hidden ? [] : drawn(card.dayCounts, card.history)));
+}
+
+function drawn({ from, steps }, history) {
+  const today = history.filter(({ time }) => time >= Date.parse(from));
+  const most = Math.max(0, ...steps.map(({ persons }) => persons?.max ?? 0), ...today.map(({ persons }) => persons ?? 0));
   const rows = [...crossingsOf(steps)].map(([line, directions]) =>
     element("li", {}, element("span", { class: "count-of" }, line), element("span", {}, [...directions].map(([direction, count]) => `${count} ${direction}`).join(", "))),
   );

@@ -87,8 +87,9 @@ function showNumbers(rows) {
 function addNumber(card, time, persons) {
   const last = card.history.at(-1);
   card.reportedAt = Math.max(time, card.reportedAt);
-  if (last?.persons === persons) return;
-  card.history.push({ time: Math.max(time, last?.time ?? 0), persons });
+  const slow = persons !== null && card.isTooLow;
+  if (last?.persons === persons && Boolean(last.slow) === slow) return;
+  card.history.push({ time: Math.max(time, last?.time ?? 0), persons, slow });
   card.history.splice(0, card.history.length - MAX_HISTORY);
   redraw(card);
 }
@@ -142,9 +143,8 @@ function showStates(rows) {
   }
   for (const card of cards.values()) {
     if (named.has(card.camera)) continue;
-    // A removed camera without reports has nothing to show.
-    if (card.info && !card.report) dropped(card);
-    else if (card.info) drawTools(card, null);
+    // The camera was removed.
+    if (card.info) dropped(card);
   }
 }
 

@@ -54,6 +54,7 @@ async function poll(signal) {
       if (!Array.isArray(rows)) throw new Unreachable();
       report("");
       for (let update = 0; update < UPDATES_PER_LIST && !signal.aborted; update += 1) {
+        for (const { name, too_low_since: since } of rows) if (cards.has(name)) cards.get(name).isTooLow = Boolean(since);
         const shown = rows.map(({ name }) => name).filter((name) => cards.get(name)?.node.isConnected);
         await Promise.all(shown.map((camera) => load(camera, signal)));
         await pause(TRACKS_MILLIS, signal);

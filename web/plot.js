@@ -1,4 +1,4 @@
-/** Persons over time as a step plot: a count is valid until the next report. A number that is not known is null. */
+/** Persons over time as a step plot: a count is valid until the next report. A number that is not known is null. Time with too few frames is marked. */
 
 import { plural, shape } from "./dom.js";
 import { roundStep } from "./geometry.js";
@@ -7,7 +7,7 @@ const [WIDTH, HEIGHT, LEFT, BOTTOM, TOP] = [320, 110, 24, 20, 8];
 
 const clock = (time) => new Date(time).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", second: "2-digit" });
 
-/** Draws `history` until `now`: at least one `{time, persons}`, milliseconds since 1970, oldest first. */
+/** Draws `history` until `now`: at least one `{time, persons, slow}`, milliseconds since 1970, oldest first. */
 export function stepPlot(history, now) {
   const first = history[0].time;
   // The clocks of the server and of this machine may differ.
@@ -17,6 +17,7 @@ export function stepPlot(history, now) {
   const top = Math.ceil(most / step) * step;
   const x = (time) => LEFT + ((time - first) / Math.max(1, last - first)) * (WIDTH - LEFT - 2);
   const y = (persons) => TOP + (1 - persons / top) * (HEIGHT - TOP - BOTTOM);
+  const slow = history.flatMap(({ time, slow }, index) => (slow ? [[x(time), x(history[index + 1]?.time ?? last)]] : []));
   const ended = [...history, { time: last, persons: history.at(-1).persons }];
   const below = steps(ended.map(({ time, persons }) => ({ time, persons: persons ?? 0 })), x, y);
   const ticks = Array.from({ length: top / step + 1 }, (_, index) => index * step);
@@ -25,6 +26,7 @@ export function stepPlot(history, now) {
   return shape(
     "svg",
     { class: "plot", viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": label },
+    ...slow.map(([from, to]) => shape("rect", { class: "too-low", x: from, y: TOP, width: to - from, height: HEIGHT - TOP - BOTTOM }, shape("title", {}, "Too few frames: crossings may be missed"))),
     ...ticks.map((tick) => shape("path", { class: "grid", d: `M${LEFT} ${y(tick)}H${WIDTH}` })),
     ...ticks.map((tick) => shape("text", { x: LEFT - 6, y: y(tick) + 4, "text-anchor": "end" }, String(tick))),
     shape("path", { class: "area", d: `${below}V${y(0)}H${x(first)}Z` }),
@@ -51,10 +53,11 @@ export function steps(history, x, y) {
 /** The history of the steps of a camera's counts from the first known number on: the mean number of each. */
 export function countedNumbers(counted) {
   const history = [];
-  for (const { from, persons } of counted) {
+  for (const { from, persons, slow_seconds: slowSeconds } of counted) {
     const number = persons ? Math.round(persons.mean) : null;
-    const isFirst = history.length === 0 && number !== null;
-    if (isFirst || (history.length > 0 && history.at(-1).persons !== number)) history.push({ time: Date.parse(from), persons: number });
+    const slow = slowSeconds > 0;
+    const last = history.at(-1);
+    if (last ? last.persons !== number || last.slow !== slow : number !== null) history.push({ time: Date.parse(from), persons: number, slow });
   }
   return history;
 }

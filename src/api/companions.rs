@@ -10,8 +10,8 @@ use crate::cameras::Cameras;
 
 /// Returns metrics in the text format of Prometheus.
 type MetricsText = Arc<dyn Fn() -> Vec<u8> + Send + Sync>;
-/// Returns the reason why the reports of a camera are not counted.
-type NotCounted = Arc<dyn Fn(&str) -> Option<String> + Send + Sync>;
+/// Returns the reason why a camera is not counted, or why its counts may be too low.
+type CountWarning = Arc<dyn Fn(&str) -> Option<String> + Send + Sync>;
 
 /// The parts of `lookdown run` beside the server, and the counts that a server forwards to. Clones
 /// share them.
@@ -21,7 +21,7 @@ pub struct Companions(Arc<RwLock<Parts>>);
 #[derive(Default)]
 struct Parts {
     counts: Counts,
-    not_counted: Option<NotCounted>,
+    count_warning: Option<CountWarning>,
     cameras: Option<Arc<Cameras>>,
     own_cameras: OwnCameras,
     metrics: BTreeMap<&'static str, MetricsText>,
@@ -51,17 +51,17 @@ impl Companions {
     pub fn set_counts(
         &self,
         routes: Router,
-        not_counted: impl Fn(&str) -> Option<String> + Send + Sync + 'static,
+        warning: impl Fn(&str) -> Option<String> + Send + Sync + 'static,
     ) {
         let mut parts = self.0.write();
         parts.counts = Counts::Here(routes);
-        parts.not_counted = Some(Arc::new(not_counted));
+        parts.count_warning = Some(Arc::new(warning));
     }
 
-    /// Returns the reason why the reports of a camera are not counted here now.
-    pub(super) fn not_counted(&self, camera: &str) -> Option<String> {
-        let not_counted = self.0.read().not_counted.clone()?;
-        not_counted(camera)
+    /// Returns the reason why a camera is not counted here now, or why its counts may be too low.
+    pub(super) fn count_warning(&self, camera: &str) -> Option<String> {
+        let warning = self.0.read().count_warning.clone()?;
+        warning(camera)
     }
 
     /// Returns the cameras of this process.

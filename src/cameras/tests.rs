@@ -158,6 +158,7 @@ fn detection_is_switched_off_until_it_is_switched_on() {
     assert_eq!(add(&second), [""; 0]);
     let both = |is_on| [("gate".to_owned(), is_on), ("hall".to_owned(), is_on)].into();
     assert_eq!(second.detection().unwrap(), both(false));
+    assert!(["gate", "hall"].map(|name| second.own.is_paused(name)) == [true; 2]);
     let paused = second.paused_of_settings().unwrap();
     assert_eq!(
         paused,
@@ -168,6 +169,7 @@ fn detection_is_switched_off_until_it_is_switched_on() {
     }
     assert_eq!(add(&second), ["gate", "hall"]);
     assert_eq!(second.detection().unwrap(), both(true));
+    assert!(["gate", "hall"].map(|name| second.own.is_paused(name)) == [false; 2]);
 }
 
 #[test]

@@ -226,7 +226,7 @@ impl Parts {
     ) -> anyhow::Result<()> {
         let settings = counting(&self.settings, Some(server.clone()));
         let started = |started: Started| {
-            companions.set_counts(started.routes, started.not_counted);
+            companions.set_counts(started.routes, started.warning);
             companions.set_metrics("counts", started.metrics);
         };
         let counts = run_counts(&settings, started, async || {

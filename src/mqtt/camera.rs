@@ -180,6 +180,12 @@ impl Camera {
         messages
     }
 
+    /// Makes it unavailable until its next report. Returns the messages.
+    pub(super) fn end(&mut self, now: Instant, topics: &Topics) -> Vec<Message> {
+        self.expires_at = Some(now);
+        self.expire(now, topics)
+    }
+
     /// The time of the next change without a report.
     pub(super) fn next_change(&self) -> Option<Instant> {
         let expiry = self.expires_at.filter(|_| self.is_available);

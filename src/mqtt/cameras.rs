@@ -139,6 +139,15 @@ impl Cameras {
         known.map(|camera| camera.name().to_owned()).collect()
     }
 
+    /// Makes the paused cameras of this process unavailable: their last number is not the present
+    /// one. Returns the messages.
+    pub(super) fn pause(&mut self, now: Instant) -> Vec<Message> {
+        let (topics, own) = (&self.topics, &self.own);
+        let known = self.known.values_mut();
+        let paused = known.filter(|camera| camera.is_available() && own.is_paused(camera.name()));
+        paused.flat_map(|camera| camera.end(now, topics)).collect()
+    }
+
     /// Sets the headline number of a camera. Returns the messages: none without a change.
     pub(super) fn set_persons(
         &mut self,

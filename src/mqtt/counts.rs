@@ -13,6 +13,7 @@ use std::{
     time::Duration,
 };
 
+use jiff::Timestamp;
 use lookdown_common::ServerClient;
 use lookdown_count::Snapshot;
 use rumqttc::Publish;
@@ -239,6 +240,7 @@ impl CountsPublisher {
             }
             topics.push(self.topics.counts(&first));
             if let Owner::Camera(name) = owner {
+                topics.push(self.topics.counts(&owner.attributes()));
                 topics.extend(config_topics(&self.topics, &self.device(owner, name)));
             }
         }
@@ -275,6 +277,9 @@ impl CountsPublisher {
             let has_images = self.options.image_every.is_some();
             retained.extend(announcements(&self.topics, &events, has_images));
             let mut device = Device::new(self, owner, &camera.name, camera.persons, &mut retained);
+            let since = camera.too_low_since_ms.map(Timestamp::from_millisecond);
+            let since = since.and_then(Result::ok).map(|time| time.to_string());
+            device.attributes(&json!({ "too_low_since": since }));
             for line in &camera.lines {
                 let (of, direction) = (level(&line.line), level(&line.direction));
                 let number = Number::Crossings {
@@ -335,6 +340,12 @@ impl<'a> Device<'a> {
         device
     }
 
+    /// Adds the attributes of the number of persons.
+    fn attributes(&mut self, attributes: &Value) {
+        let topic = self.publisher.topics.counts(&self.owner.attributes());
+        self.retained.insert(topic, attributes.to_string());
+    }
+
     /// Adds a number that changes in both directions. An unknown one has no message.
     fn state(&mut self, name: &str, number: Number<'_>, value: Option<u64>) {
         let config = json!({ "state_class": "measurement", "icon": "mdi:account-group" });
@@ -362,6 +373,9 @@ impl<'a> Device<'a> {
         let mut config = config.clone();
         config["name"] = json!(name);
         config["state_topic"] = json!(publisher.state_topic(owner, number));
+        if let (Owner::Camera(_), Number::Persons) = (owner, number) {
+            config["json_attributes_topic"] = json!(topics.counts(&owner.attributes()));
+        }
         let device = publisher.device(owner, self.name);
         let entity = number.entity();
         let announcement = device.announcement(topics, SENSOR, &entity, availability, config);

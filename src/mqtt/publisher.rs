@@ -4,6 +4,7 @@
 use std::{num::NonZeroUsize, path::PathBuf, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
+use lookdown_common::OwnCameras;
 use lookdown_detect::fairness::Client;
 use rumqttc::Publish;
 use tokio::{
@@ -300,13 +301,16 @@ impl Publication {
 
     /// Returns the headline number after a report: that of the frame if the store does not answer.
     async fn headline(&self, report: &StoredReport) -> usize {
-        let headline = Headline::of(&*self.results, report).await;
-        headline.map_or(report.report.persons, |headline| headline.persons)
+        // A paused camera is unavailable, whatever its number.
+        let headline = Headline::of(&*self.results, report, &OwnCameras::default()).await;
+        let persons = headline.ok().and_then(|headline| headline.persons);
+        persons.unwrap_or(report.report.persons)
     }
 
-    /// Updates the followed numbers, which change without a report. Returns the messages.
+    /// Updates what changes without a report: the followed numbers, and cameras that are paused.
+    /// Returns the messages.
     async fn followed(&self, cameras: &mut Cameras) -> Vec<Message> {
-        let mut messages = Vec::new();
+        let mut messages = cameras.pause(Instant::now());
         for camera in cameras.available() {
             // Without an answer or a number, the next report decides.
             if let Ok(Some(number)) = self.results.followed(&camera).await {

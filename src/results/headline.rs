@@ -5,6 +5,8 @@
 
 use std::{num::NonZeroUsize, sync::Arc, time::Duration};
 
+use lookdown_common::OwnCameras;
+
 use super::{Cameras, FollowedNumber, ReportId, ResultStore, StoredReport, Unreachable};
 
 /// The reports of this time before the latest one, inclusively, have a part in the median.
@@ -19,23 +21,36 @@ pub enum HeadlineSource {
     Tracks,
     /// The median of the last reports.
     Median,
+    /// No number: the camera is paused.
+    Paused,
 }
 
 /// The headline number of a camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Headline {
-    /// The number of persons.
-    pub persons: usize,
+    /// The number of persons; `None` while the camera is paused.
+    pub persons: Option<usize>,
     /// Its origin.
     pub source: HeadlineSource,
 }
 
 impl Headline {
-    /// Returns the headline number of the camera with this latest report.
+    /// Returns the headline number of the camera with this latest report. `own` are the cameras of
+    /// this process, which may be paused.
     ///
     /// # Errors
     /// [`Unreachable`].
-    pub async fn of(store: &dyn ResultStore, latest: &StoredReport) -> Result<Self, Unreachable> {
+    pub async fn of(
+        store: &dyn ResultStore,
+        latest: &StoredReport,
+        own: &OwnCameras,
+    ) -> Result<Self, Unreachable> {
+        if own.is_paused(&latest.report.camera) {
+            return Ok(Self {
+                persons: None,
+                source: HeadlineSource::Paused,
+            });
+        }
         if let Some(followed) = store.followed(&latest.report.camera).await? {
             return Ok(followed.into());
         }
@@ -47,7 +62,7 @@ impl Headline {
         let counted = reports.iter().filter(is_counted);
         let persons = median(counted.map(|report| report.report.persons));
         Ok(Self {
-            persons: persons.unwrap_or(latest.report.persons),
+            persons: persons.or(Some(latest.report.persons)),
             source: HeadlineSource::Median,
         })
     }
@@ -56,7 +71,7 @@ impl Headline {
 impl From<FollowedNumber> for Headline {
     fn from(followed: FollowedNumber) -> Self {
         Self {
-            persons: followed.persons,
+            persons: Some(followed.persons),
             source: HeadlineSource::Tracks,
         }
     }
@@ -69,6 +84,7 @@ impl HeadlineSource {
         match self {
             Self::Tracks => "tracks",
             Self::Median => "median",
+            Self::Paused => "paused",
         }
     }
 }
@@ -134,8 +150,10 @@ mod tests {
             (&[5, 5, 8, 5, 14, 5, 3], 5),
         ] {
             let (store, latest) = store_of(numbers);
-            let headline = Headline::of(&store, &latest).await.unwrap();
-            assert_eq!(headline.persons, expected, "{numbers:?}");
+            let headline = Headline::of(&store, &latest, &OwnCameras::default())
+                .await
+                .unwrap();
+            assert_eq!(headline.persons, Some(expected), "{numbers:?}");
             assert_eq!(headline.source, HeadlineSource::Median);
             let reports = store.since(&Cameras::All, ReportId::default(), NonZeroUsize::MAX);
             assert_eq!(medians(&reports.await.unwrap()).last(), Some(&expected));
@@ -149,12 +167,17 @@ mod tests {
             let at = Timestamp::now() - jiff::SignedDuration::from_secs(age);
             let number = FollowedNumber { persons, at };
             assert!(store.follow("hall", number).await.unwrap());
-            Headline::of(&store, &latest).await.unwrap()
+            Headline::of(&store, &latest, &OwnCameras::default())
+                .await
+                .unwrap()
         };
         let headline = follow(5, 0).await;
-        assert_eq!((headline.persons, headline.source.name()), (5, "tracks"));
-        assert_eq!(follow(6, 10).await.persons, 6);
-        assert_eq!(follow(6, 20).await.persons, 9);
+        assert_eq!(
+            (headline.persons, headline.source.name()),
+            (Some(5), "tracks")
+        );
+        assert_eq!(follow(6, 10).await.persons, Some(6));
+        assert_eq!(follow(6, 20).await.persons, Some(9));
         let number = FollowedNumber {
             persons: 1,
             at: Timestamp::now(),
@@ -163,5 +186,19 @@ mod tests {
         follow(5, 0).await;
         assert!(store.delete("hall").await.unwrap());
         assert_eq!(store.followed("hall").await.unwrap(), None);
+    }
+
+    #[tokio::test]
+    async fn paused_camera_has_no_number() {
+        let (store, latest) = store_of(&[7, 7, 7]);
+        let own = OwnCameras::default();
+        for (is_paused, persons, source) in [(true, None, "paused"), (false, Some(7), "median")] {
+            own.set([("hall".to_owned(), is_paused)].into());
+            let headline = Headline::of(&store, &latest, &own).await.unwrap();
+            assert_eq!(
+                (headline.persons, headline.source.name()),
+                (persons, source)
+            );
+        }
     }
 }

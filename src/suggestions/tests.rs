@@ -176,7 +176,7 @@ fn an_existing_calibration_is_never_replaced() {
 fn own_camera_is_observed_among_many_names() {
     let now = Instant::now();
     let own = OwnCameras::default();
-    own.set(["hall".to_owned()].into());
+    own.set([("hall".to_owned(), false)].into());
     let mut observed = std::collections::BTreeMap::new();
     for number in 0..MAX_CAMERAS {
         let mut camera = Observed::default();

@@ -125,7 +125,9 @@ async fn a_camera_that_is_not_counted_has_a_warning() {
 #[tokio::test]
 async fn frames_of_others_do_not_replace_an_own_camera() {
     let companions = Companions::default();
-    companions.own_cameras().set(["hall".to_owned()].into());
+    companions
+        .own_cameras()
+        .set([("hall".to_owned(), false)].into());
     let service = Service::within(&Bounds {
         companions,
         ..Bounds::default()

@@ -232,6 +232,52 @@ fn cameras_of_the_settings_file_are_counted() {
 }
 
 #[test]
+fn paused_and_removed_cameras_leave_results_and_metrics() {
+    let folder = tempfile::tempdir().unwrap();
+    let [frames, state] = ["frames", "state"].map(|name| folder.path().join(name));
+    fs::create_dir(&frames).unwrap();
+    let settings = folder.path().join("lookdown.toml");
+    let counts = format!(
+        "[counts]\npath = {:?}\n",
+        folder.path().join("counts.sqlite")
+    );
+    let camera = "[[cameras]]\nname = \"hall\"\nprofile = \"fast\"\nevery = \"200ms\"\n";
+    fs::write(&settings, format!("{counts}{camera}url = {frames:?}\n")).unwrap();
+    let arguments = ["run", settings.to_str().unwrap()];
+    let variables = [("LOOKDOWN__STATE__PATH", state.to_str().unwrap())];
+    let running = Running::start(&arguments, &variables);
+    let counted = "lookdown_count_last_report_timestamp_seconds{camera=\"hall\"}";
+    running.until("/counts", "", "\"hall\"", drop_frames(&frames));
+    let metrics = running.ask("GET /metrics", "");
+    assert!(metrics.contains(counted), "{metrics}");
+    running.ask("PATCH /cameras/hall", r#"{"paused": true}"#);
+    let paused = r#""persons":null,"persons_source":"paused""#;
+    running.until("/results", "", paused, || {});
+    let metrics = running.ask("GET /metrics", "");
+    assert!(!metrics.contains(counted), "{metrics}");
+    running.interrupt();
+
+    // Without the camera in the settings, only the counts know it.
+    fs::write(&settings, &counts).unwrap();
+    let running = Running::start(&arguments, &variables);
+    running.until("/counts", "", "\"hall\"", || {});
+    for (request, counts) in [
+        ("DELETE /results/hall", "\"known_seconds\""),
+        ("DELETE /counts/hall", "404 Not Found"),
+    ] {
+        let deleted = running.ask(request, "");
+        assert!(deleted.starts_with("HTTP/1.1 204 "), "{deleted}");
+        let metrics = running.ask("GET /metrics", "");
+        assert!(!metrics.contains(counted), "{metrics}");
+        let shown = running.get("/counts/hall", "");
+        assert!(shown.contains(counts), "{request}: {shown}");
+    }
+    let unknown = running.ask("DELETE /results/hall", "");
+    assert!(unknown.starts_with("HTTP/1.1 404 "), "{unknown}");
+    running.interrupt();
+}
+
+#[test]
 fn it_runs_without_certificates_of_authorities() {
     let folder = tempfile::tempdir().unwrap();
     let variables = [

@@ -1,25 +1,34 @@
 //! Places of cameras: clients choose names, and the number of places is bounded.
 
 use std::{
-    collections::BTreeSet,
+    collections::BTreeMap,
     sync::{Arc, PoisonError, RwLock},
 };
 
-/// The names of the cameras of this process, which always have a place. Clones share them.
+/// The names of the cameras of this process, which always have a place, and whether they are
+/// paused. Clones share them.
 #[derive(Debug, Clone, Default)]
-pub struct OwnCameras(Arc<RwLock<BTreeSet<String>>>);
+pub struct OwnCameras(Arc<RwLock<BTreeMap<String, bool>>>);
 
 impl OwnCameras {
-    /// Replaces the names.
-    pub fn set(&self, names: BTreeSet<String>) {
+    /// Replaces the names; `true` for those that are paused.
+    pub fn set(&self, names: BTreeMap<String, bool>) {
         *self.0.write().unwrap_or_else(PoisonError::into_inner) = names;
+    }
+
+    /// Returns true for a camera of this process that is paused: its last number is not the present
+    /// one.
+    #[must_use]
+    pub fn is_paused(&self, name: &str) -> bool {
+        let names = self.0.read().unwrap_or_else(PoisonError::into_inner);
+        names.get(name).copied().unwrap_or_default()
     }
 
     /// Returns true for the name of a camera of this process.
     #[must_use]
     pub fn contains(&self, name: &str) -> bool {
         let names = self.0.read().unwrap_or_else(PoisonError::into_inner);
-        names.contains(name)
+        names.contains_key(name)
     }
 
     /// Returns the claim of a camera.
@@ -78,7 +87,7 @@ mod tests {
     #[test]
     fn the_weakest_and_oldest_claim_makes_room() {
         let own = OwnCameras::default();
-        own.set(["hall".to_owned()].into());
+        own.set([("hall".to_owned(), false)].into());
         let place = |camera, is_calibrated, last| Place {
             claim: own.claim(camera, is_calibrated),
             camera,

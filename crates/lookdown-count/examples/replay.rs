@@ -1,7 +1,7 @@
 //! Counts the reports of a clip again and again, as if its camera had gone on: the number of
-//! persons of each round. `docs/lab/count-accuracy.md` has the command. With a fifth argument, a
-//! file, its store is kept, so that `lookdown count CLIP --store FILE --annotate OUT.mp4` goes on
-//! from it.
+//! persons of the first and the last round, and the crossings of all rounds.
+//! `docs/lab/count-accuracy.md` has the command. With a fifth argument, a file, its store is kept,
+//! so that `lookdown count CLIP --store FILE --annotate OUT.mp4` goes on from it.
 
 use std::{error::Error, fs, path::PathBuf, sync::Arc, time::Duration};
 
@@ -45,6 +45,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     recording.commit()?;
+    for line in recording.lines() {
+        println!("{} {}: {}", line.line, line.direction, line.crossings);
+    }
     Ok(())
 }
 

@@ -112,6 +112,11 @@ impl Drops {
         }
     }
 
+    /// Forgets a camera.
+    pub(crate) fn remove(&mut self, camera: &str) {
+        self.cameras.remove(camera);
+    }
+
     /// Returns the dropped reports of each camera.
     pub(crate) fn iter(&self) -> impl Iterator<Item = (&str, &CameraDrops)> {
         let cameras = self.cameras.iter();

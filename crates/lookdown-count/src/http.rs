@@ -7,6 +7,7 @@ mod furniture;
 mod heat_map;
 mod heat_map_image;
 mod operation;
+mod removal;
 mod shared;
 mod suggested_area;
 mod time;
@@ -45,7 +46,7 @@ pub(crate) fn router(api: Api) -> Router {
 fn routes() -> OpenApiRouter<Shared> {
     OpenApiRouter::new()
         .routes(routes!(cameras))
-        .routes(routes!(counts::of_camera))
+        .routes(routes!(counts::of_camera, removal::delete))
         .routes(routes!(tracks::of_camera))
         .routes(routes!(furniture::list))
         .routes(routes!(furniture::confirm, furniture::take_back))
@@ -89,6 +90,9 @@ struct CameraRow {
     last_report: Option<Timestamp>,
     /// Persons now; null while unknown.
     persons: Option<u64>,
+    /// Since when its lines have too few frames, so that crossings may be missed; null if they have
+    /// enough.
+    too_low_since: Option<Timestamp>,
     /// The site of its calibration.
     site: Option<String>,
     /// Reports that were not counted since the start.
@@ -119,6 +123,7 @@ impl CameraRow {
             name: name.to_owned(),
             last_report: None,
             persons: None,
+            too_low_since: None,
             site: None,
             dropped_reports: drops.map_or(0, |drops| drops.reports),
             dropping,
@@ -140,6 +145,7 @@ async fn cameras(State(api): State<Shared>) -> Json<Vec<CameraRow>> {
         let row = CameraRow {
             last_report: Some(time_of(camera.last_report_ms)),
             persons: camera.persons,
+            too_low_since: camera.too_low_since_ms.map(time_of),
             site: match counter.scene_of(&camera.name).map(|scene| &scene.owner) {
                 Some(Owner::Site(site)) => Some(site.clone()),
                 _ => None,

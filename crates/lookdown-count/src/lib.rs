@@ -20,6 +20,7 @@ mod event_image;
 mod event_parser;
 mod event_stream;
 mod follower;
+mod frame_rate;
 mod hand_back;
 mod http;
 mod message;

@@ -42,6 +42,9 @@ metric_set! {
     zone_person_seconds: IntCounterVec = "zone_person_seconds_total" ["camera", "zone"];
     /// Persons now; absent while unknown.
     site_persons: IntGaugeVec = "site_persons" ["site"];
+    /// 1 while crossings may be missed, as fewer frames than lines need became reports, else 0;
+    /// absent while unknown or without lines.
+    too_low: IntGaugeVec = "too_low" ["camera"];
     /// Time of the last frame.
     last_report: IntGaugeVec = "last_report_timestamp_seconds" ["camera"];
 }
@@ -73,6 +76,7 @@ impl Metrics {
             &self.persons,
             &self.zone_persons,
             &self.site_persons,
+            &self.too_low,
             &self.last_report,
         ] {
             gauges.reset();
@@ -80,10 +84,19 @@ impl Metrics {
         let number = |value: u64| i64::try_from(value).unwrap_or(i64::MAX);
         for camera in &snapshot.cameras {
             let name = camera.name.as_str();
-            let last_report = self.last_report.with_label_values(&[name]);
-            last_report.set(camera.last_report_ms.div_euclid(1000));
+            // No alert waits for the reports of a paused camera.
+            if !camera.is_paused {
+                let last_report = self.last_report.with_label_values(&[name]);
+                last_report.set(camera.last_report_ms.div_euclid(1000));
+            }
             if let Some(persons) = camera.persons {
                 self.persons.with_label_values(&[name]).set(number(persons));
+                if !camera.lines.is_empty() {
+                    let is_too_low = camera.too_low_since_ms.is_some();
+                    self.too_low
+                        .with_label_values(&[name])
+                        .set(is_too_low.into());
+                }
             }
             for line in &camera.lines {
                 let labels = [name, line.line.as_str(), line.direction.as_str()];

@@ -36,8 +36,8 @@ use crate::{
 /// Longest time for the last transaction.
 const LAST_COMMIT: Duration = Duration::from_secs(10);
 
-/// Returns the reason why the reports of a camera are not counted, if they are not.
-type NotCounted = Box<dyn Fn(&str) -> Option<String> + Send + Sync>;
+/// Returns the sentence about a camera that is not counted, or whose counts may be too low.
+type CountWarning = Box<dyn Fn(&str) -> Option<String> + Send + Sync>;
 
 /// The running counts, for a server that answers with them.
 pub struct Started {
@@ -45,8 +45,8 @@ pub struct Started {
     pub routes: Router,
     /// Returns all metrics in the text format of Prometheus.
     pub metrics: Box<dyn Fn() -> Vec<u8> + Send + Sync>,
-    /// Returns the reason why the reports of a camera are not counted now.
-    pub not_counted: NotCounted,
+    /// Returns the reason why a camera is not counted now, or why its counts may be too low.
+    pub warning: CountWarning,
 }
 
 /// The reason why nothing is counted.
@@ -126,9 +126,9 @@ pub async fn count(
         |listener| serve_alone(listener, options, counts.clone(), &counter, &metrics);
     let _serving = listener.map(own_listener);
     let (shown, shown_counter) = (Arc::clone(&metrics), Arc::clone(&counter));
-    let dropping = Arc::clone(&counter);
+    let warned = Arc::clone(&counter);
     started(Started {
-        not_counted: Box::new(move |camera| dropping.lock().drops().reason(camera)),
+        warning: Box::new(move |camera| warned.lock().warning(camera)),
         routes: counts,
         metrics: Box::new(move || {
             shown.text(&shown_counter.lock(), Timestamp::now().as_millisecond())

@@ -176,6 +176,7 @@ impl Scene {
         let reporting = &mut self.cameras[camera];
         reporting.late_since = None;
         reporting.advance_zones(time, sums);
+        reporting.advance_rate(time, sums);
         let own = if is_site {
             let own = tracks
                 .iter()

@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     definition::CameraDefinition,
     definition_key::DefinitionKey,
+    frame_rate::FrameRate,
     now::{LogPause, Now},
     presence::Presence,
     report::ReportKey,
@@ -38,6 +39,7 @@ pub(crate) struct SceneCamera {
     lines: LineCounter,
     zones: ZoneCounter,
     pub(crate) presence: Presence,
+    rate: FrameRate,
     /// Persons in each zone at the last report of this camera.
     zone_persons: Vec<u64>,
     /// The last report of this camera, counted or not.
@@ -83,6 +85,7 @@ impl SceneCamera {
             lines: line_counter(&definition, LineState::default()),
             zones: zone_counter(&definition, ZoneState::default()),
             presence: Presence::default(),
+            rate: FrameRate::default(),
             zone_persons: vec![0; definition.zones.len()],
             last_report: None,
             arrived: None,
@@ -123,6 +126,7 @@ impl SceneCamera {
     pub(crate) fn redefine(&mut self, definition: Arc<CameraDefinition>) {
         *self = Self {
             presence: self.presence,
+            rate: self.rate,
             last_report: self.last_report,
             arrived: self.arrived,
             late_since: self.late_since,
@@ -164,6 +168,20 @@ impl SceneCamera {
 
     pub(crate) fn presence(&self) -> &Presence {
         &self.presence
+    }
+
+    /// Returns the rate of the frames, if the camera has lines, which need a certain one.
+    pub(crate) fn rate(&self) -> Option<FrameRate> {
+        (!self.definition.lines.is_empty()).then_some(self.rate)
+    }
+
+    /// Adds the time since the last report to that with too few frames, if it had too few.
+    pub(crate) fn advance_rate(&mut self, time: ReportTime, sums: &mut Sums) {
+        let known = self.presence.known(time);
+        let slow = known.filter(|known| self.rate.add(*known) && self.rate().is_some());
+        for (minute, length_ms) in slow.into_iter().flat_map(TimeSpan::minutes) {
+            *sums.slow.entry((self.name.clone(), minute)).or_default() += length_ms;
+        }
     }
 
     /// Returns each zone with its persons now.

@@ -21,8 +21,12 @@ pub struct CameraSnapshot {
     pub name: String,
     /// Time of the last frame, milliseconds since the Unix epoch.
     pub last_report_ms: i64,
+    /// True for a camera of this process that is paused.
+    pub is_paused: bool,
     /// Persons now; `None` while unknown.
     pub persons: Option<u64>,
+    /// Time since which its lines have too few frames, milliseconds since the Unix epoch.
+    pub too_low_since_ms: Option<i64>,
     /// The directions of its lines.
     pub lines: Vec<LineSnapshot>,
     /// Its zones.
@@ -63,6 +67,12 @@ pub struct SiteSnapshot {
 }
 
 impl Counter {
+    /// Returns the reason why a camera is not counted now, or why its counts may be too low.
+    pub(crate) fn warning(&self, camera: &str) -> Option<String> {
+        let rate = || self.scene_of(camera)?.camera(camera)?.1.rate()?.warning();
+        self.drops().reason(camera).or_else(rate)
+    }
+
     /// Returns the current counts.
     pub(crate) fn snapshot(&self, now_ms: i64) -> Snapshot {
         let is_known = |last_ms: Option<i64>| {
@@ -84,7 +94,8 @@ impl Counter {
                 let Some(last_report_ms) = presence.last_ms else {
                     continue;
                 };
-                let is_known = is_known(Some(last_report_ms));
+                let is_paused = self.is_paused(&camera.name);
+                let is_known = is_known(Some(last_report_ms)) && !is_paused;
                 let directions = camera
                     .definition
                     .lines
@@ -126,7 +137,12 @@ impl Counter {
                 snapshot.cameras.push(CameraSnapshot {
                     name: camera.name.clone(),
                     last_report_ms,
+                    is_paused,
                     persons: is_known.then_some(presence.persons),
+                    too_low_since_ms: camera
+                        .rate()
+                        .filter(|_| is_known)
+                        .and_then(|rate| rate.too_low_since_ms),
                     lines: lines.collect(),
                     zones: zones.collect(),
                 });

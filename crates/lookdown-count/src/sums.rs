@@ -38,6 +38,8 @@ pub(crate) type Period = i64;
 pub(crate) struct Sums {
     /// Known time and persons per minute.
     pub(crate) presence: BTreeMap<(Owner, Period), PresenceSum>,
+    /// Milliseconds with fewer frames than lines need, per camera and minute.
+    pub(crate) slow: BTreeMap<(String, Period), u64>,
     /// Crossings per camera, line, direction and minute.
     pub(crate) crossings: BTreeMap<(LineDirection, Period), u64>,
     /// Sums per camera, zone and minute.
@@ -103,6 +105,12 @@ pub(crate) struct ZoneTotal {
 }
 
 impl Totals {
+    /// Removes those of a camera.
+    pub(crate) fn remove(&mut self, camera: &str) {
+        self.crossings.retain(|of, _| of.camera != camera);
+        self.zones.retain(|of, _| of.camera != camera);
+    }
+
     /// Adds sums.
     pub(crate) fn add(&mut self, sums: &Sums) {
         for ((of, _), crossings) in &sums.crossings {
@@ -117,6 +125,16 @@ impl Totals {
 }
 
 impl Sums {
+    /// Removes those of a camera.
+    pub(crate) fn remove(&mut self, camera: &str) {
+        let owner = Owner::Camera(camera.to_owned());
+        self.presence.retain(|(of, _), _| *of != owner);
+        self.slow.retain(|(of, _), _| of != camera);
+        self.crossings.retain(|(of, _), _| of.camera != camera);
+        self.zones.retain(|(of, _), _| of.camera != camera);
+        self.cells.retain(|(of, ..), _| *of != owner);
+    }
+
     /// Adds other sums.
     pub(crate) fn add(&mut self, other: Self) {
         for (key, sum) in other.presence {
@@ -124,6 +142,9 @@ impl Sums {
             own.known_ms += sum.known_ms;
             own.person_ms += sum.person_ms;
             own.most = own.most.max(sum.most);
+        }
+        for (key, milliseconds) in other.slow {
+            *self.slow.entry(key).or_default() += milliseconds;
         }
         for (key, crossings) in other.crossings {
             *self.crossings.entry(key).or_default() += crossings;

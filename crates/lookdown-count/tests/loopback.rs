@@ -178,6 +178,7 @@ async fn steps_add_up_and_a_gap_is_unknown() {
             assert!(value.is_null(), "{field} is {value}");
         }
         assert_eq!(steps[0]["known_seconds"], 60.0);
+        assert_eq!(steps[0]["slow_seconds"], 0.0);
         let mean = steps[1]["persons"]["mean"].as_f64().unwrap();
         assert!((0.8..1.4).contains(&mean), "{mean}");
 
@@ -187,7 +188,7 @@ async fn steps_add_up_and_a_gap_is_unknown() {
         let mut lines = csv.lines();
         assert_eq!(
             lines.next().unwrap(),
-            "from,to,known_seconds,persons_mean,persons_max,line.door.in,line.door.out,\
+            "from,to,known_seconds,slow_seconds,persons_mean,persons_max,line.door.in,line.door.out,\
              zone.middle.entries,zone.middle.mean,zone.middle.max,zone.middle.visits,\
              zone.middle.dwell_seconds"
         );

@@ -108,7 +108,7 @@ impl Choice {
         let wanted = COUNTING_EVERY.as_secs_f64().recip();
         let since = since.strftime("%H:%M");
         Some(format!(
-            "counts may be too low since {since}: the machine is too slow for {wanted} frames/s; now {self}"
+            "counts may be too low since {since}: the machine is too slow for {wanted} frames/s; now {self}: send fewer cameras to it, or give it more cores"
         ))
     }
 }

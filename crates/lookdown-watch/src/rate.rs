@@ -72,13 +72,13 @@ impl Rate {
         let (reason, remedies) = if self.is_server_slow {
             (
                 "the machine is too slow",
-                "choose a faster profile or a lower rate (`every`) for the camera, or leave both \
-                 out; or send fewer cameras to this server, or give it more cores",
+                "set Rate and Profile of the camera to automatic (leave out `every` and `profile`); \
+                 or send fewer cameras to this server, or give it more cores",
             )
         } else if self.is_camera_slow {
             (
                 "the camera sends fewer frames",
-                "raise the frame rate of the camera, or choose a lower rate (`every`) for it",
+                "raise the frame rate of the camera, or choose a lower Rate (`every`) for it",
             )
         } else {
             return None;
@@ -119,7 +119,7 @@ mod tests {
             warning.starts_with("3.2 of 5.0 frames per second"),
             "{warning}"
         );
-        for remedy in ["faster profile", "lower rate (`every`)", "more cores"] {
+        for remedy in ["Rate and Profile", "automatic", "more cores"] {
             assert!(warning.contains(remedy), "{warning}");
         }
     }

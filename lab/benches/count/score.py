@@ -195,7 +195,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--binary", default=ROOT / "target/debug/examples/simulate")
     parser.add_argument("--seeds", type=int, nargs="+", default=list(range(101, 107)))
-    parser.add_argument("--rates", type=int, nargs="+", default=RATES)
+    parser.add_argument("--rates", type=float, nargs="+", default=RATES)
     parser.add_argument("--detectors", nargs="+", default=["rendered", "photographs"])
     parser.add_argument("--persons", type=int, default=8)
     parser.add_argument("--seconds", type=int, default=240)

@@ -3,7 +3,7 @@
 mod rows;
 pub(in crate::api) mod suggestion;
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Duration};
 
 use axum::{
     Json,
@@ -16,6 +16,7 @@ use axum::{
 };
 use lookdown_common::Secret;
 use serde::{Deserialize, de::DeserializeOwned};
+use tokio::time::{sleep, timeout};
 use utoipa::ToSchema;
 
 use self::rows::{CameraInfo, rows};
@@ -29,12 +30,16 @@ use crate::{
         },
         openapi::RawBytes,
         require_scope::{RequireAdmin, RequireRead},
+        routes::counts,
     },
     cameras::{CameraError, Cameras, StoredCamera},
 };
 
 /// Largest description of a camera.
 const MAX_BYTES: usize = 16 << 10;
+/// Longest wait for the end of a deleted camera, and the interval of the checks.
+const END_TIMEOUT: Duration = Duration::from_secs(10);
+const END_CHECK: Duration = Duration::from_millis(100);
 
 /// A camera to add, to change or to test.
 #[derive(Deserialize, ToSchema)]
@@ -208,7 +213,8 @@ pub(in crate::api) async fn patch(
 
 /// Delete a camera
 ///
-/// Deletes the camera with its password. Its reports and counts stay.
+/// Deletes the camera with its password and its reports. The history of its counts stays until
+/// `DELETE /counts/{camera}`.
 #[utoipa::path(
     delete, path = "/cameras/{camera}", tag = "cameras", operation_id = "delete_camera",
     params(("camera" = String, Path, description = "The name of the camera.", example = "hall")),
@@ -226,6 +232,16 @@ pub(in crate::api) async fn delete(
     if !using_files(&state, deadline, delete).await? {
         return Err(unknown());
     }
+    // Until its end, the camera would return with its next report.
+    let cameras = cameras(&state)?;
+    let ended = async {
+        while cameras.is_watched(&name) {
+            sleep(END_CHECK).await;
+        }
+    };
+    let _ = timeout(END_TIMEOUT, ended).await;
+    state.results.delete(&name).await?;
+    counts::remove(&state, &name).await;
     tracing::info!(camera = name, "the camera was deleted");
     Ok(StatusCode::NO_CONTENT)
 }

@@ -15,7 +15,7 @@ use axum::{
     routing::{get, put},
 };
 use lookdown_common::ServerClient;
-use percent_encoding::percent_decode_str;
+use percent_encoding::{NON_ALPHANUMERIC, percent_decode_str, utf8_percent_encode};
 use reqwest::RequestBuilder;
 use serde::Deserialize;
 use tower::ServiceExt;
@@ -52,12 +52,13 @@ struct Failure {
 
 /// Returns the routes of the counts and the furniture. docs/count.md describes them.
 pub(in crate::api) fn router() -> Router<ApiState> {
-    let paths = ["/counts", "/counts/{*path}", "/sites/{*path}"];
+    let paths = ["/counts", "/sites/{*path}"];
     let router = paths
         .into_iter()
         .fold(Router::new(), |router, path| router.route(path, get(read)));
     let thing = "/cameras/{camera}/furniture/{thing}";
     router
+        .route("/counts/{*path}", get(read).delete(change))
         .route("/cameras/{camera}/furniture", get(read))
         .route(thing, put(change).delete(change))
 }
@@ -76,6 +77,16 @@ async fn change(
     request: Request,
 ) -> Result<Response, Problem> {
     answer(&state, request).await
+}
+
+/// Removes a camera from the counts, which keep its history. Returns false if they do not have it.
+pub(in crate::api) async fn remove(state: &ApiState, camera: &str) -> bool {
+    let camera = utf8_percent_encode(camera, NON_ALPHANUMERIC);
+    let request = Request::delete(format!("/counts/{camera}?keep_history=true"));
+    match request.body(Body::empty()) {
+        Ok(request) => answer(state, request).await.is_ok(),
+        Err(_) => false,
+    }
 }
 
 async fn answer(state: &ApiState, request: Request) -> Result<Response, Problem> {

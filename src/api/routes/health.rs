@@ -194,22 +194,28 @@ async fn read_gauges(state: &ApiState) {
     }
 }
 
-/// Sets the metrics of the cameras in the result store, and removes those of others.
+/// Sets the metrics of the cameras in the result store, and removes those of others and of paused
+/// ones.
 async fn read_cameras(state: &ApiState) {
     if !(state.options.zone_metrics || state.options.camera_metrics) {
         return;
     }
-    let Ok(latest) = state.results.latest_of_all().await else {
+    let Ok(mut latest) = state.results.latest_of_all().await else {
         return;
     };
+    let own = state.options.companions.own_cameras();
+    latest.retain(|report| !own.is_paused(&report.report.camera));
     let cameras = latest.iter().map(|report| report.report.camera.clone());
     state.metrics.retain_cameras(&cameras.collect::<Vec<_>>());
     for report in latest.iter().filter(|_| state.options.camera_metrics) {
-        let Ok(headline) = Headline::of(&*state.results, report).await else {
+        let Ok(headline) = Headline::of(&*state.results, report, &own).await else {
             return;
+        };
+        let Some(persons) = headline.persons else {
+            continue;
         };
         let at = report.id.time().as_duration().as_secs_f64();
         let camera = &report.report.camera;
-        state.metrics.set_camera(camera, headline.persons, at);
+        state.metrics.set_camera(camera, persons, at);
     }
 }

@@ -46,10 +46,11 @@ pub(in crate::api) async fn list(
     _reader: RequireRead,
 ) -> Result<impl IntoResponse, Problem> {
     let now = Timestamp::now();
+    let own = state.options.companions.own_cameras();
     let latest = state.results.latest_of_all().await?;
     let mut rows = Vec::with_capacity(latest.len());
     for report in &latest {
-        let headline = Headline::of(&*state.results, report).await?;
+        let headline = Headline::of(&*state.results, report, &own).await?;
         rows.push(CameraRow::at(report, headline, now));
     }
     rows.sort_unstable_by(|one, other| one.camera.cmp(&other.camera));

@@ -24,7 +24,7 @@ fn cameras(most: usize) -> Cameras {
 fn cameras_with(discovery: Discovery, most: usize) -> Cameras {
     let most = NonZeroUsize::new(most).unwrap();
     let own = OwnCameras::default();
-    own.set(["own".to_owned()].into());
+    own.set([("own".to_owned(), false)].into());
     Cameras::new(topics(), discovery, HOLD, most, own)
 }
 
@@ -67,6 +67,17 @@ fn expected(messages: &[(&str, &str)]) -> Vec<(String, String)> {
     messages
         .map(|(name, payload)| (topic(name), (*payload).to_owned()))
         .collect()
+}
+
+#[test]
+fn paused_camera_is_unavailable_at_once() {
+    let mut cameras = cameras(10);
+    update(&mut cameras, &report("own", 7, ""));
+    assert!(cameras.pause(Instant::now()).is_empty());
+    cameras.own.set([("own".to_owned(), true)].into());
+    let (messages, _) = published(&cameras.pause(Instant::now()));
+    assert_eq!(messages, expected(&[("own/availability", "offline")]));
+    assert!(cameras.pause(Instant::now()).is_empty());
 }
 
 #[test]

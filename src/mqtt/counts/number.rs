@@ -35,6 +35,11 @@ impl<'a> Owner<'a> {
         format!("{}/{AVAILABILITY}", self.path())
     }
 
+    /// The topic of the attributes of its number of persons, below `counts`.
+    pub(super) fn attributes(self) -> String {
+        format!("{}/attributes", self.path())
+    }
+
     /// The name of its device in Home Assistant, after the prefix of the topics.
     pub(super) fn device(self) -> String {
         match self {

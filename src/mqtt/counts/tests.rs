@@ -28,7 +28,9 @@ fn snapshot(persons: Option<u64>) -> Snapshot {
         cameras: vec![CameraSnapshot {
             name: "hall".to_owned(),
             last_report_ms: 0,
+            is_paused: false,
             persons,
+            too_low_since_ms: Some(60_000),
             lines: vec![LineSnapshot {
                 line: "door".to_owned(),
                 direction: "in".to_owned(),
@@ -55,6 +57,10 @@ fn totals_and_occupancy_are_published() {
     for (topic, payload) in [
         (format!("{base}/availability"), "online"),
         (format!("{base}/persons"), "3"),
+        (
+            format!("{base}/attributes"),
+            "{\"too_low_since\":\"1970-01-01T00:01:00Z\"}",
+        ),
         (format!("{base}/lines/door/in"), "12"),
         (format!("{base}/zones/till/persons"), "3"),
         (format!("{base}/zones/till/entries"), "7"),

@@ -67,9 +67,10 @@ pageTest(
     await card.getByRole("button", { name: "Resume" }).click();
     await card.getByRole("button", { name: "Pause" }).waitFor();
     page.on("dialog", (question) => question.accept());
+    await card.getByRole("button", { name: "Delete its history" }).click();
     await card.getByRole("button", { name: "Remove" }).click();
-    await card.getByRole("button", { name: "Remove" }).waitFor({ state: "detached" });
-    assert.equal((await fetch(`${RUN}/cameras/hall`)).status, 404);
+    await card.waitFor({ state: "detached" });
+    for (const address of ["cameras/hall", "results/hall/latest"]) assert.equal((await fetch(`${RUN}/${address}`)).status, 404);
   },
   { server: RUN, expected: /status of 4(04|22)/ },
 );

@@ -208,15 +208,21 @@ test("events are read as they are sent", () => {
   assert.deepEqual(parseEvent("data: one\ndata: two"), { id: "", data: "one\ntwo" });
 });
 
-test("a time without a number is a gap of the plot", () => {
+test("a time without a number is a gap of the plot, one with too few frames is marked", () => {
   const counted = [
     { from: "1970-01-01T00:00:00Z", persons: { mean: 1.6, max: 3 } },
     { from: "1970-01-01T00:01:00Z", persons: { mean: 2.1, max: 3 } },
     { from: "1970-01-01T00:02:00Z", persons: null },
-    { from: "1970-01-01T00:03:00Z", persons: { mean: 1, max: 1 } },
+    { from: "1970-01-01T00:03:00Z", persons: { mean: 1, max: 1 }, slow_seconds: 0 },
+    { from: "1970-01-01T00:04:00Z", persons: { mean: 1, max: 1 }, slow_seconds: 30 },
   ];
   const history = countedNumbers(counted);
-  assert.deepEqual(history, [{ time: 0, persons: 2 }, { time: 120_000, persons: null }, { time: 180_000, persons: 1 }]);
+  assert.deepEqual(history, [
+    { time: 0, persons: 2, slow: false },
+    { time: 120_000, persons: null, slow: false },
+    { time: 180_000, persons: 1, slow: false },
+    { time: 240_000, persons: 1, slow: true },
+  ]);
   const path = steps(history, (time) => time / 60_000, (persons) => persons);
-  assert.equal(path, "M0.0 2.0H2.0M3.0 1.0");
+  assert.equal(path, "M0.0 2.0H2.0M3.0 1.0H4.0V1.0");
 });

@@ -57,6 +57,27 @@ impl Counter {
         self.has_news = true;
     }
 
+    /// Returns true for a camera of this process that is paused.
+    pub(crate) fn is_paused(&self, camera: &str) -> bool {
+        self.options.own.is_paused(camera)
+    }
+
+    /// Stops following a camera, and forgets its totals and the sums that are not stored yet unless
+    /// its history is kept. Returns false for a camera that is not followed.
+    pub(crate) fn remove(&mut self, camera: &str, keeps_history: bool) -> bool {
+        self.drops.remove(camera);
+        if !keeps_history {
+            self.totals.remove(camera);
+            self.stored_totals.remove(camera);
+            self.sums.remove(camera);
+        }
+        let owner = self.owners.get(camera).cloned();
+        if let Some(owner) = &owner {
+            self.forget(owner, camera);
+        }
+        owner.is_some()
+    }
+
     /// Removes cameras without a report in the day before the newest report, so that others have
     /// their place. A report of the future does not count. Their counts stay in the store.
     pub(crate) fn forget_silent(&mut self, now_ms: i64) {

@@ -5,7 +5,7 @@ use std::time::Instant;
 use lookdown_calibration::CalibrationFile;
 
 use super::*;
-use crate::report::other_fields::OF_REPORT;
+use crate::{metrics::Metrics, report::other_fields::OF_REPORT};
 
 const START_MS: i64 = 1_795_262_400_000;
 
@@ -22,7 +22,9 @@ fn report(camera: &str, second: i64) -> ReceivedReport {
 fn calibrated() -> Arc<CameraDefinition> {
     let text = br#"{"id": "c", "image": {"width": 200, "height": 200},
         "lens": {"model": "equidistant", "focal": 63.7, "cx": 99.5, "cy": 99.5,
-                 "max_theta": 1.5708}, "mount": {"world_up": [0, 0, -1]}}"#;
+                 "max_theta": 1.5708}, "mount": {"world_up": [0, 0, -1]},
+        "lines": [{"name": "door", "frame_px": [[50, 50], [150, 150]],
+                   "directions": ["in", "out"]}]}"#;
     let file = CalibrationFile::parse(text).unwrap();
     let (_, calibration) = file.calibrations("c", text).remove(0);
     let key = report("c", 0).definition_key();
@@ -42,7 +44,7 @@ impl Places {
             max_cameras: 4,
             own: OwnCameras::default(),
         };
-        options.own.set(["hall".to_owned()].into());
+        options.own.set([("hall".to_owned(), false)].into());
         Self {
             counter: Counter::new(options, 0, Totals::default()),
             began: Instant::now(),
@@ -93,6 +95,65 @@ fn camera_with_a_calibration_displaces_names() {
         places.counts(&format!("y{number}"), 20 + number, &unknown);
     }
     assert!(places.counter.scene_of("gate").is_some());
+}
+
+#[test]
+fn slow_frames_are_marked_for_cameras_with_lines() {
+    let mut places = Places::new();
+    let unknown = Arc::new(CameraDefinition::unknown());
+    for second in 0..60 {
+        places.counts("gate", second, &calibrated());
+        places.counts("hall", second, &unknown);
+    }
+    let snapshot = places.counter.snapshot(START_MS + 60_000);
+    let [gate, hall] = &snapshot.cameras[..] else {
+        panic!("{snapshot:?}")
+    };
+    let since_ms = gate.too_low_since_ms.unwrap() - START_MS;
+    assert!((1_000..10_000).contains(&since_ms), "{since_ms}");
+    assert_eq!(hall.too_low_since_ms, None);
+    let slow: u64 = places.counter.sums.slow.values().sum();
+    assert_eq!(slow, 59_000 - since_ms.unsigned_abs());
+    let warning = places.counter.warning("gate").unwrap();
+    assert!(warning.contains("1.0 frames/s become reports"), "{warning}");
+    assert_eq!(places.counter.warning("hall"), None);
+}
+
+#[test]
+fn paused_camera_has_no_present_number() {
+    let mut places = Places::new();
+    places.counts("hall", 0, &calibrated());
+    for is_paused in [false, true] {
+        let own = &places.counter.options.own;
+        own.set([("hall".to_owned(), is_paused)].into());
+        let hall = &places.counter.snapshot(START_MS).cameras[0];
+        assert_eq!(hall.persons, (!is_paused).then_some(0));
+        let metrics = Metrics::new().unwrap().text(&places.counter, START_MS);
+        let metrics = String::from_utf8(metrics).unwrap();
+        let shown = metrics.contains("lookdown_count_last_report_timestamp_seconds{");
+        assert_eq!(shown, !is_paused, "{metrics}");
+        assert_eq!(
+            metrics.contains("lookdown_count_too_low{camera=\"hall\"} 0"),
+            !is_paused
+        );
+    }
+}
+
+#[test]
+fn removed_camera_leaves_the_current_counts() {
+    let mut places = Places::new();
+    for camera in ["hall", "gate"] {
+        places.counts(camera, 0, &calibrated());
+    }
+    assert!(places.counter.remove("hall", true));
+    assert_eq!(places.counter.snapshot(START_MS).cameras.len(), 1);
+    let presence = |counter: &Counter| counter.sums.presence.len();
+    assert_eq!(presence(&places.counter), 2, "the history is kept");
+    assert!(!places.counter.remove("hall", false));
+    assert_eq!(presence(&places.counter), 1);
+    let batch = places.counter.take_batch().unwrap();
+    let gone = batch.scenes.iter().filter(|(_, state)| state.is_none());
+    assert_eq!(gone.count(), 1);
 }
 
 #[test]

@@ -1,9 +1,8 @@
 //! Counts per step as JSON and CSV.
 
-use std::{
-    collections::{BTreeMap, BTreeSet},
-    fmt::Write as _,
-};
+mod csv;
+
+use std::collections::{BTreeMap, BTreeSet};
 
 use axum::{
     Json,
@@ -14,6 +13,7 @@ use axum::{
     },
     response::{IntoResponse, Response},
 };
+use csv::csv;
 use jiff::Timestamp;
 use lookdown_common::text::{one_line, shortened, with_causes};
 use lookdown_http::problem::Problem;
@@ -63,6 +63,11 @@ struct StepCounts {
     to: Timestamp,
     /// Seconds of the step in which reports arrived.
     known_seconds: f64,
+    /// Seconds of those with fewer frames than lines need, so that crossings may be missed; absent
+    /// for a site.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    slow_seconds: Option<f64>,
     persons: Option<PersonCounts>,
     /// Crossings by line and direction; absent for a site.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -294,59 +299,13 @@ fn step_counts(
         from: time_of(time.from_ms),
         to: time_of(time.to_ms),
         known_seconds: ratio(known_ms, 1000),
+        slow_seconds: is_camera.then(|| ratio(step.slow_ms, 1000)),
         persons: is_known.then(|| PersonCounts {
             mean: thousandths(ratio(step.presence.person_ms, known_ms)),
             max: step.presence.most,
         }),
         zones: is_camera.then(|| zone_counts.collect()),
         lines: is_camera.then_some(line_counts),
-    }
-}
-
-/// Writes the counts as a table. Unknown counts are empty cells.
-fn csv(counts: &Counts) -> String {
-    let mut text = "from,to,known_seconds,persons_mean,persons_max".to_owned();
-    let first = counts.steps.first();
-    let lines = first.and_then(|step| step.lines.as_ref());
-    for (line, directions) in lines.into_iter().flatten() {
-        for direction in directions.keys() {
-            let _ = write!(text, ",line.{line}.{direction}");
-        }
-    }
-    let zones = first.and_then(|step| step.zones.as_ref());
-    for zone in zones.into_iter().flat_map(BTreeMap::keys) {
-        for column in ["entries", "mean", "max", "visits", "dwell_seconds"] {
-            let _ = write!(text, ",zone.{zone}.{column}");
-        }
-    }
-    text.push_str("\r\n");
-    for step in &counts.steps {
-        let _ = write!(text, "{},{},{}", step.from, step.to, step.known_seconds);
-        let persons = step.persons.as_ref();
-        cell(&mut text, persons.map(|persons| persons.mean));
-        cell(&mut text, persons.map(|persons| persons.max));
-        for directions in step.lines.iter().flat_map(BTreeMap::values) {
-            for crossings in directions.values() {
-                cell(&mut text, *crossings);
-            }
-        }
-        for zone in step.zones.iter().flat_map(BTreeMap::values) {
-            let zone = zone.as_ref();
-            cell(&mut text, zone.map(|zone| zone.entries));
-            cell(&mut text, zone.map(|zone| zone.mean));
-            cell(&mut text, zone.map(|zone| zone.max));
-            cell(&mut text, zone.map(|zone| zone.visits));
-            cell(&mut text, zone.and_then(|zone| zone.dwell_seconds));
-        }
-        text.push_str("\r\n");
-    }
-    text
-}
-
-fn cell(text: &mut String, value: Option<impl std::fmt::Display>) {
-    text.push(',');
-    if let Some(value) = value {
-        let _ = write!(text, "{value}");
     }
 }
 

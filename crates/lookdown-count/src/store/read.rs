@@ -51,6 +51,8 @@ impl Span {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Step {
     pub(crate) presence: PresenceSum,
+    /// Milliseconds with fewer frames than lines need.
+    pub(crate) slow_ms: u64,
     /// Crossings per line and direction.
     pub(crate) crossings: BTreeMap<(String, String), u64>,
     /// Sums per zone.
@@ -107,6 +109,15 @@ impl Store {
         let Owner::Camera(camera) = owner else {
             return Ok(Some(steps));
         };
+        let mut statement = connection.prepare_cached(
+            "SELECT (minute - ?2) / ?4, sum(slow_ms) FROM slow
+             WHERE camera = ?1 AND minute >= ?2 AND minute < ?3 GROUP BY 1",
+        )?;
+        let mut rows = statement.query(params![camera, from, to, step])?;
+        while let Some(row) = rows.next()? {
+            let slow_ms = row.get::<_, i64>(1)?.cast_unsigned();
+            steps.entry(row.get(0)?).or_default().slow_ms = slow_ms;
+        }
         let mut statement = connection.prepare_cached(
             "SELECT (minute - ?2) / ?4, line, direction, sum(crossings) FROM crossings
              WHERE camera = ?1 AND minute >= ?2 AND minute < ?3 GROUP BY 1, 2, 3",

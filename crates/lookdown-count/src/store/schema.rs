@@ -13,6 +13,8 @@ CREATE TABLE IF NOT EXISTS calibrations (
 CREATE TABLE IF NOT EXISTS presence (
   owner TEXT, minute INTEGER, known_ms INTEGER NOT NULL, person_ms INTEGER NOT NULL, most INTEGER NOT NULL,
   PRIMARY KEY (owner, minute)) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS slow (
+  camera TEXT, minute INTEGER, slow_ms INTEGER NOT NULL, PRIMARY KEY (camera, minute)) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS crossings (
   camera TEXT, line TEXT, direction TEXT, minute INTEGER, crossings INTEGER NOT NULL,
   PRIMARY KEY (camera, minute, line, direction)) WITHOUT ROWID;

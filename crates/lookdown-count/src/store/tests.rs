@@ -35,11 +35,37 @@ fn batch(minute: i64, last_event: u64) -> Batch {
     let cell = Cell { column: -3, row: 4 };
     batch.sums = Sums {
         presence: [((hall.clone(), minute), presence)].into(),
+        slow: [(("hall".to_owned(), minute), 5_000)].into(),
         crossings: [((door, minute), 2)].into(),
         zones: [((till, minute), zone)].into(),
         cells: [((hall, 0, cell), 500)].into(),
     };
     batch
+}
+
+#[test]
+fn removed_camera_has_no_sums() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(&folder.path().join("counts.sqlite")).unwrap();
+    store.commit(&batch(0, 7), &[], None).unwrap();
+    let hall = Owner::Camera("hall".to_owned());
+    store.remove("gate").unwrap();
+    assert!(store.has(&hall).unwrap());
+    store.remove("hall").unwrap();
+    assert!(!store.has(&hall).unwrap());
+    let tables = [
+        "cells",
+        "slow",
+        "crossings",
+        "zones",
+        "line_totals",
+        "zone_totals",
+    ];
+    for table in tables {
+        let rows = format!("SELECT count(*) FROM {table}");
+        let rows = store.reader.lock().query_row(&rows, [], |row| row.get(0));
+        assert_eq!(rows, Ok(0), "{table}");
+    }
 }
 
 #[test]
@@ -58,6 +84,7 @@ fn sums_of_batches_add_up_over_steps() {
     let steps = store.steps(&hall, span(15), 100).unwrap().unwrap();
     assert_eq!(steps.keys().copied().collect::<Vec<_>>(), [0, 1]);
     assert_eq!(steps[&0].presence.known_ms, 90_000);
+    assert_eq!(steps[&0].slow_ms, 15_000);
     assert!(store.steps(&hall, span(15), 3).unwrap().is_none());
     let whole = &store.steps(&hall, span(30), 100).unwrap().unwrap()[&0];
     assert_eq!(

@@ -101,6 +101,26 @@ impl Store {
         Ok(())
     }
 
+    /// Removes all sums of a camera. Blocks.
+    pub(crate) fn remove(&self, camera: &str) -> Result<(), StoreError> {
+        let owner = Owner::Camera(camera.to_owned()).key();
+        let mut connection = self.writer.lock();
+        let transaction = connection.transaction()?;
+        for (table, column, of) in [
+            ("presence", "owner", owner.as_str()),
+            ("cells", "owner", &owner),
+            ("slow", "camera", camera),
+            ("crossings", "camera", camera),
+            ("zones", "camera", camera),
+            ("line_totals", "camera", camera),
+            ("zone_totals", "camera", camera),
+        ] {
+            let statement = format!("DELETE FROM {table} WHERE {column} = ?");
+            transaction.execute(&statement, [of])?;
+        }
+        Ok(transaction.commit()?)
+    }
+
     /// Removes sums of minutes and days that ended before this time: those of the oldest day at
     /// most, so that a clock that is ahead for a while does not remove all of them. Blocks.
     pub(crate) fn expire(&self, before_ms: i64) -> Result<(), StoreError> {
@@ -111,6 +131,7 @@ impl Store {
         let transaction = connection.transaction()?;
         for (table, column, before, at_most) in [
             ("presence", "minute", minute, MINUTES_OF_A_DAY),
+            ("slow", "minute", minute, MINUTES_OF_A_DAY),
             ("crossings", "minute", minute, MINUTES_OF_A_DAY),
             ("zones", "minute", minute, MINUTES_OF_A_DAY),
             ("cells", "day", day, 1),
@@ -135,6 +156,13 @@ fn add(transaction: &Transaction<'_>, sums: &Sums) -> rusqlite::Result<()> {
         let [known_ms, person_ms, most] =
             [sum.known_ms, sum.person_ms, sum.most].map(u64::cast_signed);
         presence.execute(params![owner.key(), minute, known_ms, person_ms, most])?;
+    }
+    let mut slow = transaction.prepare_cached(
+        "INSERT INTO slow VALUES (?, ?, ?) ON CONFLICT DO UPDATE SET
+         slow_ms = slow_ms + excluded.slow_ms",
+    )?;
+    for ((camera, minute), slow_ms) in &sums.slow {
+        slow.execute(params![camera, minute, slow_ms.cast_signed()])?;
     }
     let mut crossings = transaction.prepare_cached(
         "INSERT INTO crossings VALUES (?, ?, ?, ?, ?) ON CONFLICT DO UPDATE SET

@@ -105,8 +105,9 @@ pub(super) async fn rows(
     }
     for row in &mut rows {
         row.suggestion = suggestion::state_of(state, &row.name);
-        let not_counted = || state.options.companions.not_counted(&row.name);
-        row.warning = row.warning.take().or_else(not_counted);
+        let of_counts = || state.options.companions.count_warning(&row.name);
+        let of_counts = || (!row.paused).then(of_counts).flatten();
+        row.warning = row.warning.take().or_else(of_counts);
     }
     rows.sort_unstable_by(|one, other| one.name.cmp(&other.name));
     Ok(rows)

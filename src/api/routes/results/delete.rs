@@ -3,12 +3,12 @@
 use axum::{extract::State, http::StatusCode};
 
 use super::{address::CameraAddress, unknown};
-use crate::api::{ApiState, http::problem::Problem, require_scope::RequireAdmin};
+use crate::api::{ApiState, http::problem::Problem, require_scope::RequireAdmin, routes::counts};
 
 /// Delete a camera's reports
 ///
-/// Deletes all stored reports of a camera and its image. Home Assistant removes its entities. The
-/// camera returns with its next frame.
+/// Deletes all stored reports of a camera and its image. Home Assistant removes its entities, and
+/// the counts keep its history only. The camera returns with its next frame.
 #[utoipa::path(
     delete, path = "/results/{camera}", tag = "results", operation_id = "delete_results",
     params(("camera" = String, Path, description = "The name of the camera.", example = "lobby")),
@@ -20,7 +20,9 @@ pub(in crate::api) async fn delete(
     _admin: RequireAdmin,
     CameraAddress(camera): CameraAddress,
 ) -> Result<StatusCode, Problem> {
-    if state.results.delete(&camera).await? {
+    let had_reports = state.results.delete(&camera).await?;
+    // The counts may know a camera that has had no frame since the start of the server.
+    if counts::remove(&state, &camera).await || had_reports {
         tracing::info!(camera, "all reports of the camera were deleted");
         Ok(StatusCode::NO_CONTENT)
     } else {

@@ -22,10 +22,10 @@ pub(in crate::api) struct CameraRow {
     #[schema(minimum = 0, example = 0.731)]
     age_seconds: f64,
     /// Number of persons there now: the followed persons while `lookdown count` hands their number
-    /// back, else the median of the reports of the last 5 s.
+    /// back, else the median of the reports of the last 5 s; `null` while the camera is paused.
     #[schema(example = 3)]
-    persons: usize,
-    /// The origin of `persons`: `tracks` or `median`.
+    persons: Option<usize>,
+    /// The origin of `persons`: `tracks`, `median` or `paused`.
     #[schema(example = "median")]
     persons_source: &'static str,
     /// Number of persons in the latest report.

@@ -7,6 +7,8 @@ fn snapshot(crossings: u64, persons: Option<u64>) -> Snapshot {
         cameras: vec![CameraSnapshot {
             name: "hall".to_owned(),
             last_report_ms: 1_000,
+            is_paused: false,
+            too_low_since_ms: None,
             persons,
             lines: vec![LineSnapshot {
                 line: "door".to_owned(),

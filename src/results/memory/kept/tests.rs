@@ -199,7 +199,7 @@ fn a_deleted_camera_leaves_the_others() {
 #[test]
 fn own_camera_stays_among_many_names() {
     let mut kept = kept([2, 3, 1000, 1 << 20]);
-    kept.own.set(["hall".to_owned()].into());
+    kept.own.set([("hall".to_owned(), false)].into());
     let own = add_with_image(&mut kept, "hall");
     for number in 0..5 {
         add_with_image(&mut kept, &format!("x{number}"));
