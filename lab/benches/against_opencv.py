@@ -1,6 +1,6 @@
 """Compares the rendering of views with OpenCV's remap (bilinear, fixed-point maps) and blobFromImages.
 
-`against_opencv.py [ROUNDS]`, after `scripts/setup.py benches`. Both sides render the same 24 views of the same
+`against_opencv.py [ROUNDS]`, after `packaging/scripts/setup.py benches`. Both sides render the same 24 views of the same
 frame at the same positions, on one thread each, in turns, view by view; the ratio is the median over all turns of
 ours / theirs, so that whatever else the machine does meets both. Prints JSON, one line per view size.
 """

@@ -1,7 +1,7 @@
 """Measures the CPU time and the memory of cameras from RTSP to counts, for five walkers and for an empty room.
 
 `camera_cost.py [--seconds N] [--rounds N] [--cameras N] [--form run|three] [--scene walkers|empty] [BINARY...]`, after
-`scripts/setup.py runtime model`, `cargo build --release`, and the installation of `ffmpeg`, `gir1.2-gst-rtsp-server-1.0`
+`packaging/scripts/setup.py runtime model`, `cargo build --release`, and the installation of `ffmpeg`, `gir1.2-gst-rtsp-server-1.0`
 and GStreamer's plugins; with `--file`, `ffmpeg` alone. The stream has 960² pixels and 10 frames per second. Five of them
 are processed with `fast`. `taskset -c 0,1 camera_cost.py --file` measures on two of the cores.
 "Walkers" is the rendered clip of `tests/real/walks`. "Empty" is the median of its frames with new noise in each

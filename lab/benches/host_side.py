@@ -1,6 +1,6 @@
 """Measures all of a frame but the network: decoding, rendering, merging, HTTP.
 
-`host_side.py [SECONDS]`, after `scripts/setup.py benches` and `cargo build --release -p lookdown -p lookdown-load`.
+`host_side.py [SECONDS]`, after `packaging/scripts/setup.py benches` and `cargo build --release -p lookdown -p lookdown-load`.
 The network costs nothing: it reads one value of each view and returns constant boxes, none or some. With boxes, the second pass has crops. The default models are measured for comparison. A frame's CPU time is that of
 the server's process in a closed loop; the rate of 16 cores is extrapolated from it. Prints JSON, one line per network
 and profile.

@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "scripts"))
+sys.path.insert(0, str(ROOT / "packaging" / "scripts"))
 
 from networks.graph import OnnxGraph  # noqa: E402
 from networks.half import HALF, store_halves  # noqa: E402

@@ -1,4 +1,4 @@
-//! The generated files: `config/lookdown.toml` and `docs/configuration.md`.
+//! The generated files: `packaging/lookdown.toml` and `docs/configuration.md`.
 
 use std::{fmt::Write as _, fs, path::Path};
 
@@ -24,7 +24,7 @@ Every setting with its key, environment variable, type and default. This page is
 
 * All commands read the same settings. Defaults apply first, then the file of `--config FILE`, then
   environment variables, then flags: `--set KEY=VALUE`, such as `--set limits.max_frames_in_flight=8`,
-  and `--listen ADDRESS:PORT` for `server.listen`. [config/lookdown.toml](../config/lookdown.toml) is
+  and `--listen ADDRESS:PORT` for `server.listen`. [packaging/lookdown.toml](../packaging/lookdown.toml) is
   a file with every key at its default.
 * `lookdown serve --check` reports whether a server can start with the chosen settings.
 * The lists `[[cameras]]` with `[camera_defaults]`, and `[[webhooks]]`, are in the file only:
@@ -135,7 +135,7 @@ fn assert_generated(file: &str, text: &str) {
 
 #[test]
 fn the_settings_file_is_generated() {
-    assert_generated("config/lookdown.toml", &settings_file());
+    assert_generated("packaging/lookdown.toml", &settings_file());
 }
 
 #[test]

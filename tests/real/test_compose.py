@@ -58,7 +58,7 @@ class ComposeFile(unittest.TestCase):
             self.assertIn(f"{provider['options']['path']}/{name}.json", mounted)
 
     def test_the_stop_timeout_covers_the_shutdown_of_the_server(self):
-        defaults = tomllib.loads((ROOT / "config" / "lookdown.toml").read_text(encoding="utf-8"))
+        defaults = tomllib.loads((ROOT / "packaging" / "lookdown.toml").read_text(encoding="utf-8"))
         millis = defaults["shutdown"]["grace_millis"] + defaults["server"]["request_timeout_millis"]
         given = self.services["lookdown"]["stop_grace_period"].removesuffix("s")
         self.assertGreater(int(given), millis / 1000)

@@ -14,7 +14,7 @@ from harness.places import LOOKDOWN, ROOT, SAMPLES
 from harness.processes import free_ports
 from state import wait_until
 
-SCRIPTS = ROOT / "scripts"
+SCRIPTS = ROOT / "packaging" / "scripts"
 LARGEST_EXPOSURE = 2.0
 SERVICE = "lookdown.service"
 STATE = "var/lib/private/lookdown"

@@ -22,7 +22,7 @@ from state import wait_until
 from support.lookdown import lookdown
 from test_count import OTHER_SECRET, SECRET, CountedCamera
 
-EXAMPLES = ROOT / "examples"
+EXAMPLES = ROOT / "docs" / "examples"
 OFFICE = SAMPLES / "office.jpg"
 METRIC = re.compile(r"\blookdown_\w+")
 SERIES = "# TYPE "

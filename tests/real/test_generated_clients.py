@@ -50,7 +50,7 @@ class GeneratedClients(unittest.TestCase):
     def test_the_example_in_typescript_compiles_and_prints_persons(self) -> None:
         (self.folder / "node_modules").symlink_to(MODULES)
         (self.folder / "package.json").write_text('{"type": "module"}', encoding="utf-8")
-        example = shutil.copy(ROOT / "examples" / "detect.ts", self.folder)
+        example = shutil.copy(ROOT / "docs" / "examples" / "detect.ts", self.folder)
         strict = [option for option in STRICT if option != "--noEmit"]
         self.succeeds(MODULES / ".bin/tsc", *strict, "--types", "node", "--typeRoots", MODULES / "@types", example)
         with lookdown({}) as server:

@@ -22,7 +22,7 @@ from cameras import empty_frame, http_camera, office_calibration
 HERE = Path(__file__).resolve().parent
 PYTHON = ROOT / ".setup" / "real" / "home_assistant" / "bin" / "python"
 RECIPES = ROOT / "docs" / "home-automation.md"
-CARD = ROOT / "examples" / "home_assistant_card.yaml"
+CARD = ROOT / "docs" / "examples" / "home_assistant_card.yaml"
 OFFICE = (SAMPLES / "office.jpg").read_bytes()
 DETECT = "/detect?calibration=office&profile=fast"
 NO_PERSONS = f"{DETECT}&score_threshold=1"

@@ -47,7 +47,7 @@ class Manifests(unittest.TestCase):
                 self.assertEqual(container[f"{probe}Probe"]["httpGet"], {"path": path, "port": "metrics"})
 
     def test_the_termination_period_covers_the_shutdown(self):
-        defaults = tomllib.loads((ROOT / "config" / "lookdown.toml").read_text(encoding="utf-8"))
+        defaults = tomllib.loads((ROOT / "packaging" / "lookdown.toml").read_text(encoding="utf-8"))
         millis = defaults["shutdown"]["grace_millis"] + defaults["server"]["request_timeout_millis"]
         for documents in self.all.values():
             pod = only(documents, "Deployment")["spec"]["template"]["spec"]

@@ -21,7 +21,7 @@ from cameras import Handler, serving
 
 HERE = Path(__file__).resolve().parent
 PYTHON = ROOT / ".setup" / "real" / "labelling" / "bin" / "python"
-EXAMPLES = ROOT / "examples"
+EXAMPLES = ROOT / "docs" / "examples"
 FAST = ("--profile", "fast", "--score-threshold", "0.3")
 TOKEN = "token-of-the-user"
 QUIET = os.environ | {"PYTHONDONTWRITEBYTECODE": "1", "MPLBACKEND": "agg"}

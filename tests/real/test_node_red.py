@@ -1,4 +1,4 @@
-"""The flow of examples/node-red.json in Node-RED: it sends snapshots of a camera and counts the persons."""
+"""The flow of docs/examples/node-red.json in Node-RED: it sends snapshots of a camera and counts the persons."""
 
 import contextlib
 import json
@@ -19,7 +19,7 @@ from support.lookdown import lookdown
 from cameras import Handler, serving
 
 HERE = Path(__file__).resolve().parent / "node_red"
-RECIPE = ROOT / "examples" / "node-red.json"
+RECIPE = ROOT / "docs" / "examples" / "node-red.json"
 OFFICE = SAMPLES / "office.jpg"
 COUNT = re.compile(r"\[debug:show\] (\d+)")
 PROBLEM = re.compile(r"\[debug:problem\]")

@@ -113,7 +113,7 @@ class PythonPackage(unittest.TestCase):
             self.assertGreater((self.folder / name).stat().st_size, 10_000)
 
     def test_a_calibration_is_found_in_frames_of_a_room(self):
-        example, room = ROOT / "examples" / "calibrate.py", self.folder / "room.png"
+        example, room = ROOT / "docs" / "examples" / "calibrate.py", self.folder / "room.png"
         room.write_bytes(rendered_room())
         said = self.checked(example, room)
         self.assertIn("lens measured", said)

@@ -6,8 +6,8 @@ use std::{
 };
 
 /// The folders whose files documents name in code style.
-const FOLDERS: [&str; 9] = [
-    "src/", "crates/", "tests/", "docs/", "scripts/", "docker/", "k8s/", "web/", "config/",
+const FOLDERS: [&str; 8] = [
+    "src/", "crates/", "tests/", "docs/", "docker/", "k8s/", "web/", "packaging/",
 ];
 
 /// Adds the Markdown files of a folder.

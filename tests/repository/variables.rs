@@ -5,20 +5,17 @@ use std::{collections::BTreeSet, fs, path::Path};
 use lookdown::settings::load;
 
 /// The folders and files that tell users how to set variables.
-const PLACES: [&str; 14] = [
+const PLACES: [&str; 11] = [
     "CONTRIBUTING.md",
     "Makefile",
     "README.md",
     "SECURITY.md",
-    "config",
     "docker",
     "docs",
-    "examples",
     "k8s",
     "lab/benches",
     "lab/training",
     "packaging",
-    "scripts",
     "web",
 ];
 const PREFIX: &str = "LOOKDOWN__";

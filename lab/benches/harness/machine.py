@@ -11,7 +11,7 @@ from .places import ROOT
 
 def made() -> dict:
     """Machine, versions, commit and time."""
-    pins = tomllib.loads((ROOT / "scripts" / "pins.toml").read_text(encoding="utf-8"))
+    pins = tomllib.loads((ROOT / "packaging" / "scripts" / "pins.toml").read_text(encoding="utf-8"))
     changed = bool(
         _said("git", "status", "--porcelain", "--untracked-files=no", "--", "src", "crates", "Cargo.lock", "models")
     )

@@ -10,7 +10,7 @@ RESULTS = BENCHES / "RESULTS.md"
 PEERS = BENCHES / "peers"
 SAMPLES = ROOT / "samples"
 PYTHONS = ROOT / ".setup" / "benches"
-"""The Python environments that `scripts/setup.py benches` makes."""
+"""The Python environments that `packaging/scripts/setup.py benches` makes."""
 WORK = PYTHONS / "work"
 """Generated files: frames, plans, logs."""
 

@@ -14,7 +14,7 @@ const SIZE: u32 = 416;
 /// Runs one of the repository's scripts in the converters' environment.
 fn script(name: &str, arguments: &[&Path]) {
     let output = Command::new(of_repository(".setup/venv/bin/python"))
-        .arg(of_repository("scripts").join(name))
+        .arg(of_repository("packaging/scripts").join(name))
         .args(arguments)
         .output()
         .unwrap();

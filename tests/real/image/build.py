@@ -50,7 +50,7 @@ class Image:
 def build(*targets: str) -> list[Image]:
     """Builds an image for each target of the Dockerfile. They stay until `remove` is called."""
     remove()
-    run(sys.executable, ROOT / "scripts" / "dist.py", LOOKDOWN)
+    run(sys.executable, ROOT / "packaging" / "scripts" / "dist.py", LOOKDOWN)
     _import_base("debian:12-slim")
     return [_build(target) for target in targets]
 

@@ -43,7 +43,7 @@ def label_studio(folder: Path) -> dict:
 
 def cvat(samples: Path, server: str) -> list:
     """The shapes that CVAT's driver makes of those of the example."""
-    spec = importlib.util.spec_from_file_location("cvat_function", ROOT / "examples" / "cvat_function.py")
+    spec = importlib.util.spec_from_file_location("cvat_function", ROOT / "docs" / "examples" / "cvat_function.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     function = module.create(server=server, calibration="office", profile="fast")

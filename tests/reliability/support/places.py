@@ -5,7 +5,7 @@ from harness.places import ROOT, SAMPLES
 __all__ = ["FIXTURES", "OFFICE", "OWN", "ROOT", "SAMPLES", "SCHEMATHESIS", "TINY_MODEL", "WORK"]
 
 OWN = ROOT / ".setup" / "reliability"
-"""Created by `scripts/setup.py reliability`."""
+"""Created by `packaging/scripts/setup.py reliability`."""
 SCHEMATHESIS = OWN / "bin" / "schemathesis"
 WORK = OWN / "work"
 """Logs and results of the proofs."""

@@ -1,1 +1,1 @@
-"""Tests of the networks: `PYTHONPATH=scripts python -m unittest discover -s networks/tests -t .` in lab/training."""
+"""Tests of the networks: `PYTHONPATH=packaging/scripts python -m unittest discover -s networks/tests -t .` in lab/training."""

@@ -9,7 +9,7 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 BUDGETS = Path(__file__).with_name("budget.txt")
 KINDS = ("code", "brackets", "comments", "blanks")
 # A module of tests: in the rest of its file, or in a file of its own.

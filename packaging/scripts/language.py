@@ -10,7 +10,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 LONGEST_TEST_NAME = 60
 LONGEST_SUMMARY_WORDS = 6
 LONGEST_SENTENCE_WORDS = 35
@@ -69,7 +69,13 @@ CODE_SPAN = re.compile(r"`[^`]+`")
 SENTENCE_END = re.compile(r"(?:[.!?]|:(?= +[A-Z`\[(*]))[)\"*]* +")
 PYTHON_TEST = re.compile(r"^\s*(?:async )?def (test_\w+)")
 # Files that hold the rules, and texts of others.
-EXEMPT = {"scripts/language.py", "scripts/tests/test_language.py", "CONTRIBUTING.md", "LICENSE", "NOTICE"}
+EXEMPT = {
+    "packaging/scripts/language.py",
+    "packaging/scripts/tests/test_language.py",
+    "CONTRIBUTING.md",
+    "LICENSE",
+    "NOTICE",
+}
 SUFFIXES = {".rs", ".py", ".js", ".mjs", ".md", ".html"}
 
 

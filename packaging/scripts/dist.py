@@ -18,8 +18,9 @@ import sbom
 from assets.machine import supported_cpu
 from assets.runtime import LIBRARY, LICENSES, sha256_of
 
-ROOT = Path(__file__).resolve().parents[1]
-TEXTS = ("LICENSE", "NOTICE", "README.md", "CHANGELOG.md", "config/lookdown.toml")
+ROOT = Path(__file__).resolve().parents[2]
+TEXTS = ("LICENSE", "NOTICE", "README.md", "CHANGELOG.md")
+SETTINGS = "lookdown.toml"
 SUMS = "SHA256SUMS"
 BILL_OF_MATERIALS = "lookdown.cdx.json"
 COMPLETIONS = {"bash": "lookdown.bash", "zsh": "_lookdown", "fish": "lookdown.fish"}
@@ -56,6 +57,7 @@ def files_of(root: Path, runtime: Path) -> Iterator[tuple[Path, str]]:
     """The files of the set-up and of the repository, with their names in the folder."""
     for name in TEXTS:
         yield root / name, name
+    yield root / "packaging" / SETTINGS, SETTINGS
     for name in (LIBRARY, *LICENSES):
         yield runtime / name, f"runtime/{name}"
     yield from model_files(root)

@@ -15,7 +15,7 @@ from urllib.parse import quote
 from assets.machine import supported_cpu
 from assets.runtime import pinned_runtime
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 # Our networks: every package has them.
 MODELS = tuple(f"nanodet_g_{views}_416{precision}" for views in ("views", "fisheye") for precision in ("", "_fp16"))
 NOT_STATED = "NOASSERTION"

@@ -45,8 +45,8 @@ def _convert(root: Path, folder: Path, here: Path, sha256: str) -> None:
     python = root / ".setup" / "venv" / "bin" / "python"
     run(
         [python, "-m", "convert.ssdlite_mobilenet_v2", here / WEIGHTS / "model.json", onnx],
-        root / "scripts",
-        "scripts/convert/ssdlite_mobilenet_v2.py failed; that is a defect of Lookdown. It said:",
+        root / "packaging" / "scripts",
+        "packaging/scripts/convert/ssdlite_mobilenet_v2.py failed; that is a defect of Lookdown. It said:",
     )
     if not has_sum(onnx, sha256):
         raise SetupError("The converted model does not have the sum of its model.toml; that is a defect of Lookdown.")

@@ -17,7 +17,7 @@ from pathlib import Path
 from assets.runtime import LIBRARY, install_runtime, pinned_runtime
 from dist import make_dist
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 OWN = ROOT / ".setup" / "arm64"
 CPU = "aarch64"
 TARGET = "aarch64-unknown-linux-gnu"
@@ -36,7 +36,7 @@ LIBRARIES = ("lookdown-lens", "lookdown-calibration", "lookdown-imaging", "lookd
 
 def main(arguments: list[str]) -> int:
     """The exit status."""
-    subprocess.run([ROOT / "scripts" / "packages.sh", *PACKAGES], check=True)
+    subprocess.run([ROOT / "packaging" / "scripts" / "packages.sh", *PACKAGES], check=True)
     install_rust_library()
     install_runtime(pinned_runtime(CPU), OWN / "runtime", ROOT / ".setup" / "downloads")
     wanted = arguments or ["build", "test", "pack"]

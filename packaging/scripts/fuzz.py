@@ -11,7 +11,7 @@ import sys
 import time
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 FUZZ = ROOT / "lab/fuzz"
 IMPORTERS = re.findall(r'^    \("(\w+)", Format::', (FUZZ / "src/importer.rs").read_text(), re.MULTILINE)
 # Seeds in addition to lab/fuzz/seeds/TARGET.

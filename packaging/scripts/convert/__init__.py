@@ -1,7 +1,7 @@
 """Rewrites published detector weights as the ONNX files that Lookdown runs: SSDLite, and the darknet family.
 
 The readers of TensorFlow.js, the translator and the ONNX builder also make our own networks (lab/training/networks).
-Needs the packages of scripts/requirements/converters.txt.
+Needs the packages of packaging/scripts/requirements/converters.txt.
 """
 
 

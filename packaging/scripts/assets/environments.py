@@ -10,8 +10,8 @@ from .console import SetupError, run, say
 
 # The requirements of each step, and the environment that gets them. Steps may share an environment.
 STEPS = {
-    "checkers": (("scripts/requirements/checkers.txt", "venv"),),
-    "converters": (("scripts/requirements/converters.txt", "venv"),),
+    "checkers": (("packaging/scripts/requirements/checkers.txt", "venv"),),
+    "converters": (("packaging/scripts/requirements/converters.txt", "venv"),),
     "reliability": (("tests/reliability/requirements.txt", "reliability"),),
     "wheel": (("crates/lookdown-python/build-requirements.txt", "wheel"),),
 }

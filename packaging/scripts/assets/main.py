@@ -14,7 +14,7 @@ from .machine import check_toolchain, supported_cpu
 from .runtime import install_runtime, pinned_runtime, require_loadable
 from .ssdlite import install_ssdlite
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 BUILD = ("toolchain", "runtime")
 KNOWN = (*BUILD, "models", *STEPS, *FAMILIES)
 
