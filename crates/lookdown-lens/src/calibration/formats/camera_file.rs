@@ -14,6 +14,9 @@ use crate::{
     warning::Warning,
 };
 
+/// Most cameras taken from one file.
+pub(super) const MAX_CAMERAS: usize = 256;
+
 /// The content of a calibration file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibrationFile {
