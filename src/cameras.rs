@@ -263,16 +263,28 @@ impl Cameras {
         let is_same_login = before.is_some_and(|before| {
             before.user == camera.user && origin(&before.url) == origin(&camera.url)
         });
-        match password {
-            Some(password) => self
-                .folder
-                .write(&self.folder.password(name), password.expose_secret())?,
-            None if !is_same_login => StateFolder::remove(&self.folder.password(name))?,
-            None => {}
-        }
         file.invalid.remove(name);
         let is_new = file.cameras.insert(name.to_owned(), camera).is_none();
-        self.store(&file)?;
+        // No moment has a URL with the password of another one, however the writing ends.
+        let path = self.folder.password(name);
+        let [new, old] =
+            ["new~", "old~"].map(|ending| self.folder.password(&format!("{name}{ending}")));
+        for unfinished in [&new, &old] {
+            StateFolder::remove(unfinished)?;
+        }
+        if let Some(password) = password {
+            self.folder.write(&new, password.expose_secret())?;
+        }
+        if !is_same_login {
+            StateFolder::rename(&path, &old)?;
+        }
+        if let Err(error) = self.store(&file) {
+            StateFolder::rename(&old, &path)?;
+            StateFolder::remove(&new)?;
+            return Err(error);
+        }
+        StateFolder::rename(&new, &path)?;
+        StateFolder::remove(&old)?;
         Ok(is_new)
     }
 

@@ -11,6 +11,7 @@ use lookdown_http::{
     Shutdown,
     server::{self, Plain},
 };
+use rustix::process::{Resource, getrlimit};
 use tokio::{
     join,
     net::TcpListener,
@@ -29,6 +30,8 @@ use crate::{
 const MQTT_SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(3);
 /// Longest time that the shutdown waits for a model that is being loaded.
 const LONGEST_LOAD: Duration = Duration::from_secs(10);
+/// Files that a server opens beside its connections: listeners, models, calibrations, stores.
+const OTHER_FILES: u64 = 64;
 /// Interval of the checks during that wait.
 const LOAD_CHECK: Duration = Duration::from_millis(20);
 /// Pause before a model is loaded again after a transient failure.
@@ -46,6 +49,7 @@ impl App {
         let scheme = if self.tls.is_some() { "https" } else { "http" };
         log_start(&self.settings, scheme, address);
         log_exposure(&self.settings, self.keys.is_some(), address);
+        log_open_files(&self.settings);
         let _pollers = self.start_pollers()?;
         let publishing = self
             .publisher
@@ -204,6 +208,18 @@ impl App {
             );
         }
         Ok(())
+    }
+}
+
+/// Warns if the process may not open a file for each connection.
+fn log_open_files(settings: &Settings) {
+    let connections = settings.connections.max_connections.get() as u64;
+    let limit = getrlimit(Resource::Nofile).current;
+    if let Some(limit) = limit.filter(|limit| *limit < connections + OTHER_FILES) {
+        tracing::warn!(
+            "server.max_connections is {connections}, but the process may open {limit} files: raise \
+             that limit (ulimit -n, LimitNOFILE=), or lower server.max_connections"
+        );
     }
 }
 

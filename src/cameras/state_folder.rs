@@ -80,11 +80,20 @@ impl StateFolder {
 
     /// Removes a file, if it exists.
     pub(super) fn remove(path: &Path) -> Result<(), CameraError> {
-        match fs::remove_file(path) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => {
-                Err(CameraError::Folder(path.to_owned(), error))
-            }
-            _ => Ok(()),
+        unless_missing(path, fs::remove_file(path))
+    }
+
+    /// Renames a file, if it exists.
+    pub(super) fn rename(from: &Path, to: &Path) -> Result<(), CameraError> {
+        unless_missing(from, fs::rename(from, to))
+    }
+}
+
+fn unless_missing(path: &Path, done: io::Result<()>) -> Result<(), CameraError> {
+    match done {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => {
+            Err(CameraError::Folder(path.to_owned(), error))
         }
+        _ => Ok(()),
     }
 }

@@ -302,3 +302,36 @@ async fn a_few_cameras_are_tested_at_a_time() {
     tests.shutdown().await;
     assert_eq!(cameras.tests.available_permits(), MAX_TESTS);
 }
+
+#[test]
+fn a_change_that_is_not_stored_keeps_the_password() {
+    let folder = tempfile::tempdir().unwrap();
+    let cameras = cameras(folder.path());
+    let (before, after) = (Secret::from("geheim"), Secret::from("other"));
+    cameras
+        .put("hall", camera("rtsp://10.0.0.8/"), Some(&before))
+        .unwrap();
+    // The file of the cameras cannot be written.
+    let blocked = folder
+        .path()
+        .join("state")
+        .join(FILE)
+        .with_extension("part");
+    fs::create_dir(&blocked).unwrap();
+    for password in [Some(&after), None] {
+        cameras
+            .put("hall", camera("rtsp://10.0.0.9/"), password)
+            .unwrap_err();
+        let camera = cameras.get("hall").unwrap().unwrap();
+        assert_eq!(camera.location.to_string(), "rtsp://10.0.0.8/");
+        assert_eq!(camera.credentials.unwrap().password, before);
+    }
+    fs::remove_dir(&blocked).unwrap();
+    cameras
+        .put("hall", camera("rtsp://10.0.0.9/"), Some(&after))
+        .unwrap();
+    let camera = cameras.get("hall").unwrap().unwrap();
+    assert_eq!(camera.credentials.unwrap().password, after);
+    let passwords = folder.path().join("state").join("passwords");
+    assert_eq!(fs::read_dir(passwords).unwrap().count(), 1);
+}

@@ -2,7 +2,10 @@
 
 use axum::{
     body::Body,
-    http::{Request, StatusCode, header::CONTENT_TYPE},
+    http::{
+        Request, StatusCode,
+        header::{CONTENT_ENCODING, CONTENT_TYPE},
+    },
 };
 use serde_json::Value;
 
@@ -171,6 +174,24 @@ async fn a_malformed_form_or_query_is_refused() {
         .unwrap();
     let answer = service.send(cut_off).await;
     assert_refused(&answer, 400, "malformed-request", "cut off");
+    let lines = "--b\nContent-Disposition: form-data; name=\"img\"\n\nabc\n--b--\n";
+    let without_cr = Request::post("/detect")
+        .header(CONTENT_TYPE, "multipart/form-data; boundary=b")
+        .body(Body::from(lines))
+        .unwrap();
+    let answer = service.send(without_cr).await;
+    assert_refused(&answer, 400, "malformed-request", "end them with CRLF");
+    let compressed = Request::post("/detect")
+        .header(CONTENT_ENCODING, "gzip")
+        .body(Body::from(frame()))
+        .unwrap();
+    let answer = service.send(compressed).await;
+    assert_refused(
+        &answer,
+        415,
+        "unsupported-image",
+        "Content-Encoding is \"gzip\"",
+    );
     let answer = service.post_raw("camera=%FF", frame()).await;
     assert_refused(&answer, 400, "malformed-request", "query");
 }

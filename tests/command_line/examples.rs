@@ -2,7 +2,7 @@
 
 use super::serve::{NO_GRACE, Server};
 
-#[path = "../../examples/detect.rs"]
+#[path = "../../docs/examples/detect.rs"]
 #[expect(dead_code, reason = "only its `main` is the program")]
 mod detect;
 

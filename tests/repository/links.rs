@@ -7,7 +7,14 @@ use std::{
 
 /// The folders whose files documents name in code style.
 const FOLDERS: [&str; 8] = [
-    "src/", "crates/", "tests/", "docs/", "docker/", "k8s/", "web/", "packaging/",
+    "src/",
+    "crates/",
+    "tests/",
+    "docs/",
+    "docker/",
+    "k8s/",
+    "web/",
+    "packaging/",
 ];
 
 /// Adds the Markdown files of a folder.

@@ -44,15 +44,12 @@ pub use error::FormatError;
 pub use format::Format;
 
 use self::{
-    camera_file::alone,
+    camera_file::{MAX_CAMERAS, alone},
     document::{Document, Syntax},
     fields::Fields,
     recognize::{recognize_lines, recognize_tree},
 };
 use super::native::NativeImage;
-
-/// Most cameras taken from one file.
-const MAX_CAMERAS: usize = 256;
 
 impl CalibrationFile {
     /// Recognizes and reads the content of a calibration file.

@@ -74,8 +74,8 @@ fn length_of_scans(bytes: &[u8]) -> Option<usize> {
                 let [8, h0, h1, w0, w1, _, rest @ ..] = payload else {
                     return None;
                 };
-                let side = |high, low| usize::from(u16::from_be_bytes([high, low]));
-                size = (side(*w0, *w1), side(*h0, *h1));
+                let number = |high, low| usize::from(u16::from_be_bytes([high, low]));
+                size = (number(*w0, *w1), number(*h0, *h1));
                 let component = |of: &[u8]| Component {
                     id: of[0],
                     columns: usize::from(of[1] >> 4).clamp(1, 4),

@@ -87,7 +87,7 @@ mod tests {
         let (_, rate) = send(30, 1000);
         let warning = rate.warning().unwrap();
         assert!(
-            warning.contains("1.1 frames/s") && warning.contains("`every`"),
+            warning.contains("1.0 frames/s") && warning.contains("`every`"),
             "{warning}"
         );
     }

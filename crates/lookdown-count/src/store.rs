@@ -88,6 +88,12 @@ impl Store {
             problem: problem.to_string(),
         })?;
         let writer = connect(path).map_err(unusable)?;
+        if schema::has_code(&writer).map_err(unusable)? {
+            return Err(StoreError::Unusable {
+                path: path.to_owned(),
+                problem: "it has views, triggers or virtual tables of another program".to_owned(),
+            });
+        }
         let version = schema::version(&writer).map_err(unusable)?;
         if version != NEW {
             let checked = StoredFile::Counts.check(&version.to_string());
@@ -112,6 +118,7 @@ impl Store {
 fn connect(path: &Path) -> rusqlite::Result<Connection> {
     let connection = Connection::open(path)?;
     connection.busy_timeout(BUSY_TIMEOUT)?;
+    connection.pragma_update(None, "trusted_schema", false)?;
     connection.pragma_update(None, "journal_mode", "wal")?;
     // A transaction survives the end of the process at once. A power failure may lose the last ones
     // as a whole: the server sends their reports again.
@@ -121,6 +128,10 @@ fn connect(path: &Path) -> rusqlite::Result<Connection> {
 
 /// Opens or creates a file that only its owner may read.
 fn open_private(path: &Path) -> std::io::Result<File> {
+    // The opening of a pipe would wait for a reader.
+    if std::fs::metadata(path).is_ok_and(|about| !about.is_file()) {
+        return Err(std::io::Error::other("it is not a regular file"));
+    }
     OpenOptions::new()
         .create(true)
         .truncate(false)

@@ -36,6 +36,8 @@ const MIN_RADIUS_IN_SHORT_SIDES: f64 = 0.25;
 /// Share of the rays meeting the circle inside the frame that must show a rim. The others may show
 /// a dark part of the room.
 const MIN_SUPPORT: f64 = 0.35;
+/// Farthest middle of a circle from that of its half of a frame of two lenses.
+const MAX_OFFSET_IN_RADII: f64 = 0.25;
 /// The widest angle without any rim. Beyond it, center and radius are ambiguous.
 const MAX_GAP_RADIANS: f64 = 3.5;
 
@@ -98,6 +100,32 @@ fn is_shown(edge: &[RimPoint], frame: &Frame, circle: &LensCircle) -> bool {
     #[expect(clippy::cast_precision_loss, reason = "a few hundred rays")]
     let is_supported = shown.len() as f64 >= MIN_SUPPORT * visible as f64;
     !shown.is_empty() && is_supported && widest_gap <= MAX_GAP_RADIANS
+}
+
+/// Returns true for a frame of two lenses, beside or above each other: each half has a lens circle
+/// in its middle. The halves of one lens circle have its middle at their edge.
+#[must_use]
+pub fn shows_two_circles(frame: &Frame) -> bool {
+    let (width, height) = (frame.width(), frame.height());
+    let halves = if 2 * width >= 3 * height {
+        let middle = width / 2;
+        [(0..middle, 0..height), (middle..width, 0..height)]
+    } else if 2 * height >= 3 * width {
+        let middle = height / 2;
+        [(0..width, 0..middle), (0..width, middle..height)]
+    } else {
+        return false;
+    };
+    halves.into_iter().all(|(columns, rows)| {
+        let Ok(half) = frame.crop(columns, rows) else {
+            return false;
+        };
+        let middle = assumed_circle(half.width(), half.height());
+        find_lens_circle(&half).is_some_and(|circle| {
+            let offset = (circle.cx - middle.cx).hypot(circle.cy - middle.cy);
+            offset <= MAX_OFFSET_IN_RADII * middle.radius
+        })
+    })
 }
 
 /// The largest circle in the center of a frame of this size. It is the guess for frames without a

@@ -40,6 +40,9 @@ pub enum InvalidLocation {
         "there is no such file or folder: give a URL with its scheme, an existing path, or - for standard input"
     )]
     NoSuchFile,
+    /// A pipe, a socket or a device.
+    #[error("it is not a regular file or a folder: give a file, a folder, or - for a pipe")]
+    NotAFile,
 }
 
 impl Location {
@@ -58,8 +61,10 @@ impl Location {
         let path = PathBuf::from(text);
         if path.is_dir() {
             Ok((Self::Folder(path), None))
-        } else if path.exists() {
+        } else if path.is_file() {
             Ok((Self::Video(path), None))
+        } else if path.exists() {
+            Err(InvalidLocation::NotAFile)
         } else {
             Err(InvalidLocation::NoSuchFile)
         }
@@ -94,14 +99,19 @@ impl Location {
     }
 }
 
-/// Displays the location without credentials and without the query, which may hold a token.
+/// Displays the location without credentials: without the query, which may hold a token, and up to
+/// the first value in the path, where some cameras have their password.
 impl fmt::Display for Location {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Http(url) | Self::Rtsp(url) => {
                 let mut shown = url.clone();
                 shown.set_query(None);
-                shown.fmt(formatter)
+                shown.set_fragment(None);
+                match shown.as_str().split_once('=') {
+                    Some((before, _)) => write!(formatter, "{before}=…"),
+                    None => shown.fmt(formatter),
+                }
             }
             Self::Folder(path) | Self::Video(path) => path.display().fmt(formatter),
             Self::StandardInput => formatter.write_str("standard input"),
@@ -124,6 +134,9 @@ mod tests {
         assert_eq!(credentials.password.expose_secret(), "p@ss/");
         assert_eq!(location.to_string(), "rtsp://10.0.0.8:554/s1");
         assert!(!format!("{location:?} {credentials:?}").contains("p@ss"));
+        let of_path = "rtsp://10.0.0.8/user=admin&password=geheim&channel=1.sdp?real_stream#x";
+        let (location, _) = Location::parse(of_path).unwrap();
+        assert_eq!(location.to_string(), "rtsp://10.0.0.8/user=…");
     }
 
     #[test]
@@ -144,6 +157,7 @@ mod tests {
             parse(file.to_str().unwrap()),
             Ok(Location::Video(_))
         ));
+        assert_eq!(parse("/dev/null"), Err(InvalidLocation::NotAFile));
         assert_eq!(parse("/nowhere"), Err(InvalidLocation::NoSuchFile));
         assert_eq!(parse("ftp://camera/x"), Err(InvalidLocation::UnknownScheme));
         assert_eq!(parse("rtsp://"), Err(InvalidLocation::InvalidUrl));

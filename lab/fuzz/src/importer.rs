@@ -10,7 +10,7 @@ use lookdown_lens::geometry::Pixel;
 use strum::VariantArray;
 
 /// The importers, with the names of their folders of seeds and corpora.
-pub const IMPORTERS: [(&str, Format); 15] = [
+pub const IMPORTERS: [(&str, Format); 22] = [
     ("native", Format::Native),
     ("kalibr", Format::Kalibr),
     ("opencv", Format::OpenCv),
@@ -26,6 +26,13 @@ pub const IMPORTERS: [(&str, Format); 15] = [
     ("moil", Format::Moil),
     ("fisheye_calib_adapter", Format::FisheyeCalibAdapter),
     ("camera_intrinsic_model", Format::CameraIntrinsicModel),
+    ("slam", Format::Slam),
+    ("nerfstudio", Format::Nerfstudio),
+    ("gyroflow", Format::Gyroflow),
+    ("depthai", Format::DepthAi),
+    ("opensfm", Format::OpenSfm),
+    ("matlab", Format::Matlab),
+    ("alicevision", Format::AliceVision),
 ];
 
 /// Positions in a frame where its lens is tested, as fractions of its sides.

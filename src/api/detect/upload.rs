@@ -11,10 +11,14 @@ use std::{sync::Arc, time::Instant};
 
 use axum::{
     extract::{FromRequest, Request},
-    http::{HeaderMap, header::CONTENT_TYPE},
+    http::{
+        HeaderMap, HeaderValue,
+        header::{CONTENT_ENCODING, CONTENT_TYPE},
+    },
 };
 use bytes::Bytes;
 use jiff::Timestamp;
+use lookdown_common::text::Quoted;
 use lookdown_detect::{parameters::DetectParameters, pipeline::DetectJob};
 
 pub(in crate::api) use received_request::ReceivedRequest;
@@ -28,7 +32,10 @@ use crate::{
     api::{
         ApiState,
         http::{
-            caller::Caller, context::RequestContext, problem::Problem, query::query_parameters,
+            caller::Caller,
+            context::RequestContext,
+            problem::{Problem, ProblemKind},
+            query::query_parameters,
             request_body::UploadBudget,
         },
     },
@@ -122,6 +129,7 @@ impl Upload {
             arrived,
         } = ReceivedRequest::receive(request, state, budget).await?;
         let headers = parts.headers.clone();
+        check_encoding(&headers)?;
         let form = if is_multipart(&headers) {
             Some(form::parse(parts, held.bytes(), use_of).await?)
         } else {
@@ -150,6 +158,19 @@ impl Upload {
             arrived,
         })
     }
+}
+
+/// Refuses a compressed body: images are compressed already.
+fn check_encoding(headers: &HeaderMap) -> Result<(), Problem> {
+    let encoding = headers.get(CONTENT_ENCODING).map(HeaderValue::as_bytes);
+    let Some(encoding) = encoding.filter(|encoding| !encoding.eq_ignore_ascii_case(b"identity"))
+    else {
+        return Ok(());
+    };
+    let encoding = String::from_utf8_lossy(encoding);
+    let encoding = Quoted(&encoding);
+    let detail = format!("Content-Encoding is {encoding}: send the image without this compression");
+    Err(Problem::new(ProblemKind::UnsupportedImage, detail))
 }
 
 /// Returns `true` if the body is a multipart form.

@@ -72,7 +72,8 @@ impl Stream {
 pub(in crate::cli) fn is_video(path: &Path) -> bool {
     let ending = path.extension().and_then(|ending| ending.to_str());
     let ending = ending.map(str::to_ascii_lowercase);
-    ending.is_some_and(|ending| ENDINGS.contains(&ending.as_str())) && !path.is_dir()
+    ending.is_some_and(|ending| ENDINGS.contains(&ending.as_str()))
+        && (path.is_file() || !path.exists())
 }
 
 /// Parses `--every`.

@@ -2,7 +2,7 @@
 
 use lookdown_imaging::{
     Frame,
-    lens_circle::{LensCircle, assumed_circle, find_lens_circle},
+    lens_circle::{LensCircle, assumed_circle, find_lens_circle, shows_two_circles},
 };
 use proptest::prelude::*;
 
@@ -122,6 +122,29 @@ fn a_whole_circle_is_found_to_a_quarter_of_a_pixel() {
     assert!((found.cx - 322.3).abs() < 0.25, "{found:?}");
     assert!((found.cy - 237.8).abs() < 0.25, "{found:?}");
     assert!((found.radius - 211.4).abs() < 0.25, "{found:?}");
+}
+
+#[test]
+fn two_lens_circles_are_told_from_one() {
+    let mut halves = Room::new(320, 320, [162.0, 157.0, 150.0]).paint();
+    let above = Frame::new(320, 640, halves.pixels().repeat(2)).unwrap();
+    assert!(shows_two_circles(&above));
+    let rows: Vec<u8> = halves
+        .pixels_mut()
+        .chunks(320 * 3)
+        .flat_map(|row| row.repeat(2))
+        .collect();
+    assert!(shows_two_circles(&Frame::new(640, 320, rows).unwrap()));
+    for circle in [
+        [320.0, 160.0, 150.0],
+        [320.0, 160.0, 300.0],
+        [160.0, 160.0, 150.0],
+    ] {
+        assert!(
+            !shows_two_circles(&Room::new(640, 320, circle).paint()),
+            "{circle:?}"
+        );
+    }
 }
 
 #[test]

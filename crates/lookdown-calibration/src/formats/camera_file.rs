@@ -12,6 +12,9 @@ use crate::native::{
 use crate::warning::Warning;
 use lookdown_lens::geometry::lens::LensModel;
 
+/// Most cameras taken from one file.
+pub(super) const MAX_CAMERAS: usize = 256;
+
 /// The content of a calibration file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibrationFile {

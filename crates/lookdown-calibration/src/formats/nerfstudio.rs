@@ -8,6 +8,7 @@ use serde_json::Value;
 
 use super::{
     Camera, FileCamera, FormatError,
+    camera_file::{MAX_CAMERAS, alone},
     distortion::{Distortion, are_all_zero, not_a_fisheye},
     fields::Fields,
 };
@@ -45,14 +46,14 @@ pub(super) fn read(fields: &Fields<'_>) -> Vec<FileCamera> {
         let values = INTRINSICS
             .map(|key| fields.map().get(key).or(frame.map().get(key)))
             .to_vec();
-        if !seen.contains(&values) && cameras.len() <= super::MAX_CAMERAS {
+        if !seen.contains(&values) && cameras.len() <= MAX_CAMERAS {
             seen.push(values);
             let camera = read_camera(|key| if fields.has(key) { fields } else { &frame });
             cameras.push(FileCamera { name: None, camera });
         }
     }
     if cameras.is_empty() {
-        return super::alone(read_camera(|_| fields));
+        return alone(read_camera(|_| fields));
     }
     cameras
 }

@@ -1,8 +1,9 @@
 //! Counts per step as JSON and CSV.
 
-mod csv;
-
-use std::collections::{BTreeMap, BTreeSet};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fmt::Write as _,
+};
 
 use axum::{
     Json,
@@ -13,7 +14,6 @@ use axum::{
     },
     response::{IntoResponse, Response},
 };
-use csv::csv;
 use jiff::Timestamp;
 use lookdown_common::text::{one_line, shortened, with_causes};
 use lookdown_http::problem::Problem;
@@ -309,6 +309,54 @@ fn step_counts(
     }
 }
 
+/// Writes the counts as a table. Unknown counts are empty cells.
+fn csv(counts: &Counts) -> String {
+    let mut text = "from,to,known_seconds,slow_seconds,persons_mean,persons_max".to_owned();
+    let first = counts.steps.first();
+    let lines = first.and_then(|step| step.lines.as_ref());
+    for (line, directions) in lines.into_iter().flatten() {
+        for direction in directions.keys() {
+            let _ = write!(text, ",line.{line}.{direction}");
+        }
+    }
+    let zones = first.and_then(|step| step.zones.as_ref());
+    for zone in zones.into_iter().flat_map(BTreeMap::keys) {
+        for column in ["entries", "mean", "max", "visits", "dwell_seconds"] {
+            let _ = write!(text, ",zone.{zone}.{column}");
+        }
+    }
+    text.push_str("\r\n");
+    for step in &counts.steps {
+        let _ = write!(text, "{},{},{}", step.from, step.to, step.known_seconds);
+        cell(&mut text, step.slow_seconds);
+        let persons = step.persons.as_ref();
+        cell(&mut text, persons.map(|persons| persons.mean));
+        cell(&mut text, persons.map(|persons| persons.max));
+        for directions in step.lines.iter().flat_map(BTreeMap::values) {
+            for crossings in directions.values() {
+                cell(&mut text, *crossings);
+            }
+        }
+        for zone in step.zones.iter().flat_map(BTreeMap::values) {
+            let zone = zone.as_ref();
+            cell(&mut text, zone.map(|zone| zone.entries));
+            cell(&mut text, zone.map(|zone| zone.mean));
+            cell(&mut text, zone.map(|zone| zone.max));
+            cell(&mut text, zone.map(|zone| zone.visits));
+            cell(&mut text, zone.and_then(|zone| zone.dwell_seconds));
+        }
+        text.push_str("\r\n");
+    }
+    text
+}
+
+fn cell(text: &mut String, value: Option<impl std::fmt::Display>) {
+    text.push(',');
+    if let Some(value) = value {
+        let _ = write!(text, "{value}");
+    }
+}
+
 #[expect(
     clippy::cast_precision_loss,
     reason = "exact for centuries of milliseconds"
@@ -326,32 +374,4 @@ fn thousandths(value: f64) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn steps_times_columns_are_bounded() {
-        let owner = || Owner::Camera("hall".to_owned());
-        let span = |steps| Span {
-            from_minute: 0,
-            to_minute: steps,
-            step_minutes: 1,
-        };
-        let names = |zones: usize| {
-            let zones = (0..zones).map(|number| format!("zone {number}"));
-            (BTreeSet::new(), zones.collect())
-        };
-        let found = |steps, zones| counts(owner(), span(steps), &BTreeMap::new(), names(zones));
-        assert!(found(10_000, 9).is_some());
-        assert!(found(10_000, 10).is_none());
-        assert!(found(1, MAX_VALUES).is_none());
-        // Columns of the stored sums count as well.
-        let mut step = Step::default();
-        for line in 0..10 {
-            let direction = (line.to_string(), "in".to_owned());
-            step.crossings.insert(direction, 1);
-        }
-        let sums = BTreeMap::from([(0, step)]);
-        assert!(counts(owner(), span(10_000), &sums, names(0)).is_none());
-    }
-}
+mod tests;

@@ -42,6 +42,13 @@ pub(super) fn version(connection: &Connection) -> rusqlite::Result<i64> {
     connection.pragma_query_value(None, "user_version", |row| row.get(0))
 }
 
+/// Returns true for a file whose schema runs code that no store has.
+pub(super) fn has_code(connection: &Connection) -> rusqlite::Result<bool> {
+    let query = "SELECT EXISTS (SELECT 1 FROM sqlite_schema
+        WHERE type NOT IN ('table', 'index') OR sql LIKE 'create%virtual%')";
+    connection.query_row(query, [], |row| row.get(0))
+}
+
 /// Creates the tables that are missing.
 pub(super) fn create(connection: &Connection) -> rusqlite::Result<()> {
     // An earlier table held the URLs of webhooks with their secrets.

@@ -257,3 +257,20 @@ fn files_of_the_store_are_readable_by_the_owner_alone() {
     }
     assert!(files >= 3, "{files}");
 }
+
+#[test]
+fn a_store_with_code_and_a_pipe_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("counts.sqlite");
+    drop(Store::open(&path).unwrap());
+    let foreign = Connection::open(&path).unwrap();
+    let trigger = "CREATE TRIGGER t AFTER INSERT ON scenes BEGIN DELETE FROM zones; END";
+    foreign.execute_batch(trigger).unwrap();
+    drop(foreign);
+    let refused = |path: &Path| Store::open(path).err().unwrap().to_string();
+    assert!(refused(&path).contains("it has views, triggers"));
+    let pipe = folder.path().join("pipe");
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+    assert!(made.unwrap().success());
+    assert!(refused(&pipe).contains("it is not a regular file"));
+}

@@ -5,7 +5,7 @@ use std::convert::Infallible;
 
 use bytes::{Bytes, BytesMut};
 use lookdown_common::{
-    HttpClient, HttpError,
+    HttpClient, HttpError, JPEG_START,
     text::{one_line, with_causes},
 };
 use reqwest::{
@@ -19,6 +19,8 @@ use crate::{Camera, MAX_FRAME_BYTES, SourceError, credentials::Login, memory_bud
 
 /// Most characters of a camera's text in an error.
 const SHOWN_CHARS: usize = 60;
+/// Bytes that show what a response is: the boundary of a part or the start of an image.
+const BEGIN_BYTES: usize = 4;
 /// Requests for one answer: the second one answers the challenge of the first.
 const ATTEMPTS: usize = 2;
 
@@ -35,23 +37,28 @@ pub(super) async fn run(
     ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
         ticks.tick().await;
-        let response = get(client, url, login, entity_tag.as_ref()).await?;
+        let mut response = get(client, url, login, entity_tag.as_ref()).await?;
         if response.status() == StatusCode::NOT_MODIFIED {
             sink.alive();
             continue;
         }
         let content_type = content_type(&response);
-        if content_type.starts_with("multipart/") {
-            return read_stream(response, &content_type, sink).await;
-        }
-        let is_image = content_type.is_empty() || content_type.starts_with("image/");
-        if !is_image && !content_type.starts_with("application/octet-stream") {
+        let is_stream = content_type.starts_with("multipart/");
+        let is_unknown =
+            content_type.is_empty() || content_type.starts_with("application/octet-stream");
+        if !is_stream && !is_unknown && !content_type.starts_with("image/") {
             return Err(SourceError::ContentType(
                 shown(response, content_type).await,
             ));
         }
+        let begin = begin(&mut response).await?;
+        // A part of a stream begins with a boundary, whatever the response is called.
+        if is_stream || (is_unknown && begin.trim_ascii_start().starts_with(b"--")) {
+            read_stream(response, begin, &content_type, sink).await?;
+            continue;
+        }
         let tag = response.headers().get(ETAG).cloned();
-        sink.accept(read_image(response).await?)?;
+        sink.accept(read_image(response, begin).await?)?;
         entity_tag = tag;
     }
 }
@@ -109,9 +116,20 @@ async fn shown(mut response: Response, content_type: String) -> String {
     format!("{content_type}: {words}")
 }
 
-/// Reads the whole image of a snapshot.
-async fn read_image(mut response: Response) -> Result<Bytes, SourceError> {
-    let mut image = BytesMut::new();
+/// Reads the first bytes of a response, which show what it is.
+async fn begin(response: &mut Response) -> Result<BytesMut, SourceError> {
+    let mut bytes = BytesMut::new();
+    while bytes.len() < BEGIN_BYTES {
+        let Some(chunk) = response.chunk().await.map_err(unreachable)? else {
+            break;
+        };
+        bytes.extend_from_slice(&chunk);
+    }
+    Ok(bytes)
+}
+
+/// Reads the whole image of a snapshot after its first bytes.
+async fn read_image(mut response: Response, mut image: BytesMut) -> Result<Bytes, SourceError> {
     let mut memory = Reservation::default();
     while let Some(chunk) = response.chunk().await.map_err(unreachable)? {
         if image.len() + chunk.len() > MAX_FRAME_BYTES {
@@ -124,23 +142,34 @@ async fn read_image(mut response: Response) -> Result<Bytes, SourceError> {
     Ok(image.freeze())
 }
 
-/// Reads frames until the stream ends. A damaged frame is dropped.
+/// Reads frames until the stream ends. A damaged frame is dropped. An image with the label of a
+/// stream may end.
 async fn read_stream(
     mut response: Response,
+    begin: BytesMut,
     content_type: &str,
     sink: &Sink<'_>,
-) -> Result<Infallible, SourceError> {
+) -> Result<(), SourceError> {
     let stream = |error: super::multipart::PartError| SourceError::Stream(error.to_string());
-    let mut parts = PartReader::new(content_type, MAX_FRAME_BYTES).map_err(stream)?;
+    let mut parts = PartReader::new(content_type, MAX_FRAME_BYTES);
     let mut memory = Reservation::default();
-    while let Some(chunk) = response.chunk().await.map_err(unreachable)? {
-        let bytes = parts.buffered() + chunk.len();
+    let mut is_received = false;
+    let mut chunk = Some(begin.freeze());
+    let is_image = chunk
+        .as_ref()
+        .is_some_and(|begin| begin.starts_with(JPEG_START));
+    while let Some(received) = chunk {
+        let bytes = parts.buffered() + received.len();
         memory.resize(bytes).map_err(|_| SourceError::Memory)?;
-        parts.push(&chunk);
+        parts.push(&received);
         while let Some(image) = parts.next_part().map_err(stream)? {
             // The sink counts damaged frames.
-            let _ = sink.accept(image);
+            is_received |= sink.accept(image).is_ok();
         }
+        chunk = response.chunk().await.map_err(unreachable)?;
+    }
+    if is_image && is_received {
+        return Ok(());
     }
     Err(SourceError::Closed)
 }
@@ -162,13 +191,15 @@ fn unreachable(error: impl Into<HttpError>) -> SourceError {
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use tokio::{
         io::{AsyncBufReadExt, AsyncWriteExt, BufReader},
         net::TcpListener,
     };
 
     use super::*;
-    use crate::Credentials;
+    use crate::{CameraEntry, Credentials};
 
     const CHALLENGE: &str = "HTTP/1.1 401 Unauthorized\r\nContent-Length: 0\r\n\
         WWW-Authenticate: Digest realm=\"cam\", qop=\"auth\", nonce=\"abc\"\r\n\r\n";
@@ -200,6 +231,51 @@ mod tests {
             let answers: &'static [&'static str] = Box::leak(Box::new([CHALLENGE, image]));
             let answer = answer(answers).await;
             assert_eq!(answer.unwrap().status(), StatusCode::OK);
+        }
+    }
+
+    /// Reads the first frame of a camera whose response has these headers and this body.
+    async fn first_frame_of(headers: &'static str, body: Vec<u8>) -> Result<Bytes, SourceError> {
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let url = format!("http://{}/snap.jpg", listener.local_addr().unwrap());
+        tokio::spawn(async move {
+            let (stream, _) = listener.accept().await.unwrap();
+            let mut lines = BufReader::new(stream).lines();
+            while lines.next_line().await.unwrap() != Some(String::new()) {}
+            let head = format!("HTTP/1.1 200 OK\r\nConnection: close\r\n{headers}\r\n");
+            let stream = lines.get_mut();
+            stream
+                .write_all(&[head.as_bytes(), &body].concat())
+                .await
+                .unwrap();
+            // The rest of the stream never comes.
+            std::future::pending::<()>().await;
+        });
+        let entry = CameraEntry {
+            name: Some("hall".to_owned()),
+            url: Some(url),
+            ..CameraEntry::default()
+        };
+        let camera = entry.check("").unwrap();
+        let frame = crate::first_frame(&camera, Duration::from_secs(20)).await?;
+        Ok(frame.image)
+    }
+
+    #[tokio::test]
+    async fn streams_and_images_are_told_by_their_first_bytes() {
+        let jpeg = b"\xff\xd8\xff\xda\x00\x02xyz\xff\xd9".to_vec();
+        let part = [b"--b\r\nContent-Length: 11\r\n\r\n".as_slice(), &jpeg].concat();
+        let multipart = "Content-Type: multipart/x-mixed-replace;boundary=b\r\n";
+        let without_boundary = "Content-Type: multipart/x-mixed-replace\r\n";
+        for (headers, body) in [
+            ("", &part),
+            ("Content-Type: application/octet-stream\r\n", &part),
+            (without_boundary, &part),
+            (multipart, &part),
+            (multipart, &jpeg),
+        ] {
+            let image = first_frame_of(headers, body.clone()).await;
+            assert_eq!(image.unwrap(), jpeg, "{headers}");
         }
     }
 

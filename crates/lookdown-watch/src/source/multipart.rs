@@ -2,10 +2,14 @@
 //! deviations of cameras).
 //!
 //! The boundary is accepted with and without its leading dashes, lines may end without a carriage
-//! return, and `Content-Length` may be missing.
+//! return, and `Content-Length` may be missing or wrong. A stream without a usable boundary is
+//! split by the JPEG files in it.
 
 use bytes::{Bytes, BytesMut};
+use lookdown_common::{JPEG_END, JPEG_START};
 use memchr::memmem;
+
+use crate::jpeg_splitter::JpegSplitter;
 
 /// Most bytes of the headers of a part.
 const MAX_HEADER_BYTES: usize = 8 << 10;
@@ -21,6 +25,8 @@ pub(crate) struct PartReader {
     state: State,
     /// Number of bytes that do not contain what is searched for.
     searched: usize,
+    /// Reads the stream instead, if it has no usable boundary.
+    splitter: Option<JpegSplitter>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -39,43 +45,50 @@ const OTHER: &str = "give the URL of a JPEG snapshot or RTSP";
 /// The reason why a stream is not read further.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum PartError {
-    #[error("the camera's multipart stream names no boundary: {OTHER}")]
-    NoBoundary,
     #[error(
         "a part of the camera's multipart stream has more than {MAX_HEADER_BYTES} bytes of headers: \
          {OTHER}"
     )]
     LongHeaders,
-    #[error("the camera's multipart stream does not contain its boundary: {OTHER}")]
-    BoundaryNotFound,
     #[error("a frame of the camera's multipart stream is too large: reduce its resolution")]
     TooLarge,
 }
 
 impl PartReader {
     /// Creates a parser for a `Content-Type`, with a limit for each part.
-    ///
-    /// # Errors
-    /// [`PartError::NoBoundary`].
-    pub(crate) fn new(content_type: &str, max_part_bytes: usize) -> Result<Self, PartError> {
-        let boundary = boundary_of(content_type).ok_or(PartError::NoBoundary)?;
-        Ok(Self {
+    pub(crate) fn new(content_type: &str, max_part_bytes: usize) -> Self {
+        let boundary = boundary_of(content_type);
+        Self {
             buffer: BytesMut::new(),
-            boundary: [b"--", boundary.as_bytes()].concat(),
+            boundary: [b"--", boundary.unwrap_or_default().as_bytes()].concat(),
             max_part_bytes,
             state: State::Boundary,
             searched: 0,
-        })
+            splitter: boundary
+                .is_none()
+                .then(|| JpegSplitter::new(max_part_bytes)),
+        }
     }
 
     /// Appends received bytes.
     pub(crate) fn push(&mut self, bytes: &[u8]) {
-        self.buffer.extend_from_slice(bytes);
+        match &mut self.splitter {
+            Some(splitter) => splitter.buffer().extend_from_slice(bytes),
+            None => self.buffer.extend_from_slice(bytes),
+        }
     }
 
     /// The number of bytes in the buffer.
     pub(crate) fn buffered(&self) -> usize {
-        self.buffer.len()
+        let splitter = self.splitter.as_ref();
+        splitter.map_or(self.buffer.len(), JpegSplitter::buffered)
+    }
+
+    /// Splits the rest of the stream by its JPEG files.
+    fn split(&mut self) -> Option<Bytes> {
+        let mut splitter = JpegSplitter::new(self.max_part_bytes);
+        splitter.buffer().extend_from_slice(&self.buffer.split());
+        self.splitter.insert(splitter).next_file()
     }
 
     /// Returns the body of the next part, or `None` if more bytes are needed.
@@ -83,11 +96,20 @@ impl PartReader {
     /// # Errors
     /// [`PartError`] if the stream cannot be read further.
     pub(crate) fn next_part(&mut self) -> Result<Option<Bytes>, PartError> {
+        if let Some(splitter) = &mut self.splitter {
+            return Ok(splitter.next_file());
+        }
         loop {
             match self.state {
                 State::Boundary => {
-                    let Some(end) = self.end_of_boundary_line()? else {
-                        return Ok(None);
+                    let Some(end) = self.end_of_boundary_line() else {
+                        let has_none = self.buffer.len() > MAX_BYTES_BETWEEN;
+                        let is_image = self.buffer.starts_with(JPEG_START);
+                        return Ok(if has_none || is_image {
+                            self.split()
+                        } else {
+                            None
+                        });
                     };
                     self.consume(end, State::Headers);
                 }
@@ -133,16 +155,10 @@ impl PartReader {
         found.map(|found| self.searched + found)
     }
 
-    fn end_of_boundary_line(&mut self) -> Result<Option<usize>, PartError> {
-        let start = self.find_boundary();
-        let end = start.and_then(|start| {
-            let line = memchr::memchr(b'\n', &self.buffer[start..])?;
-            Some(start + line + 1)
-        });
-        if end.is_none() && self.buffer.len() > MAX_BYTES_BETWEEN {
-            return Err(PartError::BoundaryNotFound);
-        }
-        Ok(end)
+    fn end_of_boundary_line(&mut self) -> Option<usize> {
+        let start = self.find_boundary()?;
+        let line = memchr::memchr(b'\n', &self.buffer[start..])?;
+        Some(start + line + 1)
     }
 
     fn end_of_headers(&self) -> Result<Option<usize>, PartError> {
@@ -167,10 +183,25 @@ impl PartReader {
         if length > self.max_part_bytes {
             return Err(PartError::TooLarge);
         }
-        if self.buffer.len() < length {
-            return Ok(None);
+        let is_jpeg = self.buffer.starts_with(&JPEG_START[..2]);
+        if !is_jpeg || ends_jpeg(self.buffer.get(..length).unwrap_or_default()) {
+            let is_whole = self.buffer.len() >= length;
+            return Ok(is_whole.then(|| self.consume(length, State::Boundary)));
         }
-        Ok(Some(self.consume(length, State::Boundary)))
+        // The length is not that of the image: up to the boundary, if that is behind an image.
+        let boundary = self.find_boundary();
+        let is_behind = boundary.is_some_and(|end| {
+            let dashes = self.buffer[..end]
+                .iter()
+                .rev()
+                .take_while(|byte| **byte == b'-');
+            ends_jpeg(&self.buffer[..end - dashes.count()])
+        });
+        if is_behind || self.buffer.len() >= length {
+            self.state = State::Body(None);
+            return self.body_up_to_boundary();
+        }
+        Ok(None)
     }
 
     fn body_up_to_boundary(&mut self) -> Result<Option<Bytes>, PartError> {
@@ -194,6 +225,13 @@ impl PartReader {
     }
 }
 
+/// Returns true for bytes that end with the end of a JPEG, possibly with padding.
+fn ends_jpeg(bytes: &[u8]) -> bool {
+    let padded = |byte: &u8| matches!(byte, 0 | b'\r' | b'\n');
+    let end = bytes.iter().rposition(|byte| !padded(byte));
+    end.is_some_and(|end| bytes[..=end].ends_with(JPEG_END))
+}
+
 /// Returns the boundary of a `Content-Type` without leading dashes.
 fn boundary_of(content_type: &str) -> Option<&str> {
     let mut parameters = content_type.split(';').skip(1);
@@ -209,11 +247,15 @@ fn boundary_of(content_type: &str) -> Option<&str> {
 /// Returns the declared length of a body.
 fn content_length(headers: &[u8]) -> Option<usize> {
     let headers = std::str::from_utf8(headers).ok()?;
-    headers.lines().find_map(|line| {
-        let (name, value) = line.split_once(':')?;
-        let is_length = name.trim().eq_ignore_ascii_case("content-length");
-        is_length.then(|| value.trim().parse().ok())?
-    })
+    headers
+        .lines()
+        .find_map(|line| {
+            let (name, value) = line.split_once(':')?;
+            let is_length = name.trim().eq_ignore_ascii_case("content-length");
+            is_length.then(|| value.trim().parse().ok())?
+        })
+        // Some cameras declare 0 for a length that they do not know.
+        .filter(|length| *length > 0)
 }
 
 #[cfg(test)]
@@ -223,7 +265,7 @@ mod tests {
     const TYPE: &str = "multipart/x-mixed-replace; boundary=frame";
 
     fn parts(content_type: &str, stream: &[u8], chunk: usize) -> Result<Vec<Bytes>, PartError> {
-        let mut reader = PartReader::new(content_type, 100)?;
+        let mut reader = PartReader::new(content_type, 100);
         let mut parts = Vec::new();
         for bytes in stream.chunks(chunk) {
             reader.push(bytes);
@@ -256,7 +298,7 @@ mod tests {
 
     #[test]
     fn the_rest_of_a_stream_does_not_keep_a_part_in_memory() {
-        let mut reader = PartReader::new(TYPE, 100).unwrap();
+        let mut reader = PartReader::new(TYPE, 100);
         reader.push(b"--frame\r\nContent-Length: 90\r\n\r\n");
         reader.push(&[b'x'; 90]);
         reader.push(b"\r\n--frame\r\n");
@@ -280,18 +322,50 @@ mod tests {
         assert_eq!(parts(TYPE, &endless, 10), Err(PartError::TooLarge));
         let headers = [b"--frame\r\n".as_slice(), &[b'x'; 9000]].concat();
         assert_eq!(parts(TYPE, &headers, 1000), Err(PartError::LongHeaders));
-        let noise = vec![b'x'; 70_000];
-        assert_eq!(parts(TYPE, &noise, 1000), Err(PartError::BoundaryNotFound));
+    }
+
+    const JPEG: &[u8] = b"\xff\xd8\xff\xda\x00\x02xyz\xff\xd9";
+
+    /// A stream of two images whose parts have this header.
+    fn stream(header: &str) -> Vec<u8> {
+        let part = [
+            b"--frame\r\n",
+            header.as_bytes(),
+            b"\r\n\r\n",
+            JPEG,
+            b"\r\n",
+        ]
+        .concat();
+        [&part, &part, b"--frame\r\n".as_slice()].concat()
     }
 
     #[test]
-    fn a_stream_without_a_boundary_is_refused() {
+    fn streams_without_a_usable_boundary_are_split_by_images() {
+        let noise = [vec![b'x'; 70_000], stream("A: b")].concat();
         for content_type in [
+            "",
             "multipart/x-mixed-replace",
-            "a/b; boundary=",
             "a/b; boundary=--",
+            "a/b; boundary=x",
         ] {
-            assert_eq!(parts(content_type, b"", 1), Err(PartError::NoBoundary));
+            for chunk in [1, 1000] {
+                let found = parts(content_type, &noise, chunk).unwrap();
+                assert_eq!(found, [JPEG, JPEG], "{content_type}");
+            }
+        }
+        // A snapshot with the label of a stream.
+        assert_eq!(parts(TYPE, JPEG, 4).unwrap(), [JPEG]);
+    }
+
+    #[test]
+    fn wrong_lengths_of_images_are_corrected() {
+        for length in [0, 3, 9, 12, 15, 40, 90] {
+            let stream = stream(&format!("Content-Length: {length}"));
+            for chunk in [1, 7, 1000] {
+                let found = parts(TYPE, &stream, chunk).unwrap();
+                let is_whole = found.iter().all(|part| part.starts_with(JPEG));
+                assert!(found.len() == 2 && is_whole, "{length}: {found:?}");
+            }
         }
     }
 }

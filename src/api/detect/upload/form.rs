@@ -2,10 +2,7 @@
 
 use axum::{
     body::Body,
-    extract::{
-        DefaultBodyLimit, FromRequest, Multipart, Request,
-        multipart::{Field, MultipartError},
-    },
+    extract::{DefaultBodyLimit, FromRequest, Multipart, Request, multipart::MultipartError},
     http::request::Parts,
 };
 use bytes::Bytes;
@@ -53,6 +50,8 @@ pub(super) async fn parse(
     body: Bytes,
     use_of: fn(&str) -> Result<FieldUse, Problem>,
 ) -> Result<Form, Problem> {
+    let ending = wrong_line_ending(&body);
+    let broken = |error| ending.map_or_else(|| broken(error), malformed);
     let mut request = Request::from_parts(parts, Body::from(body));
     // The body was limited when it was read.
     DefaultBodyLimit::disable().apply(&mut request);
@@ -87,7 +86,7 @@ pub(super) async fn parse(
                 }
             }
             FieldUse::Parameter => {
-                let value = value_of(&name, field).await?;
+                let value = value_of(&name, &field.bytes().await.map_err(broken)?)?;
                 parameters.push((name, value));
             }
             FieldUse::None => {}
@@ -103,13 +102,12 @@ pub(super) async fn parse(
     })
 }
 
-async fn value_of(name: &str, field: Field<'_>) -> Result<String, Problem> {
-    let bytes = field.bytes().await.map_err(broken)?;
+fn value_of(name: &str, bytes: &[u8]) -> Result<String, Problem> {
     if bytes.len() > MAX_VALUE_BYTES {
         let fault = format!("the value is longer than {MAX_VALUE_BYTES} bytes");
         return Err(invalid(name, &fault));
     }
-    let text = str::from_utf8(&bytes).map_err(|_| invalid(name, "the value is not UTF-8 text"))?;
+    let text = str::from_utf8(bytes).map_err(|_| invalid(name, "the value is not UTF-8 text"))?;
     Ok(text.to_owned())
 }
 
@@ -151,6 +149,13 @@ fn name_of_file(path: &str) -> Option<String> {
 
 fn malformed(detail: &str) -> Problem {
     Problem::new(ProblemKind::MalformedRequest, detail)
+}
+
+/// Returns the fault of a form whose lines end with LF alone, which scripts write.
+fn wrong_line_ending(body: &[u8]) -> Option<&'static str> {
+    let end = body.iter().position(|byte| *byte == b'\n')?;
+    let is_wrong = body.starts_with(b"--") && body[end - 1] != b'\r';
+    is_wrong.then_some("the lines of the multipart form end with LF: end them with CRLF")
 }
 
 #[expect(clippy::needless_pass_by_value, reason = "the shape map_err needs")]

@@ -20,7 +20,7 @@ use crate::{
 };
 use lookdown_imaging::{
     Frame, NetworkInput,
-    lens_circle::{LensCircle, assumed_circle, find_lens_circle},
+    lens_circle::{LensCircle, assumed_circle, find_lens_circle, shows_two_circles},
 };
 
 /// The rounding step of lens circles, as a share of the radius. Rounding maps the jittering circles
@@ -124,8 +124,15 @@ impl Engine {
         model: &Model,
         warnings: &mut Vec<Warning>,
     ) -> Result<FrameCamera, PipelineError> {
+        let middle = assumed_circle(frame.width(), frame.height());
         let found = find_lens_circle(frame);
-        let circle = found.unwrap_or_else(|| assumed_circle(frame.width(), frame.height()));
+        // A circle in the middle is that of one lens.
+        let is_middle = |circle: &LensCircle| {
+            (circle.cx - middle.cx).hypot(circle.cy - middle.cy) < circle.radius / 2.0
+        };
+        let has_two = !found.as_ref().is_some_and(is_middle) && shows_two_circles(frame);
+        let found = found.filter(|_| !has_two);
+        let circle = found.unwrap_or(middle);
         let (camera, circle) = rounded(&circle);
         let lens = Lens::equidistant_circle(circle.cx, circle.cy, circle.radius, FRAC_PI_2)
             .map_err(|error| internal(anyhow::Error::new(error)))?;
@@ -135,11 +142,14 @@ impl Engine {
              assumed, with the lens circle calibration.assumed_circle",
         ));
         if found.is_none() {
-            warnings.push(Warning::new(
-                WarningCode::LensCircleNotFound,
+            let problem = if has_two {
+                "the frame shows two lens circles: crop each to a frame of its own, and send these \
+                 as two cameras"
+            } else {
                 "the frame shows no lens circle: the largest circle in the middle of the frame was \
-                 assumed, name a calibration instead",
-            ));
+                 assumed, name a calibration instead"
+            };
+            warnings.push(Warning::new(WarningCode::LensCircleNotFound, problem));
         }
         let geometry = CameraGeometry {
             lens,
