@@ -66,12 +66,16 @@ fn routes() -> OpenApiRouter<ApiState> {
         .merge(metrics())
 }
 
-/// Returns the OpenAPI document of all routes.
+/// Returns the OpenAPI document of all routes, those of the counts included if it is so.
 ///
 /// # Errors
 /// A document that is not JSON.
-pub fn openapi_document() -> serde_json::Result<Document> {
-    Document::of(&openapi::complete(routes().into_openapi()))
+pub fn openapi_document(with_counts: bool) -> serde_json::Result<Document> {
+    let mut document = routes().into_openapi();
+    if with_counts {
+        document.merge(lookdown_count::openapi_document());
+    }
+    Document::of(&openapi::complete(document))
 }
 
 /// The routes of the native API and of the Open Inference Protocol.

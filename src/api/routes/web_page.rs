@@ -14,7 +14,10 @@ use axum::{
     response::{IntoResponse, Response},
     routing::get,
 };
-use lookdown_http::page_headers;
+use lookdown_http::{
+    entity_tags::{entity_tag, is_unmodified},
+    page_headers,
+};
 use lookdown_lens::revision::revision_of;
 
 use serde::Serialize;
@@ -22,10 +25,7 @@ use serde::Serialize;
 use crate::{
     api::{
         ApiState,
-        http::{
-            entity_tags::{entity_tag, is_unmodified},
-            problem::{Problem, ProblemKind},
-        },
+        http::problem::{Problem, ProblemKind},
         require_scope::RequireAdmin,
     },
     samples::SAMPLES,

@@ -6,17 +6,20 @@ use std::{
 };
 
 use axum::{
-    Json,
     extract::{Path, Query, State, rejection::QueryRejection},
     http::{
-        HeaderMap,
-        header::{ACCEPT, CONTENT_TYPE},
+        HeaderMap, HeaderValue, StatusCode,
+        header::{ACCEPT, CACHE_CONTROL, CONTENT_TYPE, ETAG},
     },
     response::{IntoResponse, Response},
 };
 use jiff::Timestamp;
 use lookdown_common::text::{one_line, shortened, with_causes};
-use lookdown_http::problem::Problem;
+use lookdown_http::{
+    entity_tags::{entity_tag, is_unmodified},
+    problem::Problem,
+};
+use lookdown_lens::revision::revision_of;
 use serde::Serialize;
 use utoipa::{
     ToSchema,
@@ -107,12 +110,19 @@ fn zones_schema() -> Object {
 type Names = (BTreeSet<(String, String)>, BTreeSet<String>);
 
 /// Get the counts of a camera
+///
+/// `If-None-Match` with the `ETag` of known counts returns 304 until they change.
 #[utoipa::path(
     get, path = "/counts/{camera}", tag = "counts", operation_id = "get_camera_counts",
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
-    params(("camera" = String, Path, description = "The name of the camera."), TimeParameters),
-    responses((status = OK, description = "Counts per step. Unknown counts are null.",
-        content((Counts = "application/json"), (String = "text/csv"))))
+    params(("camera" = String, Path, description = "The name of the camera."), TimeParameters,
+        ("If-None-Match" = Option<String>, Header, nullable = false, description = "The ETag of the known counts.")),
+    responses(
+        (status = OK, description = "Counts per step. Unknown counts are null.",
+            content((Counts = "application/json"), (String = "text/csv")),
+            headers(("ETag" = String, description = "It changes with the counts."))),
+        (status = NOT_MODIFIED, description = "The counts are the same."),
+    )
 )]
 pub(super) async fn of_camera(
     State(api): State<Shared>,
@@ -124,12 +134,19 @@ pub(super) async fn of_camera(
 }
 
 /// Get the counts of a site
+///
+/// `If-None-Match` with the `ETag` of known counts returns 304 until they change.
 #[utoipa::path(
     get, path = "/sites/{site}", tag = "sites", operation_id = "get_site_counts",
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
-    params(("site" = String, Path, description = "The name of the site."), TimeParameters),
-    responses((status = OK, description = "Counts per step. Unknown counts are null.",
-        content((Counts = "application/json"), (String = "text/csv"))))
+    params(("site" = String, Path, description = "The name of the site."), TimeParameters,
+        ("If-None-Match" = Option<String>, Header, nullable = false, description = "The ETag of the known counts.")),
+    responses(
+        (status = OK, description = "Counts per step. Unknown counts are null.",
+            content((Counts = "application/json"), (String = "text/csv")),
+            headers(("ETag" = String, description = "It changes with the counts."))),
+        (status = NOT_MODIFIED, description = "The counts are the same."),
+    )
 )]
 pub(super) async fn of_site(
     State(api): State<Shared>,
@@ -162,16 +179,25 @@ async fn answer(
     check_known(api, &owner).await?;
     let names = current_names(api, &owner);
     let store = api.store.clone();
-    blocking(move || {
+    let (media_type, text) = blocking(move || {
         let sums = stored(store.steps(&owner, span, MAX_VALUES))?.ok_or_else(too_large)?;
         let counts = counts(owner, span, &sums, names).ok_or_else(too_large)?;
-        if !is_csv {
-            return Ok(Json(counts).into_response());
+        if is_csv {
+            return Ok(("text/csv; charset=utf-8; header=present", csv(&counts)));
         }
-        let content_type = [(CONTENT_TYPE, "text/csv; charset=utf-8; header=present")];
-        Ok((content_type, csv(&counts)).into_response())
+        let json = serde_json::to_string(&counts).map_err(|_| Problem::internal())?;
+        Ok(("application/json", json))
     })
-    .await
+    .await?;
+    let revision = revision_of(text.as_bytes());
+    let about = [
+        (ETAG, entity_tag(&revision)),
+        (CACHE_CONTROL, HeaderValue::from_static("no-cache")),
+    ];
+    if is_unmodified(headers, &revision)? {
+        return Ok((StatusCode::NOT_MODIFIED, about).into_response());
+    }
+    Ok((about, [(CONTENT_TYPE, media_type)], text).into_response())
 }
 
 fn too_large() -> Problem {
