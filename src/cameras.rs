@@ -31,8 +31,10 @@ const TEST_TIMEOUT: Duration = Duration::from_secs(15);
 const TOO_MANY: &str = "there are 256 cameras: delete one first";
 /// Most cameras that are tested at a time: each may start a decoder.
 const MAX_TESTS: usize = 4;
-/// The file with the names of the cameras of the settings that are paused, in the state folder.
+/// The files with the names of the cameras of the settings that are paused, and whose latest image
+/// is kept, in the state folder.
 const PAUSED: &str = "paused.json";
+const WITH_IMAGE: &str = "images.json";
 
 /// The cameras of this process.
 pub struct Cameras {
@@ -45,6 +47,8 @@ pub struct Cameras {
     defaults: RwLock<CameraEntry>,
     /// The stored cameras that cannot be watched, with the reasons.
     problems: RwLock<BTreeMap<String, String>>,
+    /// The cameras whose latest image is kept.
+    with_image: RwLock<BTreeSet<String>>,
     /// The permits of tests.
     tests: Semaphore,
     /// The names of all cameras.
@@ -62,6 +66,7 @@ impl Cameras {
             configured: RwLock::default(),
             defaults: RwLock::default(),
             problems: RwLock::default(),
+            with_image: RwLock::default(),
             tests: Semaphore::new(MAX_TESTS),
             own,
             metrics,
@@ -90,7 +95,7 @@ impl Cameras {
     /// # Errors
     /// [`ConfigError`].
     pub fn paused_of_settings(&self) -> Result<BTreeMap<String, String>, ConfigError> {
-        let paused = self.paused()?;
+        let paused = self.listed(PAUSED)?;
         let configured = self.configured.read();
         let of_settings = configured.iter().filter(|(name, _)| paused.contains(*name));
         let with_source =
@@ -102,6 +107,12 @@ impl Cameras {
     #[must_use]
     pub fn problems(&self) -> BTreeMap<String, String> {
         self.problems.read().clone()
+    }
+
+    /// Returns true if the latest image of the camera is kept. A change applies once it is loaded.
+    #[must_use]
+    pub fn keeps_image(&self, name: &str) -> bool {
+        self.with_image.read().contains(name)
     }
 
     /// Returns true while frames of the camera are read.
@@ -123,7 +134,7 @@ impl Cameras {
                 (name, is_on)
             })
             .collect();
-        let paused = self.paused()?;
+        let paused = self.listed(PAUSED)?;
         for name in self.configured.read().keys() {
             let is_on = !paused.contains(name) || self.is_watched(name);
             states.insert(name.clone(), is_on);
@@ -137,24 +148,42 @@ impl Cameras {
     /// # Errors
     /// [`CameraError`].
     pub fn set_detection(&self, name: &str, is_on: bool) -> Result<bool, CameraError> {
+        self.change(name, Some(!is_on), None)
+    }
+
+    /// Pauses or resumes a camera, and switches whether its latest image is kept; `None` leaves it.
+    /// Returns false for an unknown camera. Blocks.
+    ///
+    /// # Errors
+    /// [`CameraError`].
+    pub fn change(
+        &self,
+        name: &str,
+        paused: Option<bool>,
+        keep_image: Option<bool>,
+    ) -> Result<bool, CameraError> {
         let _changing = self.changing.lock();
         let configured: BTreeSet<_> = self.configured.read().keys().cloned().collect();
         if configured.contains(name) {
-            let mut paused = self.paused()?;
-            // Names that the settings no longer have are dropped, so that the file stays small.
-            paused.retain(|paused| configured.contains(paused) && paused != name);
-            if !is_on {
-                paused.insert(name.to_owned());
+            for (list, is_listed) in [(PAUSED, paused), (WITH_IMAGE, keep_image)] {
+                let Some(is_listed) = is_listed else { continue };
+                let mut names = self.listed(list)?;
+                // Names that the settings no longer have are dropped, so that the file stays small.
+                names.retain(|other| configured.contains(other) && other != name);
+                if is_listed {
+                    names.insert(name.to_owned());
+                }
+                let content = serde_json::to_string(&names).unwrap_or_default();
+                self.folder.write(&self.folder.file(list), &content)?;
             }
-            let content = serde_json::to_string(&paused).unwrap_or_default();
-            self.folder.write(&self.folder.file(PAUSED), &content)?;
             return Ok(true);
         }
         let mut file = self.file()?;
         let Some(camera) = file.cameras.get_mut(name) else {
             return Ok(false);
         };
-        camera.paused = !is_on;
+        camera.paused = paused.unwrap_or(camera.paused);
+        camera.keep_image = keep_image.unwrap_or(camera.keep_image);
         self.store(&file)?;
         Ok(true)
     }
@@ -175,8 +204,13 @@ impl Cameras {
             .iter()
             .map(|camera| (camera.name.clone(), camera.clone()));
         let configured: BTreeMap<_, _> = named.collect();
-        let paused = self.paused()?;
+        let paused = self.listed(PAUSED)?;
+        let mut with_image = self.listed(WITH_IMAGE)?;
+        with_image.retain(|name| configured.contains_key(name));
         let file = self.file()?;
+        let stored = file.cameras.iter().filter(|(_, camera)| camera.keep_image);
+        with_image.extend(stored.map(|(name, _)| name.clone()));
+        *self.with_image.write() = with_image;
         self.own.set(
             configured
                 .keys()
@@ -229,9 +263,9 @@ impl Cameras {
         CameraFile::read(&self.folder)
     }
 
-    /// Returns the names of the paused cameras of the settings, possibly also of earlier settings.
-    fn paused(&self) -> Result<BTreeSet<String>, ConfigError> {
-        self.folder.read(PAUSED)
+    /// Returns the names in a list of cameras of the settings, possibly also of earlier settings.
+    fn listed(&self, list: &str) -> Result<BTreeSet<String>, ConfigError> {
+        self.folder.read(list)
     }
 
     /// Creates or replaces a camera, and returns true if it is new. Without a URL, the stored one

@@ -123,6 +123,59 @@ async fn a_camera_that_is_not_counted_has_a_warning() {
 }
 
 #[tokio::test]
+async fn the_field_at_fault_of_a_camera_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let companions = Companions::default();
+    let service = service(folder.path(), &companions);
+    for (body, detail) in [
+        (
+            r#"{ "parameters": {} }"#,
+            "parameters: there is no such field: use paused, keep_image",
+        ),
+        (
+            r#"{ "paused": "secret" }"#,
+            "paused: it has a value of another type",
+        ),
+        (
+            r#"{ "paused": 1, "keep_image": 2 }"#,
+            "body: line 1: not a camera",
+        ),
+        ("[", "body: line 1: not a camera"),
+    ] {
+        let refused = service.patch("/cameras/hall", body).await;
+        let said = refused.problem()["detail"].to_string();
+        assert!(said.contains(detail) && !said.contains("secret"), "{said}");
+    }
+}
+
+#[tokio::test]
+async fn an_image_is_kept_after_it_is_switched_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let companions = Companions::default();
+    let metrics = Arc::new(Metrics::new().unwrap());
+    let own = lookdown_common::OwnCameras::default();
+    let cameras = Arc::new(Cameras::new(folder.path().into(), own, metrics));
+    companions.set_cameras(Arc::clone(&cameras));
+    let service = Service::within(&Bounds {
+        companions,
+        ..Bounds::default()
+    });
+    service.put("/cameras/hall", CAMERA).await;
+    for (change, status) in [("true", StatusCode::OK), ("false", StatusCode::NOT_FOUND)] {
+        let body = format!(r#"{{ "keep_image": {change} }}"#);
+        let changed = service.patch("/cameras/hall", &body).await;
+        assert_eq!(changed.status, StatusCode::NO_CONTENT, "{changed:?}");
+        let loaded = cameras.add_to(&mut Vec::new(), &lookdown_watch::CameraEntry::default());
+        loaded.unwrap();
+        service.post_raw("camera=hall", frame()).await;
+        let image = service.get("/results/hall/latest.jpg").await;
+        assert_eq!(image.status, status, "{change}");
+        let row = service.get("/cameras/hall").await.json();
+        assert_eq!(row["keep_image"].to_string(), change);
+    }
+}
+
+#[tokio::test]
 async fn frames_of_others_do_not_replace_an_own_camera() {
     let companions = Companions::default();
     companions.own_cameras().set(["hall".to_owned()].into());
