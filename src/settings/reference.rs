@@ -26,7 +26,7 @@ Every setting with its key, environment variable, type and default. This page is
   apply first, then the file of `--config FILE`, then environment variables, then flags: `--set KEY=VALUE`, such as `--set limits.max_frames_in_flight=8`, and `--listen
   ADDRESS:PORT` for `server.listen`.
   [config/lookdown.toml](../config/lookdown.toml) is a file with every key at its default.
-* `lookdown serve --check` reports whether a server can start with the chosen settings, and which
+* `lookdown run --check` and `serve --check` report whether they can start with the chosen settings, and which
   clients have access.
 * The lists `[[cameras]]` with `[camera_defaults]`, and `[[webhooks]]`, are in the file only:
   [watch.md](watch.md#several-cameras) and [count.md](count.md#webhooks) describe their keys.

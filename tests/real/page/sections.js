@@ -99,6 +99,17 @@ pageTest("a camera with kept images is shown with them", "#cameras", async (page
   await page.getByRole("article", { name: "Camera gate" }).getByAltText("The latest frame of gate").waitFor();
 });
 
+pageTest("the skip link leads to the content, and boxes are no tab stops", "#cameras", async (page) => {
+  await post("gate", "office");
+  const card = page.getByRole("article", { name: "Camera gate" });
+  await card.locator("[data-box]").first().waitFor();
+  await page.keyboard.press("Tab");
+  await page.getByRole("link", { name: "Skip to the content" }).press("Enter");
+  assert.equal(await page.evaluate(() => document.activeElement.id), "main");
+  assert.match(page.url(), /#cameras$/);
+  assert.equal(await card.locator("[data-box][tabindex]").count(), 0);
+});
+
 pageTest("a later visitor sees earlier results", "#detect", async (page) => {
   await post("yard", "office");
   await post("yard", "lounge", "profile=fast&max_detections=1");
