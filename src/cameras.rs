@@ -109,7 +109,7 @@ impl Cameras {
         self.problems.read().clone()
     }
 
-    /// Returns true if the latest image of the camera is kept. A change applies once it is loaded.
+    /// Returns true if the latest image of the camera is kept.
     #[must_use]
     pub fn keeps_image(&self, name: &str) -> bool {
         self.with_image.read().contains(name)
@@ -176,6 +176,7 @@ impl Cameras {
                 let content = serde_json::to_string(&names).unwrap_or_default();
                 self.folder.write(&self.folder.file(list), &content)?;
             }
+            self.set_with_image(name, keep_image);
             return Ok(true);
         }
         let mut file = self.file()?;
@@ -185,6 +186,7 @@ impl Cameras {
         camera.paused = paused.unwrap_or(camera.paused);
         camera.keep_image = keep_image.unwrap_or(camera.keep_image);
         self.store(&file)?;
+        self.set_with_image(name, keep_image);
         Ok(true)
     }
 
@@ -258,6 +260,16 @@ impl Cameras {
         Ok(self.file()?.cameras)
     }
 
+    /// Switches at once whether the latest image of a camera is kept.
+    fn set_with_image(&self, name: &str, keep_image: Option<bool>) {
+        let mut with_image = self.with_image.write();
+        match keep_image {
+            Some(true) => drop(with_image.insert(name.to_owned())),
+            Some(false) => drop(with_image.remove(name)),
+            None => {}
+        }
+    }
+
     /// Reads the file of the cameras.
     fn file(&self) -> Result<CameraFile, ConfigError> {
         CameraFile::read(&self.folder)
@@ -305,8 +317,10 @@ impl Cameras {
             None => {}
         }
         file.invalid.remove(name);
+        let keep_image = camera.keep_image;
         let is_new = file.cameras.insert(name.to_owned(), camera).is_none();
         self.store(&file)?;
+        self.set_with_image(name, Some(keep_image));
         Ok(is_new)
     }
 

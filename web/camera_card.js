@@ -76,6 +76,11 @@ async function showImage(card) {
     const answer = await ask(`results/${encodeURIComponent(card.camera)}/latest.jpg?draw=${layersBelow(card)}&width=${width}`);
     const image = element("img", { alt: `The latest frame of ${card.camera}`, src: URL.createObjectURL(await answer.blob()) });
     await image.decode();
+    // The switch may have been turned off meanwhile.
+    if (!card.hasImage) {
+      URL.revokeObjectURL(image.src);
+      return;
+    }
     find(".sight", card.node).firstChild.replaceWith(image);
     if (card.image) URL.revokeObjectURL(card.image.src);
     card.image = image;
@@ -136,6 +141,7 @@ function managing(card) {
 function dropImage(card) {
   if (card.image) URL.revokeObjectURL(card.image.src);
   Object.assign(card, { image: null, hasImage: false });
+  find(".sight > img", card.node)?.replaceWith(sketch(card.report));
 }
 
 export function tellAge({ age, reportedAt }) {

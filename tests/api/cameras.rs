@@ -152,21 +152,12 @@ async fn the_field_at_fault_of_a_camera_is_named() {
 async fn an_image_is_kept_after_it_is_switched_on() {
     let folder = tempfile::tempdir().unwrap();
     let companions = Companions::default();
-    let metrics = Arc::new(Metrics::new().unwrap());
-    let own = lookdown_common::OwnCameras::default();
-    let cameras = Arc::new(Cameras::new(folder.path().into(), own, metrics));
-    companions.set_cameras(Arc::clone(&cameras));
-    let service = Service::within(&Bounds {
-        companions,
-        ..Bounds::default()
-    });
+    let service = service(folder.path(), &companions);
     service.put("/cameras/hall", CAMERA).await;
     for (change, status) in [("true", StatusCode::OK), ("false", StatusCode::NOT_FOUND)] {
         let body = format!(r#"{{ "keep_image": {change} }}"#);
         let changed = service.patch("/cameras/hall", &body).await;
         assert_eq!(changed.status, StatusCode::NO_CONTENT, "{changed:?}");
-        let loaded = cameras.add_to(&mut Vec::new(), &lookdown_watch::CameraEntry::default());
-        loaded.unwrap();
         service.post_raw("camera=hall", frame()).await;
         let image = service.get("/results/hall/latest.jpg").await;
         assert_eq!(image.status, status, "{change}");

@@ -73,9 +73,11 @@ pub(in crate::api) struct NewCamera {
 #[schema(example = json!({ "paused": true }))]
 pub(in crate::api) struct CameraChange {
     /// `true` to read no frames.
+    #[schema(nullable = false)]
     paused: Option<bool>,
     /// `true` to keep the latest image, as for a camera in the setting `results.images`. After
     /// `false`, the next frame removes it.
+    #[schema(nullable = false)]
     keep_image: Option<bool>,
 }
 

@@ -44,7 +44,8 @@ const NO_CACHE: HeaderValue = HeaderValue::from_static("no-cache");
 /// with the `ETag` of a known list returns 304 until a report or a number is new.
 #[utoipa::path(
     get, path = "/results", tag = "results", operation_id = "list_results",
-    params(("If-None-Match" = Option<String>, Header, nullable = false, description = "The ETag of the known list.")),
+    params(("If-None-Match" = Option<String>, Header, nullable = false, pattern = r#"^(\*|(W/)?"[!#-~]*")$"#,
+        description = "The ETag of the known list.")),
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
     responses(
         (status = OK, description = "By name.", body = Vec<CameraRow>,

@@ -99,7 +99,7 @@ pageTest("a camera with kept images is shown with them", "#cameras", async (page
   await page.getByRole("article", { name: "Camera gate" }).getByAltText("The latest frame of gate").waitFor();
 });
 
-pageTest("the skip link leads to the content, and boxes are no tab stops", "#cameras", async (page) => {
+pageTest("the skip link leads to the content, and Tab passes over boxes", "#cameras", async (page) => {
   await post("gate", "office");
   const card = page.getByRole("article", { name: "Camera gate" });
   await card.locator("[data-box]").first().waitFor();

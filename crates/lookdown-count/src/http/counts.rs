@@ -116,7 +116,8 @@ type Names = (BTreeSet<(String, String)>, BTreeSet<String>);
     get, path = "/counts/{camera}", tag = "counts", operation_id = "get_camera_counts",
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
     params(("camera" = String, Path, description = "The name of the camera."), TimeParameters,
-        ("If-None-Match" = Option<String>, Header, nullable = false, description = "The ETag of the known counts.")),
+        ("If-None-Match" = Option<String>, Header, nullable = false, pattern = r#"^(\*|"[!#-~]*")$"#,
+            description = "The ETag of the known counts.")),
     responses(
         (status = OK, description = "Counts per step. Unknown counts are null.",
             content((Counts = "application/json"), (String = "text/csv")),
@@ -140,7 +141,8 @@ pub(super) async fn of_camera(
     get, path = "/sites/{site}", tag = "sites", operation_id = "get_site_counts",
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
     params(("site" = String, Path, description = "The name of the site."), TimeParameters,
-        ("If-None-Match" = Option<String>, Header, nullable = false, description = "The ETag of the known counts.")),
+        ("If-None-Match" = Option<String>, Header, nullable = false, pattern = r#"^(\*|"[!#-~]*")$"#,
+            description = "The ETag of the known counts.")),
     responses(
         (status = OK, description = "Counts per step. Unknown counts are null.",
             content((Counts = "application/json"), (String = "text/csv")),
