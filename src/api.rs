@@ -25,6 +25,7 @@ use lookdown_detect::open_inference::HEAD_LENGTH;
 use lookdown_http::{csrf, header_limits, host, page_headers};
 use tower::{ServiceBuilder, util::option_layer};
 use tower_http::catch_panic::CatchPanicLayer;
+use utoipa::openapi::OpenApi;
 use utoipa_axum::{router::OpenApiRouter, routes};
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
@@ -66,14 +67,14 @@ fn routes() -> OpenApiRouter<ApiState> {
         .merge(metrics())
 }
 
-/// Returns the OpenAPI document of all routes, those of the counts included if it is so.
+/// Returns the OpenAPI document of all routes, with those of the counts if their document is given.
 ///
 /// # Errors
 /// A document that is not JSON.
-pub fn openapi_document(with_counts: bool) -> serde_json::Result<Document> {
+pub fn openapi_document(counts: Option<OpenApi>) -> serde_json::Result<Document> {
     let mut document = routes().into_openapi();
-    if with_counts {
-        document.merge(lookdown_count::openapi_document());
+    if let Some(counts) = counts {
+        document.merge(counts);
     }
     Document::of(&openapi::complete(document))
 }

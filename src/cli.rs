@@ -137,7 +137,7 @@ fn print_openapi(of_counts: bool) -> anyhow::Result<ExitCode> {
     let document = if of_counts {
         lookdown_count::openapi_document().to_pretty_json()?
     } else {
-        serde_json::to_string_pretty(&api::openapi_document(false)?)?
+        serde_json::to_string_pretty(&api::openapi_document(None)?)?
     };
     writeln!(io::stdout(), "{document}").context(UNWRITABLE)?;
     Ok(ExitCode::SUCCESS)

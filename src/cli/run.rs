@@ -180,7 +180,7 @@ impl Parts {
             Arc::clone(&metrics),
         ));
         app.set_cameras(&stored);
-        companions.expect_counts();
+        companions.expect_counts(lookdown_count::openapi_document);
         let server = ServerOptions {
             url: url.parse()?,
             api_key: self.key.clone(),

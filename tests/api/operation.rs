@@ -100,6 +100,6 @@ async fn the_server_serves_its_openapi_document() {
         let schemas = document["components"]["schemas"].as_object().unwrap();
         assert!(schemas.contains_key("CameraRow"));
         assert_eq!(schemas.contains_key("CountedCamera"), has_counts);
-        companions.expect_counts();
+        companions.expect_counts(lookdown_count::openapi_document);
     }
 }

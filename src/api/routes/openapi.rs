@@ -2,12 +2,14 @@
 
 use axum::{Extension, Json, extract::State};
 
+use utoipa::openapi::OpenApi;
+
 use crate::api::{ApiState, http::problem::Problem, openapi::Document};
 
-/// Builds the OpenAPI document of all routes, with those of the counts or without.
+/// Builds the OpenAPI document of all routes, with those of the counts if their document is given.
 #[derive(Clone, Copy)]
 pub(in crate::api) struct DocumentSource(
-    pub(in crate::api) fn(bool) -> serde_json::Result<Document>,
+    pub(in crate::api) fn(Option<OpenApi>) -> serde_json::Result<Document>,
 );
 
 /// Get the OpenAPI document
@@ -21,7 +23,7 @@ pub(in crate::api) async fn openapi_json(
     State(state): State<ApiState>,
     Extension(DocumentSource(document)): Extension<DocumentSource>,
 ) -> Result<Json<Document>, Problem> {
-    document(state.options.companions.has_counts())
+    document(state.options.companions.counts_document())
         .map(Json)
         .map_err(Problem::internal)
 }

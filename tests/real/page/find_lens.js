@@ -20,7 +20,8 @@ for (const [device, options] of [["wide", {}], ["phone", { viewport: PHONE, hasT
     async (page) => {
       await start(page);
       await findButton(page).click();
-      await page.getByText("This frame cannot tell which").waitFor();
+      // Three fits, one after the other.
+      await page.getByText("This frame cannot tell which").waitFor({ timeout: 180_000 });
       assert.deepEqual(await page.locator("#lens-choice h3").allTextContents(), ["equidistant", "equisolid"]);
       assert.equal(await page.locator("#lens-choice canvas").count(), 4);
       await assertFits(page);
