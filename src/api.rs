@@ -73,7 +73,10 @@ fn routes() -> OpenApiRouter<ApiState> {
 /// A document that is not JSON.
 pub fn openapi_document(counts: Option<OpenApi>) -> serde_json::Result<Document> {
     let mut document = routes().into_openapi();
-    if let Some(counts) = counts {
+    if let Some(mut counts) = counts {
+        let tags = counts.tags.iter_mut();
+        // Both documents have the tag of health checks and metrics.
+        tags.for_each(|tags| tags.retain(|tag| tag.name != "operation"));
         document.merge(counts);
     }
     Document::of(&openapi::complete(document))

@@ -97,6 +97,10 @@ async fn the_server_serves_its_openapi_document() {
             let is_there = document["paths"][path]["get"].is_object();
             assert_eq!(is_there, has_counts, "{path}");
         }
+        let tags = document["tags"].as_array().unwrap();
+        let names: std::collections::BTreeSet<_> =
+            tags.iter().map(|tag| tag["name"].as_str()).collect();
+        assert_eq!(names.len(), tags.len());
         let schemas = document["components"]["schemas"].as_object().unwrap();
         assert!(schemas.contains_key("CameraRow"));
         assert_eq!(schemas.contains_key("CountedCamera"), has_counts);

@@ -171,7 +171,7 @@ fn a_camera_is_counted_on_the_port_of_the_server() {
     let counts = running.get("/counts", &key);
     assert!(counts.contains("\"name\":\"hall\""), "{counts}");
     assert!(counts.starts_with("HTTP/1.1 200 "), "{counts}");
-    let past = "/counts/hall?from=2026-01-01&to=2026-01-02";
+    let past = "/counts/hall?from=2026-01-01T00:00:00Z&to=2026-01-02T00:00:00Z";
     let counts = running.get(past, &key);
     let tag = counts.lines().find(|line| line.starts_with("etag: "));
     let known = tag.unwrap().replace("etag", "If-None-Match");
