@@ -25,6 +25,7 @@ use lookdown_detect::open_inference::HEAD_LENGTH;
 use lookdown_http::{csrf, header_limits, host, page_headers};
 use tower::{ServiceBuilder, util::option_layer};
 use tower_http::catch_panic::CatchPanicLayer;
+use utoipa::openapi::OpenApi;
 use utoipa_axum::{router::OpenApiRouter, routes};
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
@@ -66,12 +67,19 @@ fn routes() -> OpenApiRouter<ApiState> {
         .merge(metrics())
 }
 
-/// Returns the OpenAPI document of all routes.
+/// Returns the OpenAPI document of all routes, with those of the counts if their document is given.
 ///
 /// # Errors
 /// A document that is not JSON.
-pub fn openapi_document() -> serde_json::Result<Document> {
-    Document::of(&openapi::complete(routes().into_openapi()))
+pub fn openapi_document(counts: Option<OpenApi>) -> serde_json::Result<Document> {
+    let mut document = routes().into_openapi();
+    if let Some(mut counts) = counts {
+        let tags = counts.tags.iter_mut();
+        // Both documents have the tag of health checks and metrics.
+        tags.for_each(|tags| tags.retain(|tag| tag.name != "operation"));
+        document.merge(counts);
+    }
+    Document::of(&openapi::complete(document))
 }
 
 /// The routes of the native API and of the Open Inference Protocol.

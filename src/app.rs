@@ -329,7 +329,10 @@ fn companions(settings: &CountSettings) -> anyhow::Result<Companions> {
             authorities: None,
             in_process: None,
         };
-        companions.forward_counts(ServerClient::new(&options)?);
+        companions.forward_counts(
+            ServerClient::new(&options)?,
+            lookdown_count::openapi_document,
+        );
     }
     Ok(companions)
 }

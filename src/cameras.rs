@@ -4,6 +4,7 @@
 mod error;
 mod state_folder;
 mod stored;
+mod switches;
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -31,8 +32,11 @@ const TEST_TIMEOUT: Duration = Duration::from_secs(15);
 const TOO_MANY: &str = "there are 256 cameras: delete one first";
 /// Most cameras that are tested at a time: each may start a decoder.
 const MAX_TESTS: usize = 4;
-/// The file with the names of the cameras of the settings that are paused, in the state folder.
+
+/// The files with the names of the cameras of the settings that are paused, and whose latest image
+/// is kept, in the state folder.
 const PAUSED: &str = "paused.json";
+const WITH_IMAGE: &str = "images.json";
 
 /// The cameras of this process.
 pub struct Cameras {
@@ -45,6 +49,8 @@ pub struct Cameras {
     defaults: RwLock<CameraEntry>,
     /// The stored cameras that cannot be watched, with the reasons.
     problems: RwLock<BTreeMap<String, String>>,
+    /// The cameras whose latest image is kept.
+    with_image: RwLock<BTreeSet<String>>,
     /// The permits of tests.
     tests: Semaphore,
     /// The names of all cameras.
@@ -62,6 +68,7 @@ impl Cameras {
             configured: RwLock::default(),
             defaults: RwLock::default(),
             problems: RwLock::default(),
+            with_image: RwLock::default(),
             tests: Semaphore::new(MAX_TESTS),
             own,
             metrics,
@@ -85,19 +92,6 @@ impl Cameras {
         states
     }
 
-    /// Returns the paused cameras of the settings with their sources. Blocks.
-    ///
-    /// # Errors
-    /// [`ConfigError`].
-    pub fn paused_of_settings(&self) -> Result<BTreeMap<String, String>, ConfigError> {
-        let paused = self.paused()?;
-        let configured = self.configured.read();
-        let of_settings = configured.iter().filter(|(name, _)| paused.contains(*name));
-        let with_source =
-            of_settings.map(|(name, camera)| (name.clone(), camera.location.to_string()));
-        Ok(with_source.collect())
-    }
-
     /// Returns the stored cameras that cannot be watched, with the reasons.
     #[must_use]
     pub fn problems(&self) -> BTreeMap<String, String> {
@@ -108,55 +102,6 @@ impl Cameras {
     #[must_use]
     pub fn is_watched(&self, name: &str) -> bool {
         self.metrics.states().iter().any(|state| state.name == name)
-    }
-
-    /// Returns all cameras by name, and whether their frames are read. Blocks.
-    ///
-    /// # Errors
-    /// [`ConfigError`].
-    pub fn detection(&self) -> Result<BTreeMap<String, bool>, ConfigError> {
-        let stored = self.stored()?;
-        let mut states: BTreeMap<_, _> = stored
-            .into_iter()
-            .map(|(name, camera)| {
-                let is_on = !camera.paused || self.is_watched(&name);
-                (name, is_on)
-            })
-            .collect();
-        let paused = self.paused()?;
-        for name in self.configured.read().keys() {
-            let is_on = !paused.contains(name) || self.is_watched(name);
-            states.insert(name.clone(), is_on);
-        }
-        Ok(states)
-    }
-
-    /// Pauses a camera or resumes it; it stays so after a restart. Returns false for an unknown
-    /// camera. Blocks.
-    ///
-    /// # Errors
-    /// [`CameraError`].
-    pub fn set_detection(&self, name: &str, is_on: bool) -> Result<bool, CameraError> {
-        let _changing = self.changing.lock();
-        let configured: BTreeSet<_> = self.configured.read().keys().cloned().collect();
-        if configured.contains(name) {
-            let mut paused = self.paused()?;
-            // Names that the settings no longer have are dropped, so that the file stays small.
-            paused.retain(|paused| configured.contains(paused) && paused != name);
-            if !is_on {
-                paused.insert(name.to_owned());
-            }
-            let content = serde_json::to_string(&paused).unwrap_or_default();
-            self.folder.write(&self.folder.file(PAUSED), &content)?;
-            return Ok(true);
-        }
-        let mut file = self.file()?;
-        let Some(camera) = file.cameras.get_mut(name) else {
-            return Ok(false);
-        };
-        camera.paused = !is_on;
-        self.store(&file)?;
-        Ok(true)
     }
 
     /// Adds the stored cameras that are not paused to those of the settings, which have precedence,
@@ -175,8 +120,13 @@ impl Cameras {
             .iter()
             .map(|camera| (camera.name.clone(), camera.clone()));
         let configured: BTreeMap<_, _> = named.collect();
-        let paused = self.paused()?;
+        let paused = self.listed(PAUSED)?;
+        let mut with_image = self.listed(WITH_IMAGE)?;
+        with_image.retain(|name| configured.contains_key(name));
         let file = self.file()?;
+        let stored = file.cameras.iter().filter(|(_, camera)| camera.keep_image);
+        with_image.extend(stored.map(|(name, _)| name.clone()));
+        *self.with_image.write() = with_image;
         let stored = file.cameras.iter();
         let mut own: BTreeMap<_, _> = stored
             .map(|(name, camera)| (name.clone(), camera.paused))
@@ -229,11 +179,6 @@ impl Cameras {
         CameraFile::read(&self.folder)
     }
 
-    /// Returns the names of the paused cameras of the settings, possibly also of earlier settings.
-    fn paused(&self) -> Result<BTreeSet<String>, ConfigError> {
-        self.folder.read(PAUSED)
-    }
-
     /// Creates or replaces a camera, and returns true if it is new. Without a URL, the stored one
     /// stays; without a password, that of the same user at the same host. Blocks.
     ///
@@ -264,6 +209,7 @@ impl Cameras {
             before.user == camera.user && origin(&before.url) == origin(&camera.url)
         });
         file.invalid.remove(name);
+        let keep_image = camera.keep_image;
         let is_new = file.cameras.insert(name.to_owned(), camera).is_none();
         // No moment has a URL with the password of another one, however the writing ends.
         let path = self.folder.password(name);
@@ -285,6 +231,7 @@ impl Cameras {
         }
         StateFolder::rename(&new, &path)?;
         StateFolder::remove(&old)?;
+        self.set_with_image(name, Some(keep_image));
         Ok(is_new)
     }
 

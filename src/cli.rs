@@ -77,10 +77,8 @@ enum Command {
         counts: bool,
     },
     /// Print shell completions
-    #[command(hide = true)]
     Completions(shell::CompletionArguments),
     /// Write the manual pages
-    #[command(hide = true)]
     Manual(shell::ManualArguments),
 }
 
@@ -139,7 +137,7 @@ fn print_openapi(of_counts: bool) -> anyhow::Result<ExitCode> {
     let document = if of_counts {
         lookdown_count::openapi_document().to_pretty_json()?
     } else {
-        serde_json::to_string_pretty(&api::openapi_document()?)?
+        serde_json::to_string_pretty(&api::openapi_document(None)?)?
     };
     writeln!(io::stdout(), "{document}").context(UNWRITABLE)?;
     Ok(ExitCode::SUCCESS)

@@ -4,6 +4,9 @@ import { shape } from "./dom.js";
 import { points } from "./geometry.js";
 import { middles, titleOf } from "./areas.js";
 
+/** The height of a caption, pixels of the screen. */
+const CAPTION_HEIGHT = 16;
+
 const capital = (text) => text[0].toUpperCase() + text.slice(1);
 
 /**
@@ -14,20 +17,30 @@ export function drawAreas(drawing, { editor, surface, report, unit, countOf, inv
   const focused = drawing.contains(document.activeElement) ? document.activeElement.dataset.node : null;
   const { selected, draft } = editor;
   const shownAreas = editor.areas.filter(({ space }) => space === surface.space);
+  // Those on the floor are seen over the frame, too.
+  const floorAreas = editor.areas.filter(({ space }) => surface.outlineOnFloor && space === "floor_m");
   // The selected area is above the others.
   shownAreas.sort((one, other) => Number(one.key === selected?.key) - Number(other.key === selected?.key));
   drawing.setAttribute("viewBox", surface.viewBox.join(" "));
   drawing.classList.toggle("is-drawing", Boolean(draft));
   const context = { editor, surface, unit, countOf, invalid };
+  const projected = floorAreas.map((area) => ({ area, places: surface.outlineOnFloor(area) ?? [] })).filter(({ places }) => places.length > 1);
   const current = selected && shownAreas.find(({ key }) => key === selected.key);
   drawing.replaceChildren(
     shape("g", { class: "backdrop", "aria-hidden": "true" }, ...surface.backdrop(report, unit)),
+    ...projected.map((fixed) => fixedShape(fixed, unit)),
     ...shownAreas.map((area) => areaShape(area, context)),
-    ...shownAreas.flatMap((area) => captions(area, context)),
+    ...apart([...projected.flatMap(({ area, places }) => nameCaption(area, context, places)), ...shownAreas.flatMap((area) => captions(area, context))], unit),
     ...(current ? handles(current, context) : []),
     ...(draft ? draftShapes(draft, context) : []),
   );
   if (focused) (drawing.querySelector(`[data-node="${focused}"]`) ?? drawing).focus({ preventScroll: true });
+}
+
+/** An area of the other surface, which is not edited here. */
+function fixedShape({ area: { kind }, places }, unit) {
+  const part = (name, width) => shape(kind === "line" ? "polyline" : "polygon", { points: points(places), class: name, "stroke-width": width * unit });
+  return shape("g", { class: `area fixed ${kind}`, "data-kind": kind, "aria-hidden": "true" }, part("casing", 4.5), part("outline", 2));
 }
 
 function areaShape(area, { editor, surface, unit, countOf, invalid }) {
@@ -57,15 +70,39 @@ function text(words, [x, y], unit, kind) {
   return shape("text", { x, y, class: `caption-text ${kind}`, ...size, "aria-hidden": "true" }, words);
 }
 
-function captions(area, { editor, surface, unit, countOf }) {
-  const places = area.corners.map(surface.toDrawing);
-  if (area.kind === "line") return lineCaptions(area, places, unit);
+function captions(area, context) {
+  const places = area.corners.map(context.surface.toDrawing);
+  return area.kind === "line" ? lineCaptions(area, places, context) : nameCaption(area, context, places);
+}
+
+/** The name of an area in its middle, with the count of a zone. */
+function nameCaption(area, { editor, unit, countOf }, places) {
   const words = [area.name || capital(titleOf(area, editor.areas)), countOf(area)?.split(" ")[0]];
   return [text(words.filter(Boolean).join(" · "), middleOf(places), unit, area.kind)];
 }
 
-/** The name of a line at its first end, and its directions on the sides that they count toward. */
-function lineCaptions({ name, directions }, [from, to], unit) {
+/** Half the width of a caption, pixels of the screen. */
+const halfWidth = (words) => 3.6 * words.length;
+
+/** Moves captions down until none covers an earlier one. */
+function apart(shapes, unit) {
+  const boxes = [];
+  for (const node of shapes.filter(({ tagName }) => tagName === "text")) {
+    const [x, wide] = [Number(node.getAttribute("x")), halfWidth(node.textContent) * unit];
+    let y = Number(node.getAttribute("y"));
+    const isOver = (box) => Math.abs(box.x - x) < box.wide + wide && Math.abs(box.y - y) < (CAPTION_HEIGHT - 1) * unit;
+    for (let covered = boxes.find(isOver); covered; covered = boxes.find(isOver)) y = covered.y + CAPTION_HEIGHT * unit;
+    node.setAttribute("y", y);
+    boxes.push({ x, y, wide });
+  }
+  return shapes;
+}
+
+/**
+ * The name of a line at the end that is farther from the middle of the surface, and its directions on the sides that they
+ * count toward.
+ */
+function lineCaptions({ name, directions }, [from, to], { surface, unit }) {
   const along = [to[0] - from[0], to[1] - from[1]];
   const length = Math.hypot(...along) || 1;
   // The right side, seen along the line.
@@ -76,14 +113,19 @@ function lineCaptions({ name, directions }, [from, to], unit) {
   const tip = [[-5, 8], [0, 14], [5, 8]].map(([across, ahead]) =>
     beside(ahead).map((value, axis) => value + (along[axis] / length) * across * unit),
   );
-  const before = (14 + 3.6 * name.length) * unit;
-  const behind = [0, 1].map((axis) => from[axis] - (along[axis] / length) * before);
+  const middleOfSurface = surface.toDrawing(surface.middle);
+  const distance = (place) => Math.hypot(...place.map((value, axis) => value - middleOfSurface[axis]));
+  const [end, sign] = distance(from) > distance(to) ? [from, -1] : [to, 1];
+  const beyond = sign * (16 + (halfWidth(name) * Math.abs(along[0])) / length) * unit;
+  const nameAt = end.map((value, axis) => value + (along[axis] / length) * beyond);
+  // Words beside a line that goes up need their width, beside one that goes across their height.
+  const besideFor = (words, side) => beside(side * (16 + (halfWidth(words) * Math.abs(right[0]) + 8 * Math.abs(right[1]))));
   return [
     shape("polyline", { points: points(arrow), class: "arrow", "stroke-width": 2 * unit }),
     shape("polyline", { points: points(tip), class: "arrow", "stroke-width": 2 * unit }),
-    text(name, behind, unit, "line"),
-    text(directions[0], beside(28), unit, "line direction"),
-    text(directions[1], beside(-28), unit, "line direction"),
+    text(name, nameAt, unit, "line"),
+    text(directions[0], besideFor(directions[0], 1), unit, "line direction"),
+    text(directions[1], besideFor(directions[1], -1), unit, "line direction"),
   ];
 }
 

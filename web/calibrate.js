@@ -307,7 +307,7 @@ export function start() {
     event.preventDefault();
     shown(save)();
   });
-  startFinding(id, showFit);
+  startFinding(id, showFit, (file, signal) => straightened(shared.frame, JSON.stringify({ ...file, id: id() }), "", signal));
   find("#import-file").addEventListener("change", (event) => {
     const [file] = event.target.files;
     event.target.value = "";

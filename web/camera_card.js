@@ -1,7 +1,7 @@
 /** A card of a camera: image, number of persons, plot, state, and the tools that use its frame. */
 
 import { showDay } from "./camera_day.js";
-import { options } from "./camera_states.js";
+import { options, retention } from "./camera_states.js";
 import { addCounts, layersBelow } from "./counts.js";
 import { element, find } from "./dom.js";
 import { addBoxes } from "./ignore_place.js";
@@ -53,10 +53,9 @@ export function drawCard(card, others) {
   }
   const count = history.at(-1).persons;
   const zones = report.zones?.map(({ name, persons }) => element("li", {}, `${name} `, element("b", {}, String(persons))));
-  const focused = card.now.contains(document.activeElement) ? document.activeElement.dataset.box : undefined;
   card.now.replaceChildren(
     element("div", { class: "sight" }, card.image ?? sketch(report), element("p", { class: "big" }, element("b", {}, count === null ? "–" : String(count)), count === null ? "paused" : count === 1 ? "person" : "persons")),
-    card.isSingle && !card.hasImage ? imagesOff(card.camera) : "",
+    card.isSingle && !card.hasImage && !card.info ? imagesOff(card.camera) : "",
     zones ? element("ul", { class: "zones" }, zones) : "",
     stepPlot(history, Date.now()),
   );
@@ -64,25 +63,31 @@ export function drawCard(card, others) {
   addCounts(card);
   showDay(card);
   if (card.message) find(".sight", card.node).after(card.message);
-  addBoxes(card, others, focused);
+  addBoxes(card, others);
 }
 
 const imagesOff = (camera) => element("p", { class: "muted images-off" }, "Images of this camera are not kept. The setting ", element("code", {}, `results.images = ["${camera}"]`), " shows them.");
 
 /** Replaces the sketch by the image of the latest report, if the server stores images of this camera. */
 async function showImage(card) {
-  if (!card.hasImage || card.isAsking || card.node.hidden) return;
+  if (!card.hasImage || card.isAsking || card.node.hidden || card.info?.keep_image === false) return;
   card.isAsking = true;
   const width = card.isSingle ? SINGLE_WIDTH : WIDTH;
   try {
     const answer = await ask(`results/${encodeURIComponent(card.camera)}/latest.jpg?draw=${layersBelow(card)}&width=${width}`);
     const image = element("img", { alt: `The latest frame of ${card.camera}`, src: URL.createObjectURL(await answer.blob()) });
     await image.decode();
+    // The switch may have been turned off meanwhile.
+    if (!card.hasImage) {
+      URL.revokeObjectURL(image.src);
+      return;
+    }
     find(".sight", card.node).firstChild.replaceWith(image);
     if (card.image) URL.revokeObjectURL(card.image.src);
     card.image = image;
   } catch (problem) {
-    if (problem.status === 404) card.hasImage = false;
+    // The image of the first frame after the switch may not be there yet.
+    if (problem.status === 404) card.hasImage = Boolean(card.info?.keep_image);
   } finally {
     card.isAsking = false;
   }
@@ -95,11 +100,14 @@ export async function drawTools(card, info) {
   const text = stateOf(info);
   if (card.state.textContent !== text) card.state.textContent = text;
   card.state.classList.toggle("failing", Boolean(info?.problem));
+  if (info?.keep_image) card.hasImage = true;
+  else if (before?.keep_image) dropImage(card);
   showSuggestion(card);
   const { can_change: may } = await options();
   const isManaged = Boolean(may && info);
   card.remedy.hidden = !(isManaged && info.stored && info.warning && (info.every || info.profile));
-  if (Boolean(card.manage.firstChild) === isManaged && before?.paused === info?.paused) return;
+  const isSame = before?.paused === info?.paused && before?.keep_image === info?.keep_image;
+  if (Boolean(card.manage.firstChild) === isManaged && isSame) return;
   card.manage.replaceChildren(...(isManaged ? managing(card) : []));
 }
 
@@ -127,14 +135,27 @@ const chooseAutomatically = (card) => acting(card)("Saving", () => {
 function managing(card) {
   const { camera, info } = card;
   const [path, act] = [pathOf(card), acting(card)];
-  const pause = () => ask(path, { method: "PATCH", body: JSON.stringify({ paused: !card.info.paused }) });
+  const patch = (change) => ask(path, { method: "PATCH", body: JSON.stringify(change) });
+  const pause = () => patch({ paused: !card.info.paused });
+  const keep = element("input", { type: "checkbox", checked: info.keep_image, onchange: act("Saving", () => patch({ keep_image: keep.checked })) });
+  const note = element("p", { class: "muted", hidden: info.keep_image });
+  retention().then((text) => (note.textContent = text));
+  const keeping = element("div", { class: "keeping" }, element("label", { class: "check" }, keep, " Keep the latest image"), note);
   const remove = () => confirm(`Remove the camera ${camera}? The history of its counts stays.`) && act("Removing", () => ask(path, { method: "DELETE" }))();
   const clear = () => confirm(`Delete the history of the counts of ${camera}? It is counted on from now.`) && act("Deleting", () => ask(`counts/${encodeURIComponent(camera)}`, { method: "DELETE" }))();
   const button = (label, onclick) => element("button", { type: "button", class: "quiet", onclick }, label);
   const pausing = button(info.paused ? "Resume" : "Pause", act("Saving", pause));
   // A camera of the settings is changed and removed there.
   const clearing = button("Delete its history", clear);
-  return info.stored ? [button("Settings", () => card.onchange(card.info)), pausing, button("Remove", remove), clearing] : [pausing, clearing];
+  const buttons = info.stored ? [button("Settings", () => card.onchange(card.info)), pausing, button("Remove", remove), clearing] : [pausing, clearing];
+  return [...buttons, keeping];
+}
+
+/** Removes the image of a card whose images are no longer kept. */
+function dropImage(card) {
+  if (card.image) URL.revokeObjectURL(card.image.src);
+  Object.assign(card, { image: null, hasImage: false });
+  find(".sight > img", card.node)?.replaceWith(sketch(card.report));
 }
 
 export function tellAge({ age, reportedAt }) {

@@ -18,6 +18,7 @@ export async function showDay(card) {
   if (!hasCounts) return;
   const query = new URLSearchParams({ from: "today", step: "1h" });
   card.dayCounts = await askJson(`counts/${encodeURIComponent(card.camera)}?${query}`).catch(() => null);
+  card.today = card.dayCounts ? crossingsOf(card.dayCounts.steps) : null;
   drawDay(card);
 }
 
@@ -30,11 +31,8 @@ function drawDay(card) {
 function drawn({ from, steps }, history) {
   const today = history.filter(({ time }) => time >= Date.parse(from));
   const most = Math.max(0, ...steps.map(({ persons }) => persons?.max ?? 0), ...today.map(({ persons }) => persons ?? 0));
-  const rows = [...crossingsOf(steps)].map(([line, directions]) =>
-    element("li", {}, element("span", { class: "count-of" }, line), element("span", {}, [...directions].map(([direction, count]) => `${count} ${direction}`).join(", "))),
-  );
   const text = steps.some(({ persons }) => persons) ? `Today: at most ${plural(most, "person")} at once` : "Today: nothing is counted yet";
-  return [element("h2", {}, text), bars(Date.parse(from), steps, most), element("ul", { class: "count-rows of-day" }, ...rows)];
+  return [element("h2", {}, text), bars(Date.parse(from), steps, most)];
 }
 
 /** The crossings of the day by line and direction. */

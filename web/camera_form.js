@@ -1,5 +1,6 @@
 /** The dialog that adds a camera or changes its settings, with a test that shows its first frame. */
 
+import { retention } from "./camera_states.js";
 import { element, find } from "./dom.js";
 import { shown, showFailure, withProgress } from "./progress.js";
 import { ask } from "./server.js";
@@ -45,6 +46,8 @@ export function openForm(info, then) {
   const choice = field("calibration");
   choice.replaceChildren(choice.firstElementChild, ...shared.calibrations.map(({ id }) => element("option", { value: id }, id)));
   for (const name of ["every", "profile", "calibration"]) choose(field(name), info?.[name] ?? "");
+  field("keep_image").checked = info?.keep_image ?? true;
+  retention().then((text) => (find("#camera-kept-image").textContent = text));
   showFrame(null);
   for (const host of ["#camera-test", "#camera-save"]) showFailure(find(host), "");
   find("#camera-dialog").showModal();
@@ -60,8 +63,11 @@ function choose(choice, value) {
 function camera() {
   const names = ["url", "user", "password", "every", "calibration", "profile"];
   const given = names.map((name) => [name, field(name).value.trim()]).filter(([, value]) => value);
-  return { ...Object.fromEntries(given), paused: edited?.paused ?? false };
+  return { ...Object.fromEntries(given), keep_image: field("keep_image").checked, paused: edited?.paused ?? false };
 }
+
+/** The nearest name that a camera may have, such as `my-cam` for `My Cam`. */
+export const plainName = (text) => text.trim().toLowerCase().replace(/[^a-z0-9_-]+/g, "-").replace(/^[-_]+/, "");
 
 async function test() {
   testing?.abort();
@@ -110,6 +116,7 @@ export function startForm() {
   find("#makers").replaceChildren(
     ...MAKERS.map(([maker, url]) => element("li", {}, element("span", {}, maker), element("button", { type: "button", class: "quiet", onclick: pick(url) }, url))),
   );
+  field("name").addEventListener("change", ({ target }) => (target.value = plainName(target.value)));
   find("#camera-try").addEventListener("click", shown(test));
   find("#camera-cancel").addEventListener("click", () => find("#camera-dialog").close());
   find("#camera-dialog").addEventListener("close", () => {

@@ -1,6 +1,6 @@
 /** The cameras that this server reads: their states and settings, if the server reads any. */
 
-import { find } from "./dom.js";
+import { find, plural } from "./dom.js";
 import { askJson } from "./server.js";
 
 /** The interval between two updates. */
@@ -12,6 +12,13 @@ let asked = null;
 export function options() {
   asked ??= askJson("assets/options.json").catch(() => ({}));
   return asked;
+}
+
+/** Says for how long a kept image stays. */
+export async function retention() {
+  const { image_age_seconds: seconds = 86_400 } = await options();
+  const age = seconds < 3600 ? plural(Math.round(seconds / 60), "minute") : plural(Math.round(seconds / 3600), "hour");
+  return `Images show people to everyone who may read results. The next frame replaces the image; without one, it is deleted after ${age}.`;
 }
 
 /** Passes the states to `show` until `signal` aborts. Returns a function that reads them at once. */

@@ -75,7 +75,7 @@ function controls() {
   };
   const heat = element("input", { type: "checkbox", id: "heat", onchange });
   const node = element("div", { id: "counts-bar" }, element("label", { for: "heat" }, heat, " Heat map"), element("p", { class: "muted", role: "status" }));
-  find("#wall").before(node);
+  find("#add-camera").before(node);
   return { node, heat, message: find("p", node) };
 }
 
@@ -112,7 +112,7 @@ async function refresh(camera, signal = polling?.signal) {
   if (!card?.report || !counted.has(camera)) return;
   const { width, height } = card.report.image;
   drawCounts(counts.drawing, { camera, width, height, heat: bar.heat.checked ? counts.heat : "" }, counts.answer);
-  counts.rows.replaceChildren(...countRows(counts.answer));
+  counts.rows.replaceChildren(...countRows(counts.answer, card.isSingle ? card.today : null));
   counts.furniture.show(counts.answer.furniture);
 }
 

@@ -5,6 +5,8 @@ import { points } from "./geometry.js";
 
 /** The number of colors of tracks (counts.css). */
 const COLORS = 6;
+/** The number of colors of lines (counts.css). */
+const LINE_COLORS = 4;
 /** The share of the frame's width that 1 unit of a drawing has. */
 const UNIT = 1 / 320;
 /** Arrows in steps of 45°, clockwise from the right. */
@@ -19,7 +21,7 @@ export function drawCounts(drawing, { camera, width, height, heat }, { tracks, l
     ...(heat ? [shape("image", { href: heat, width, height })] : []),
     ...zones.filter(hasOutline).map(({ outline_px: outline }) => shape("polygon", { class: "count-zone", points: points(outline), "stroke-width": unit })),
     ...furniture.filter(isFurniture).map(({ id, outline_px: outline }) => shape("polygon", { class: "count-furniture", "data-thing": id, points: points(outline), "stroke-width": unit, "stroke-dasharray": 3 * unit })),
-    ...lines.filter(hasOutline).flatMap((line) => drawnLine(line, unit)),
+    ...lines.flatMap((line, index) => (hasOutline(line) ? drawnLine(line, unit, index) : [])),
     ...tracks.filter(({ frame_px: place }) => place).map((track) => drawnTrack(track, unit)),
   );
 }
@@ -28,14 +30,15 @@ const isFurniture = ({ state }) => state !== "candidate";
 const hasOutline = ({ outline_px: outline }) => outline?.length > 1;
 
 /** A line with its name, and an arrow in its first direction. */
-function drawnLine({ line, outline_px: outline }, unit) {
+function drawnLine({ line, outline_px: outline }, unit, index) {
   const [x, y] = outline[Math.floor(outline.length / 2)];
   const [x2, y2] = outline.at(-1);
   const degrees = turnOf(outline);
+  const color = `line-${index % LINE_COLORS}`;
   const arrow = `M0 ${-5 * unit}L${9 * unit} 0L0 ${5 * unit}Z`;
   return [
-    shape("polyline", { class: "count-line", points: points(outline), "stroke-width": 2.5 * unit }),
-    shape("path", { class: "count-arrow", d: arrow, transform: `translate(${x} ${y}) rotate(${degrees})` }),
+    shape("polyline", { class: `count-line ${color}`, points: points(outline), "stroke-width": 2.5 * unit }),
+    shape("path", { class: `count-arrow ${color}`, d: arrow, transform: `translate(${x} ${y}) rotate(${degrees})` }),
     shape("text", { class: "count-name", x: x2, y: y2, "font-size": 11 * unit, "stroke-width": 3 * unit, "text-anchor": "middle" }, line),
   ];
 }
@@ -52,12 +55,13 @@ function drawnTrack({ id, frame_px: [x, y], tail_px: tail }, unit) {
   );
 }
 
-/** The rows of lines with their crossings, and of zones with their persons. */
-export function countRows({ lines = [], zones = [] }) {
-  const ofLine = ({ line, directions, crossings, outline_px: outline }) => {
-    const [first, second] = directions;
-    const [there, back] = arrowsOf(outline);
-    return row("line", line, number(crossings[first]), ` ${there} ${first}, `, number(crossings[second]), ` ${back} ${second}`);
+/** The rows of lines with their crossings, also those of `today` by line and direction, and of zones with their persons. */
+export function countRows({ lines = [], zones = [] }, today = null) {
+  const ofLine = ({ line, directions, crossings, outline_px: outline }, index) => {
+    const arrows = arrowsOf(outline);
+    const ofToday = (direction) => (today?.has(line) ? ` (today ${today.get(line).get(direction) ?? 0})` : "");
+    const parts = directions.map((direction, side) => [number(crossings[direction]), ` ${arrows[side]} ${direction}${ofToday(direction)}${side === 0 ? ", " : ""}`]);
+    return row(`line line-${index % LINE_COLORS}`, line, ...parts.flat());
   };
   const ofZone = ({ zone, persons, entries }) => row("zone", zone, number(persons ?? "?"), " now, ", number(entries), " entered");
   return [...lines.map(ofLine), ...zones.map(ofZone)];

@@ -37,6 +37,7 @@ function showFrame() {
   image.height = frame.height;
   image.alt = `The frame ${frame.name}`;
   find("#stage").classList.remove("blank");
+  clearFindings();
   find("#stage").style.aspectRatio = `${frame.width} / ${frame.height}`;
   runShown();
 }

@@ -1,13 +1,14 @@
 /** Finds lens, center and level of the frame's camera in straight edges, from what is known of the camera. */
 
-import { element, find } from "./dom.js";
+import { find } from "./dom.js";
+import { clearChoice, showChoice } from "./lens_choice.js";
 import { imagesOf } from "./live_frames.js";
 import { shown, showFailure, withProgress } from "./progress.js";
 import { askJson } from "./server.js";
 import { shared, whenChanged } from "./shared.js";
 
 /** The reasons of refusals that another search with a known model may avoid. */
-const WANT_MODEL = ["ambiguous", "uncertain"];
+export const WANT_MODEL = ["ambiguous", "uncertain"];
 
 /** The models of many ceiling cameras. */
 const TRIED_MODELS = ["equisolid", "equidistant"];
@@ -17,13 +18,19 @@ const LABEL = "Finding the lens";
 const field = (name) => find("#calibration-form").elements[name];
 const host = () => find("#find-progress");
 
-/** The query for what is known of the camera. */
-function known() {
+/** The query for what is known of the camera, or for another lens. */
+function known(lens = field("knownLens").value) {
   const query = new URLSearchParams();
-  if (field("knownLens").value) query.set("lens", field("knownLens").value);
+  if (lens) query.set("lens", lens);
   if (field("knownField").value) query.set("field_of_view_deg", field("knownField").value);
   if (field("knownPlace").value) query.set("ceiling", true);
   return query;
+}
+
+/** Returns null for a lens that the edges refuse; throws any other problem. */
+function passOver(problem) {
+  if (problem.refusal) return null;
+  throw problem;
 }
 
 /** The body of a request: one image, or several in a form. */
@@ -34,57 +41,58 @@ function bodyOf(images) {
   return form;
 }
 
-/** Removes what leads to the model of the lens. */
-function clear() {
-  find("#try-model")?.remove();
-  field("knownLens").classList.remove("wanted");
-}
-
-/** Starts the search with its button. `nameOf` returns the name of the calibration, `show` gets it with the found lens. */
-export function startFinding(nameOf, show) {
+/**
+ * Starts the search with its button. `nameOf` returns the name of the calibration, `show` gets it with the found lens, and
+ * `viewsOf` returns the straightened views of a calibration.
+ */
+export function startFinding(nameOf, show, viewsOf) {
   let searching = null;
 
-  /** Searches in these images of the frame's camera, or in new ones. */
-  async function search(given = null) {
+  /** Searches in the images of the frame's camera. */
+  async function search() {
     if (!field("knownField").reportValidity()) return;
     searching?.abort();
     searching = new AbortController();
     const { signal } = searching;
     const { frame } = shared;
     const name = nameOf();
-    clear();
+    clearChoice();
     showFailure(host(), "");
-    let images = given;
     const work = async (say) => {
-      images ??= await imagesOf(frame, say, signal);
+      const images = await imagesOf(frame, say, signal);
+      const fit = (query) => askJson(`calibrations/${name}/fit?${query}`, { method: "POST", body: bodyOf(images), signal });
       say(LABEL);
-      return askJson(`calibrations/${name}/fit?${known()}`, { method: "POST", body: bodyOf(images), signal });
+      try {
+        return [await fit(known())];
+      } catch (problem) {
+        if (!WANT_MODEL.includes(problem.refusal) || field("knownLens").value) throw problem;
+        const lenses = [];
+        for (const model of TRIED_MODELS) {
+          say(`Comparing lenses, ${model}`);
+          lenses.push(await fit(known(model)).catch(passOver));
+        }
+        if (!lenses.some(Boolean)) throw problem;
+        return lenses;
+      }
     };
-    const found = await withProgress(host(), LABEL, work).catch((problem) => {
-      if (WANT_MODEL.includes(problem.refusal) && !field("knownLens").value) askForModel(images);
-      throw problem;
-    });
-    if (shared.frame === frame) await show(name, found);
+    const lenses = await withProgress(host(), LABEL, work);
+    if (shared.frame !== frame) return;
+    if (lenses.length === 1) await show(name, lenses[0]);
+    else await showChoice(lenses.filter(Boolean), (file) => viewsOf(file, signal), shown(choose(name)));
   }
 
-  /** Leads to the model of the lens after a refusal without one. */
-  function askForModel(images) {
-    const repeat = (model) => () => {
-      field("knownLens").value = model;
-      find("#find-lens").focus();
-      return search(images);
-    };
-    const tries = TRIED_MODELS.map((model) => element("button", { type: "button", onclick: shown(repeat(model)) }, `Try ${model}`));
-    host().append(element("span", { id: "try-model" }, ...tries));
-    field("knownLens").classList.add("wanted");
-    if ([document.body, find("#find-lens")].includes(document.activeElement)) field("knownLens").focus();
-  }
+  /** Takes a lens of the choice. */
+  const choose = (name) => async (found) => {
+    clearChoice();
+    await show(name, found);
+    find("#save").focus();
+  };
 
-  find("#find-lens").addEventListener("click", shown(() => search()));
-  field("knownLens").addEventListener("change", clear);
+  find("#find-lens").addEventListener("click", shown(search));
+  field("knownLens").addEventListener("change", clearChoice);
   whenChanged(["frame"], () => {
     searching?.abort();
-    clear();
+    clearChoice();
     showFailure(host(), "");
   });
 }

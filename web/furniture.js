@@ -24,7 +24,7 @@ async function show({ camera, node, summary, list, message }, furniture) {
   node.dataset.content = content;
   node.hidden = !rows.length;
   const hidden = rows.filter(({ state }) => state !== COUNTED).length;
-  summary.textContent = `${plural(hidden, "thing")} not counted`;
+  summary.textContent = hidden ? `${plural(hidden, "thing")} not counted` : `${plural(rows.length, "person")} standing still`;
   const { can_change: may } = await options();
   list.replaceChildren(...rows.map((row) => element("li", {}, element("span", {}, textOf(row)), ...(may ? buttons(camera, row, message) : []))));
 }

@@ -25,27 +25,28 @@ async function mayChange() {
 /** Forgets what the key may do. */
 export const forgetKey = () => (canChange = null);
 
-/** Adds the boxes of the report over the image of a card. A click ignores the place of a box; `focused` is one's index. */
-export async function addBoxes(card, others, focused) {
+/**
+ * Adds the boxes of the report over the image of a card. A click ignores the place of a box. Boxes move, so that the
+ * keyboard ignores places in Zones instead.
+ */
+export async function addBoxes(card, others) {
   if (!(await mayChange()) || !card.report) return;
   const { report } = card;
   const { width, height } = report.image;
   const boxes = report.persons.map((person, index) => {
     const ignore = () => change(card, (file) => withIgnored(file, person, report), others);
     const label = `Ignore the place of person ${index + 1}, score ${person.score.toFixed(2)}`;
-    const onkeydown = (event) => event.key === "Enter" && ignore();
     return shape(
       "polygon",
       // A click ends after the next report may have replaced the box: it counts when it begins.
-      { points: points(corners(person.oriented_box)), "data-box": index, tabindex: 0, role: "button", "aria-label": label, onpointerdown: ignore, onkeydown },
+      { points: points(corners(person.oriented_box)), "data-box": index, onpointerdown: ignore },
       shape("title", {}, label),
     );
   });
-  const drawing = shape("svg", { class: "ignorable", viewBox: `0 0 ${width} ${height}` }, ...boxes);
+  const drawing = shape("svg", { class: "ignorable", "aria-hidden": "true", viewBox: `0 0 ${width} ${height}` }, ...boxes);
   const sight = find(".sight", card.node);
   find(".ignorable", sight)?.remove();
   sight.append(drawing);
-  if (focused !== undefined) boxes[focused]?.focus({ preventScroll: true });
 }
 
 /** Writes the calibration of a card's camera after `edit`, and offers Undo. */

@@ -56,12 +56,46 @@ export function withFound(base, { id, image, lens, mount, sources = {} }, height
 const curveOf = ({ model, k }) =>
   model === "kannala_brandt" ? (theta) => theta * (1 + k.reduceRight((sum, part) => theta ** 2 * (sum + part), 0)) : CURVES[model];
 
+/** The angle from the axis at which lenses are compared: people stand around it. */
+const COMPARED_THETA = Math.PI / 4;
+
+/** The difference of two lenses at 45° from the axis, percent of the radius there. */
+export function differenceOf(...lenses) {
+  const [one, other] = lenses.map((lens) => (lens.focal ?? lens.fx) * curveOf(lens)(COMPARED_THETA));
+  return (Math.abs(one - other) / Math.min(one, other)) * 100;
+}
+
 /** The circle that the lens of a file sees, in corner-origin pixels of a frame of `width` × `height`; null if it is none or not known here. */
 export function rimOf({ lens, image }) {
   const curve = curveOf(lens);
   const focal = lens.focal ?? (lens.fx === lens.fy ? lens.fx : null);
   if (!curve || !focal || !lens.max_theta) return null;
   return { ...image, cx: lens.cx + 0.5, cy: lens.cy + 0.5, radius: focal * curve(lens.max_theta) };
+}
+
+/**
+ * Returns the corner-origin pixel of a place on the floor, in meters from the point below the camera of a file; null if
+ * the lens does not see it. Returns null instead of the function if the height or the lens is not known here.
+ */
+export function pixelOfFloor({ lens, mount }) {
+  const curve = curveOf(lens);
+  const height = mount?.height_m;
+  if (!curve || !height) return null;
+  const [fx, fy] = [lens.focal ?? lens.fx, lens.focal ?? lens.fy];
+  const down = (mount.world_up ?? STRAIGHT_DOWN).map((part) => -part / Math.hypot(...(mount.world_up ?? STRAIGHT_DOWN)));
+  // The smallest rotation of straight down to the camera's axis: around z × down.
+  const [wx, wy] = [-down[1], down[0]];
+  return ([px, py]) => {
+    const turned = wx * py - wy * px;
+    const cross = [wy * height, -wx * height, turned];
+    const twice = [wy * cross[2], -wx * cross[2], wx * cross[1] - wy * cross[0]];
+    const [x, y, z] = [px, py, height].map((part, axis) => part + cross[axis] + twice[axis] / (1 + down[2]));
+    const across = Math.hypot(x, y);
+    const theta = Math.atan2(across, z);
+    if (theta > (lens.max_theta ?? Math.PI / 2)) return null;
+    const radius = across ? curve(theta) / across : 0;
+    return [lens.cx + 0.5 + fx * radius * x, lens.cy + 0.5 + fy * radius * y];
+  };
 }
 
 /** The circle from which `calibrationOf` makes this file; null if there is none. */

@@ -39,6 +39,11 @@ function showSection() {
 }
 
 const load = shown(loadCalibrations);
+// The address names the section, so the link does not change it.
+find("#skip").addEventListener("click", (event) => {
+  event.preventDefault();
+  find("#main").focus();
+});
 
 frame.start();
 for (const section of Object.values(SECTIONS)) section.start();

@@ -4,6 +4,7 @@
 import { openFound } from "./calibrate.js";
 import { options } from "./camera_states.js";
 import { element } from "./dom.js";
+import { WANT_MODEL } from "./find_lens.js";
 import { loadCalibrations } from "./parameters.js";
 import { shown, withProgress } from "./progress.js";
 import { ask, askJson } from "./server.js";
@@ -30,7 +31,12 @@ export async function showSuggestion(card) {
 }
 
 /** The reason why no lens was found, with what to do; empty while the server looks for one. */
-const refusalOf = (answer) => (answer?.state === "refused" && answer.lens_refusal ? `No calibration was found: ${answer.lens_refusal.detail}.` : "");
+function refusalOf(answer) {
+  if (answer?.state !== "refused" || !answer.lens_refusal) return "";
+  const { reason, detail } = answer.lens_refusal;
+  const remedy = WANT_MODEL.includes(reason) ? "Calibrate compares the usual lenses: do you know your camera's model?" : `${detail[0].toUpperCase()}${detail.slice(1)}.`;
+  return `No calibration was found. ${remedy}`;
+}
 
 function textOf({ lens, height, frames, frames_wanted: wanted }) {
   const above = height ? `${height.height_m.toFixed(2)} m above the floor (± ${height.height_sd_m.toFixed(2)} m, from its people)` : "";

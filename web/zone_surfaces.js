@@ -3,10 +3,13 @@
 import { shape } from "./dom.js";
 import { VIEW_BOX, floorDot, floorGrid, floorPlaces, reachOf, scaleOf } from "./floor_map.js";
 import { corners, foot, pointBelow, points } from "./geometry.js";
+import { pixelOfFloor } from "./lens.js";
 
 /** Steps of the arrow keys: the share of the frame's longer side, and meters on the floor. */
 const FRAME_STEPS = 500;
 const FLOOR_STEP_M = 0.05;
+/** The parts of an edge on the floor: a straight line there is a curve in the frame. */
+const EDGE_PARTS = 16;
 /** The maximum distance of corners on the floor, meters. */
 const FARTHEST_M = 1000;
 
@@ -15,6 +18,7 @@ const numbers = (text) => text.split(" ").map(Number);
 /** The frame, in pixels of frames of the size of a calibration file. */
 export function frameSurface(file) {
   const { image } = file;
+  const projected = pixelOfFloor(file);
   const { width, height } = image;
   const scaled = (report) => ([x, y]) => [(x * width) / report.image.width, (y * height) / report.image.height];
   return {
@@ -26,6 +30,7 @@ export function frameSurface(file) {
     toDrawing: (place) => place,
     toPlace: (point) => point,
     describe: ([x, y]) => `${x}, ${y} pixels`,
+    outlineOnFloor: (area) => projected && subdivided(area).map(projected).filter(Boolean),
     backdrop: (report, unit) =>
       (report?.persons ?? []).flatMap((person) => {
         const toDrawing = scaled(report);
@@ -37,6 +42,16 @@ export function frameSurface(file) {
         ];
       }),
   };
+}
+
+/** The outline of an area with further corners on its edges. */
+function subdivided({ kind, corners: places }) {
+  const edges = kind === "line" ? places.slice(0, -1) : places;
+  const along = edges.flatMap((place, index) => {
+    const next = places[(index + 1) % places.length];
+    return Array.from({ length: EDGE_PARTS }, (_, part) => place.map((value, axis) => value + ((next[axis] - value) * part) / EDGE_PARTS));
+  });
+  return kind === "line" ? [...along, places.at(-1)] : along;
 }
 
 /** The floor, in meters from the point below the camera, with room for these areas and the persons of `report`. */

@@ -5,6 +5,7 @@ use std::{collections::BTreeMap, fmt, sync::Arc};
 use axum::Router;
 use lookdown_common::{OwnCameras, ServerClient};
 use parking_lot::RwLock;
+use utoipa::openapi::OpenApi;
 
 use crate::cameras::Cameras;
 
@@ -21,6 +22,8 @@ pub struct Companions(Arc<RwLock<Parts>>);
 #[derive(Default)]
 struct Parts {
     counts: Counts,
+    /// Returns the OpenAPI document of the counts.
+    counts_document: Option<fn() -> OpenApi>,
     count_warning: Option<CountWarning>,
     cameras: Option<Arc<Cameras>>,
     own_cameras: OwnCameras,
@@ -42,9 +45,11 @@ pub(super) enum Counts {
 }
 
 impl Companions {
-    /// Declares counts of this process, which are not there yet.
-    pub fn expect_counts(&self) {
-        self.0.write().counts = Counts::Starting;
+    /// Declares counts of this process, which are not there yet. `document` returns their OpenAPI
+    /// document.
+    pub fn expect_counts(&self, document: fn() -> OpenApi) {
+        let mut parts = self.0.write();
+        (parts.counts, parts.counts_document) = (Counts::Starting, Some(document));
     }
 
     /// Answers requests to `/counts` and `/sites` with these routes.
@@ -79,9 +84,11 @@ impl Companions {
         self.0.read().cameras.clone()
     }
 
-    /// Forwards requests to `/counts` and `/sites`.
-    pub(crate) fn forward_counts(&self, client: ServerClient) {
-        self.0.write().counts = Counts::Elsewhere(Arc::new(client));
+    /// Forwards requests to `/counts` and `/sites`. `document` returns their OpenAPI document.
+    pub(crate) fn forward_counts(&self, client: ServerClient, document: fn() -> OpenApi) {
+        let mut parts = self.0.write();
+        parts.counts = Counts::Elsewhere(Arc::new(client));
+        parts.counts_document = Some(document);
     }
 
     /// Adds metrics to those of the server, or replaces those of the same name.
@@ -95,6 +102,12 @@ impl Companions {
 
     pub(super) fn counts(&self) -> Counts {
         self.0.read().counts.clone()
+    }
+
+    /// Returns the OpenAPI document of the counts, if `/counts` is answered.
+    pub(super) fn counts_document(&self) -> Option<OpenApi> {
+        let document = self.0.read().counts_document;
+        document.map(|document| document())
     }
 
     /// Returns true if `/counts` is answered.

@@ -8,7 +8,6 @@ pub(super) mod context;
 pub(super) mod cors;
 pub(super) mod deadline;
 pub(super) mod drain_body;
-pub(super) mod entity_tags;
 pub(super) mod envelope;
 pub(super) mod incoming_trace;
 pub(super) mod problem;

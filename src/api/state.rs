@@ -61,6 +61,8 @@ pub struct ApiOptions {
     pub camera_metrics: bool,
     /// The cameras whose latest image is stored.
     pub images_of: Arc<ImagesOf>,
+    /// Longest time that these images are stored.
+    pub image_age: Duration,
     /// The concealment of persons in these images.
     pub conceal_images: Option<Concealment>,
     /// The lens of cameras without a calibration, if it is known.
@@ -128,6 +130,7 @@ impl ApiOptions {
             zone_metrics: false,
             camera_metrics: false,
             images_of: Arc::default(),
+            image_age: Duration::from_hours(24),
             conceal_images: None,
             lens: None,
             apply_suggested_calibrations: false,
@@ -216,6 +219,13 @@ impl ApiState {
             fits: FitTurns::default(),
             options,
         }))
+    }
+
+    /// Returns true if the latest image of the camera is kept.
+    pub(super) fn keeps_image(&self, camera: &str) -> bool {
+        let of_settings = self.options.images_of.include(camera);
+        let cameras = self.options.companions.cameras();
+        of_settings || cameras.is_some_and(|cameras| cameras.keeps_image(camera))
     }
 
     /// Returns the problem while the server is not ready.

@@ -24,6 +24,7 @@ pub(super) fn api_options(
         zone_metrics: settings.calibrations.zone_metrics,
         camera_metrics: settings.results.camera_metrics,
         images_of: Arc::new(settings.results.images_of.clone()),
+        image_age: settings.results.limits.max_age,
         conceal_images: settings.results.conceal_images,
         lens: settings.calibrations.lens,
         apply_suggested_calibrations: settings.calibrations.apply_suggested,

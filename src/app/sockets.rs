@@ -35,6 +35,6 @@ impl Sockets {
 async fn bind(key: &str, address: SocketAddr) -> anyhow::Result<TcpListener> {
     TcpListener::bind(address).await.with_context(|| {
         let variable = variable_of(key);
-        format!("{key}: cannot listen on {address}: set {variable} to a free address")
+        format!("{key}: cannot listen on {address}: set {variable} or --listen to a free address")
     })
 }

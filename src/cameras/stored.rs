@@ -35,6 +35,9 @@ pub struct StoredCamera {
     /// True if no frames are read.
     #[serde(default)]
     pub paused: bool,
+    /// True if the latest image is kept.
+    #[serde(default)]
+    pub keep_image: bool,
 }
 
 impl StoredCamera {

@@ -40,6 +40,7 @@ pub(crate) fn camera(url: &str) -> StoredCamera {
         calibration: None,
         profile: None,
         paused: false,
+        keep_image: false,
     }
 }
 
@@ -170,6 +171,27 @@ fn detection_is_switched_off_until_it_is_switched_on() {
     assert_eq!(add(&second), ["gate", "hall"]);
     assert_eq!(second.detection().unwrap(), both(true));
     assert!(["gate", "hall"].map(|name| second.own.is_paused(name)) == [false; 2]);
+}
+
+#[test]
+fn the_latest_image_is_kept_while_it_is_switched_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let first = cameras(folder.path());
+    first
+        .put("hall", camera("rtsp://10.0.0.8/s2"), None)
+        .unwrap();
+    watched(&first, &[configured("gate")]);
+    assert!(!first.keeps_image("gate") && !first.keeps_image("hall"));
+    for name in ["gate", "hall"] {
+        assert!(first.change(name, None, Some(true)).unwrap());
+    }
+    // After a restart.
+    let second = cameras(folder.path());
+    assert_eq!(watched(&second, &[configured("gate")]).len(), 2);
+    assert!(second.keeps_image("gate") && second.keeps_image("hall"));
+    assert!(second.change("hall", Some(true), Some(false)).unwrap());
+    assert!(second.change("gate", None, Some(false)).unwrap());
+    assert!(!second.keeps_image("gate") && !second.keeps_image("hall"));
 }
 
 #[test]

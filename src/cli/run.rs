@@ -1,6 +1,11 @@
 //! `lookdown run`
 
-use std::{fs, process::ExitCode, sync::Arc};
+use std::{
+    fs,
+    io::{self, Write},
+    process::ExitCode,
+    sync::Arc,
+};
 
 use anyhow::{Context, bail};
 use clap::Args;
@@ -15,6 +20,7 @@ use super::{
     async_runtime::{THREADS, run_async},
     camera_flags::CameraFlags,
     count::{counting, run_counts},
+    output::UNWRITABLE,
     serve,
     server_flags::given,
     settings_file::SettingsSource,
@@ -49,6 +55,10 @@ pub(super) struct Arguments {
     /// Port to listen on, at the address of `server.listen`
     #[arg(long, conflicts_with = "listen")]
     port: Option<u16>,
+    /// Check that all of it could start (settings, cameras, library, models, calibrations, keys and
+    /// addresses), print the clients that would have access, and end
+    #[arg(long)]
+    check: bool,
     /// The file of the counts (`counts.path`) [default: counts.sqlite]
     #[arg(long, value_name = "FILE")]
     store: Option<String>,
@@ -81,6 +91,18 @@ pub(super) fn run(arguments: &Arguments, commit: Option<&str>) -> anyhow::Result
     }
     check(&settings)?;
     create_calibrations(&settings);
+    // The metrics of the counts have the same names.
+    settings.results.camera_metrics = true;
+    settings.calibrations.zone_metrics = true;
+    if arguments.check {
+        return run_async(THREADS, async {
+            let watched = cameras(&source_of_settings, camera, None).load().await?;
+            counting(&source_of_settings, None).load().await?;
+            serve::check(settings).await?;
+            let count = watched.cameras.len();
+            writeln!(io::stdout(), "cameras of the settings: {count}").context(UNWRITABLE)
+        });
+    }
     let key = own_key(&mut settings)?;
     run_async(THREADS, async {
         let shutdown = Shutdown::on_signals().context("signals cannot be handled")?;
@@ -158,7 +180,7 @@ impl Parts {
             Arc::clone(&metrics),
         ));
         app.set_cameras(&stored);
-        companions.expect_counts();
+        companions.expect_counts(lookdown_count::openapi_document);
         let server = ServerOptions {
             url: url.parse()?,
             api_key: self.key.clone(),

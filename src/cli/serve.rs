@@ -124,7 +124,8 @@ async fn reload_on(mut signals: Signal, reloader: Reloader) {
     }
 }
 
-async fn check(settings: Settings) -> anyhow::Result<()> {
+/// Checks that a server could start, and prints its description.
+pub(super) async fn check(settings: Settings) -> anyhow::Result<()> {
     // Binds the addresses without accepting connections, and releases them at once.
     drop(Sockets::bind(&settings.server).await?);
     let app = start(settings).await?;

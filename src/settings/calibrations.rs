@@ -34,7 +34,7 @@ settings! {
         /// (docs/calibrate.md).
         apply_suggested: bool = false => flag();
         /// `true` if `/metrics` shows the number of persons in each zone, with the names of its
-        /// camera and of the zone as labels: 1000 zones at most.
+        /// camera and of the zone as labels: 1000 zones at most. `lookdown run` always does.
         zone_metrics: bool = false => flag();
         /// The most memory for the remap tables of cameras, in bytes. The least recently used go
         /// first.

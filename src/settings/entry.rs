@@ -1,6 +1,6 @@
 //! A setting in the reference, and the error for keys that no setting has.
 
-use super::{SettingsError, form::Form};
+use super::{SettingsError, form::Form, lists};
 
 /// A setting as the reference shows it.
 #[derive(Debug, Clone)]
@@ -62,6 +62,11 @@ pub(super) fn unknown(place: &str, key: &str, entries: &[Entry]) -> SettingsErro
         )
     };
     known.dedup();
+    if !is_table {
+        known.extend(lists::TABLES);
+    }
+    // Similar names, such as that of the list `cameras` for a table `camera`, come first.
+    known.sort_by_key(|known| name.is_empty() || !known.trim_matches('[').starts_with(name));
     SettingsError::Unknown {
         place: place.to_owned(),
         name: if is_table || above.is_empty() {

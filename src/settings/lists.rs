@@ -9,6 +9,8 @@ use super::SettingsError;
 
 /// The names of these tables.
 pub(super) const NAMES: [&str; 3] = ["cameras", "camera_defaults", "webhooks"];
+/// These tables as they are written.
+pub(super) const TABLES: [&str; 3] = ["[[cameras]]", "[camera_defaults]", "[[webhooks]]"];
 
 /// Cameras and webhooks as they are written.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]

@@ -26,7 +26,7 @@ Every setting with its key, environment variable, type and default. This page is
   environment variables, then flags: `--set KEY=VALUE`, such as `--set limits.max_frames_in_flight=8`,
   and `--listen ADDRESS:PORT` for `server.listen`. [packaging/lookdown.toml](../packaging/lookdown.toml) is
   a file with every key at its default.
-* `lookdown serve --check` reports whether a server can start with the chosen settings.
+* `lookdown run --check` and `serve --check` report whether they can start with the chosen settings.
 * The lists `[[cameras]]` with `[camera_defaults]`, and `[[webhooks]]`, are in the file only:
   [watch.md](watch.md#several-cameras) and [count.md](count.md#webhooks) describe their keys.
 * The file may have `version = 1`, the [version of its format](upgrade.md#what-is-kept).

@@ -54,7 +54,8 @@ settings! {
             ("silhouette", Some(Concealment::Silhouette)),
         ]);
         /// `true` if `/metrics` shows the number of persons of each camera and the time of its
-        /// latest report, with its name as a label: 1000 cameras at most.
+        /// latest report, with its name as a label: 1000 cameras at most. `lookdown run` always
+        /// does.
         camera_metrics: bool = false => flag();
     }
 }

@@ -69,8 +69,14 @@ pub(super) fn ignored(
     });
     let mut ignored: Vec<_> = ignored
         .map(|name| {
+            let upper = name.to_uppercase();
             let mut known = entries.iter().map(|entry| variable_of(entry.key));
-            let meant = known.find(|known| known.replace(SEPARATOR, "_") == name.to_uppercase());
+            let key = upper.strip_prefix(NEARLY).unwrap_or_default();
+            let is_meant = |known: &String| {
+                known.replace(SEPARATOR, "_") == upper
+                    || known.ends_with(&format!("{SEPARATOR}{key}"))
+            };
+            let meant = known.find(is_meant);
             match meant {
                 Some(meant) => format!("{name} (for the setting, use {meant})"),
                 None => name,
@@ -94,5 +100,8 @@ mod tests {
         assert_eq!(ignored(names(&[CAMERA_VARIABLE, "PATH"]), &[]), None);
         let found = ignored(names(&[CAMERA_VARIABLE, "LOOKDOWN_PORT"]), &[]).unwrap();
         assert!(found.ends_with("ignored: LOOKDOWN_PORT"), "{found}");
+        let found = ignored(names(&["LOOKDOWN_LISTEN"]), &super::super::entries()).unwrap();
+        let meant = "LOOKDOWN_LISTEN (for the setting, use LOOKDOWN__SERVER__LISTEN)";
+        assert!(found.ends_with(meant), "{found}");
     }
 }

@@ -12,6 +12,7 @@ use axum::{Router, http::StatusCode};
 use lookdown::{api::Companions, cameras::Cameras};
 use lookdown_watch::Metrics;
 use tokio::{
+    sync::Mutex,
     task::JoinSet,
     time::{sleep, timeout},
 };
@@ -22,6 +23,8 @@ const CAMERA: &str = r#"{ "url": "rtsp://127.0.0.1:9/" }"#;
 const TIMEOUT: Duration = Duration::from_mins(1);
 /// Most requests that wait for the folder.
 const MAX_WAITING: usize = 32;
+/// The tests of a process share the places of requests that wait.
+static PLACES: Mutex<()> = Mutex::const_new(());
 
 /// A pipe in the place of a file that the server writes. Writers wait until this is dropped.
 struct HangingFile(PathBuf);
@@ -45,6 +48,7 @@ impl Drop for HangingFile {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_folder_of_cameras_that_hangs_keeps_few_threads() {
+    let _places = PLACES.lock().await;
     let folder = tempfile::tempdir().unwrap();
     let hanging = HangingFile::plant(folder.path().join("cameras.part"));
     let companions = Companions::default();
@@ -106,6 +110,7 @@ fn service(folder: &std::path::Path, companions: &Companions) -> Service {
 
 #[tokio::test]
 async fn a_camera_that_is_not_counted_has_a_warning() {
+    let _places = PLACES.lock().await;
     let folder = tempfile::tempdir().unwrap();
     let companions = Companions::default();
     let service = service(folder.path(), &companions);
@@ -119,6 +124,52 @@ async fn a_camera_that_is_not_counted_has_a_warning() {
         service.put(&format!("/cameras/{camera}"), CAMERA).await;
         let row = service.get(&format!("/cameras/{camera}")).await;
         assert_eq!(row.json()["warning"], warning);
+    }
+}
+
+#[tokio::test]
+async fn the_field_at_fault_of_a_camera_is_named() {
+    let _places = PLACES.lock().await;
+    let folder = tempfile::tempdir().unwrap();
+    let companions = Companions::default();
+    let service = service(folder.path(), &companions);
+    for (body, detail) in [
+        (
+            r#"{ "parameters": {} }"#,
+            "parameters: there is no such field: use paused, keep_image",
+        ),
+        (
+            r#"{ "paused": "secret" }"#,
+            "paused: it has a value of another type",
+        ),
+        (
+            r#"{ "paused": 1, "keep_image": 2 }"#,
+            "body: line 1: not a camera",
+        ),
+        ("[", "body: line 1: not a camera"),
+    ] {
+        let refused = service.patch("/cameras/hall", body).await;
+        let said = refused.problem()["detail"].to_string();
+        assert!(said.contains(detail) && !said.contains("secret"), "{said}");
+    }
+}
+
+#[tokio::test]
+async fn an_image_is_kept_after_it_is_switched_on() {
+    let _places = PLACES.lock().await;
+    let folder = tempfile::tempdir().unwrap();
+    let companions = Companions::default();
+    let service = service(folder.path(), &companions);
+    service.put("/cameras/hall", CAMERA).await;
+    for (change, status) in [("true", StatusCode::OK), ("false", StatusCode::NOT_FOUND)] {
+        let body = format!(r#"{{ "keep_image": {change} }}"#);
+        let changed = service.patch("/cameras/hall", &body).await;
+        assert_eq!(changed.status, StatusCode::NO_CONTENT, "{}", changed.text());
+        service.post_raw("camera=hall", frame()).await;
+        let image = service.get("/results/hall/latest.jpg").await;
+        assert_eq!(image.status, status, "{change}");
+        let row = service.get("/cameras/hall").await.json();
+        assert_eq!(row["keep_image"].to_string(), change);
     }
 }
 

@@ -1,8 +1,8 @@
 //! Health checks, metrics and the API page.
 
-use lookdown::api::Readiness;
+use lookdown::api::{Companions, Readiness};
 
-use crate::service::{Service, frame};
+use crate::service::{Bounds, Service, frame};
 
 #[tokio::test]
 async fn readiness_follows_the_phase_and_liveness_does_not() {
@@ -80,7 +80,30 @@ async fn the_api_page_loads_nothing_from_other_hosts() {
 
 #[tokio::test]
 async fn the_server_serves_its_openapi_document() {
-    let answer = Service::start().get("/openapi.json").await;
-    let document: serde_json::Value = answer.json();
-    assert!(document["paths"]["/detect"]["post"].is_object());
+    let companions = Companions::default();
+    let service = Service::within(&Bounds {
+        companions: companions.clone(),
+        ..Bounds::default()
+    });
+    for has_counts in [false, true] {
+        let document = service.get("/openapi.json").await.json();
+        assert!(document["paths"]["/detect"]["post"].is_object());
+        let counts = [
+            "/counts/{camera}",
+            "/sites/{site}",
+            "/cameras/{camera}/furniture",
+        ];
+        for path in counts {
+            let is_there = document["paths"][path]["get"].is_object();
+            assert_eq!(is_there, has_counts, "{path}");
+        }
+        let tags = document["tags"].as_array().unwrap();
+        let names: std::collections::BTreeSet<_> =
+            tags.iter().map(|tag| tag["name"].as_str()).collect();
+        assert_eq!(names.len(), tags.len());
+        let schemas = document["components"]["schemas"].as_object().unwrap();
+        assert!(schemas.contains_key("CameraRow"));
+        assert_eq!(schemas.contains_key("CountedCamera"), has_counts);
+        companions.expect_counts(lookdown_count::openapi_document);
+    }
 }

@@ -76,6 +76,10 @@ async fn the_camera_name_defaults_to_the_calibration_id() {
     );
     let list = service.get("/results").await;
     assert_eq!(list.header("cache-control"), "no-cache");
+    let tag = list.header("etag").to_owned();
+    let known = [("If-None-Match", &*tag)];
+    let again = service.ask("GET", "/results", &known).await;
+    assert_eq!((again.status.as_u16(), again.header("etag")), (304, &*tag));
     let list = list.json();
     let cameras: Vec<_> = list
         .as_array()
@@ -91,6 +95,9 @@ async fn the_camera_name_defaults_to_the_calibration_id() {
     assert_eq!(row["persons"], report["persons"].as_array().unwrap().len());
     let age = row["age_seconds"].as_f64().unwrap();
     assert!((0.0..60.0).contains(&age), "{age}");
+    service.post_raw("camera=hall", frame()).await;
+    let newer = service.ask("GET", "/results", &known).await;
+    assert_eq!(newer.status, 200);
 }
 
 #[tokio::test]

@@ -315,6 +315,11 @@ impl Service {
         self.send(Request::put(path).body(body).unwrap()).await
     }
 
+    pub(crate) async fn patch(&self, path: &str, body: &str) -> Answer {
+        let body = Body::from(body.to_owned());
+        self.send(Request::patch(path).body(body).unwrap()).await
+    }
+
     pub(crate) async fn post(&self, path: &str, body: &str) -> Answer {
         let body = Body::from(body.to_owned());
         self.send(Request::post(path).body(body).unwrap()).await

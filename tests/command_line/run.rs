@@ -165,10 +165,18 @@ fn a_camera_is_counted_on_the_port_of_the_server() {
     let key = format!("X-API-Key: {KEY}\r\n");
     let counted = "lookdown_count_last_report_timestamp_seconds{camera=\"hall\"}";
     let metrics = running.until("/metrics", &key, counted, drop_frames(&frames));
-    assert!(metrics.contains("lookdown_watch_frames_sent_total{camera=\"hall\"}"));
+    for metric in ["watch_frames_sent_total", "camera_persons"] {
+        assert!(metrics.contains(&format!("lookdown_{metric}{{camera=\"hall\"}}")));
+    }
     let counts = running.get("/counts", &key);
     assert!(counts.contains("\"name\":\"hall\""), "{counts}");
     assert!(counts.starts_with("HTTP/1.1 200 "), "{counts}");
+    let past = "/counts/hall?from=2026-01-01T00:00:00Z&to=2026-01-02T00:00:00Z";
+    let counts = running.get(past, &key);
+    let tag = counts.lines().find(|line| line.starts_with("etag: "));
+    let known = tag.unwrap().replace("etag", "If-None-Match");
+    let unmodified = running.get(past, &format!("{key}{known}\r\n"));
+    assert!(unmodified.starts_with("HTTP/1.1 304 "), "{unmodified}");
     let refused = running.get("/counts", "");
     assert!(refused.starts_with("HTTP/1.1 401 "), "{refused}");
     let unknown = running.get("/counts/gate", &key);
@@ -275,6 +283,33 @@ fn paused_and_removed_cameras_leave_results_and_metrics() {
     let unknown = running.ask("DELETE /results/hall", "");
     assert!(unknown.starts_with("HTTP/1.1 404 "), "{unknown}");
     running.interrupt();
+}
+
+#[test]
+fn a_check_of_run_tests_cameras_and_serves_no_client() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = folder.path().join("lookdown.toml");
+    let start = format!(
+        "[server]\nlisten = \"127.0.0.1:0\"\n[calibrations]\npath = {:?}\n",
+        folder.path().join("calibrations"),
+    );
+    let check = |text: &str| {
+        fs::write(&settings, format!("{start}{text}")).unwrap();
+        lookdown(&["run", settings.to_str().unwrap(), "--check"], &[])
+    };
+    let output = check("[[cameras]]\nname = \"hall\"\nurl = \"rtsp://10.0.0.8/\"\n");
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(said.starts_with("ready to serve on"), "{said}");
+    assert!(said.ends_with("\ncameras of the settings: 1\n"), "{said}");
+    for (text, parts) in [
+        ("[[cameras]]\nname = \"hall\"\n", ["url", "missing"]),
+        (
+            "[camera]\nname = \"hall\"\n",
+            ["`camera`", "use one of `[[cameras]]`"],
+        ),
+    ] {
+        assert_fails_with(&check(text), &parts);
+    }
 }
 
 #[test]

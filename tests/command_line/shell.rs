@@ -67,9 +67,25 @@ fn each_command_has_a_manual_page() {
 fn help_lists_commands_of_users_only() {
     let output = lookdown(&["--help"], &[]);
     let help = String::from_utf8(output.stdout).unwrap();
-    assert!(help.contains("\n  serve "), "{help}");
-    for command in ["openapi", "completions", "manual"] {
-        assert!(!help.contains(&format!("\n  {command} ")), "{help}");
+    for (command, is_listed) in [
+        ("serve", true),
+        ("completions", true),
+        ("manual", true),
+        ("openapi", false),
+    ] {
+        let line = format!("\n  {command} ");
+        assert_eq!(help.contains(&line), is_listed, "{command}: {help}");
+    }
+}
+
+#[test]
+fn help_of_count_has_the_threshold_of_recordings() {
+    for flag in ["--help", "-h"] {
+        let output = lookdown(&["count", flag], &[]);
+        let help = String::from_utf8(output.stdout).unwrap();
+        let (_, threshold) = help.split_once("--score-threshold").unwrap();
+        let (threshold, _) = threshold.split_once("\n      --").unwrap();
+        assert!(threshold.contains("[default: 0.06]"), "{threshold}");
     }
 }
 

@@ -7,7 +7,7 @@ use lookdown_detect::parameters::DetectParameters;
 use serde_json::Value;
 
 fn document() -> Value {
-    serde_json::to_value(openapi_document().unwrap()).unwrap()
+    serde_json::to_value(openapi_document(None).unwrap()).unwrap()
 }
 
 /// The documents of the server and of the counts, with their files.
@@ -217,7 +217,7 @@ fn counts_need_the_scope_read_and_decisions_admin() {
 
 #[test]
 fn form_is_the_first_media_type_of_a_body() {
-    let text = serde_json::to_string(&openapi_document().unwrap()).unwrap();
+    let text = serde_json::to_string(&openapi_document(None).unwrap()).unwrap();
     let forms = text.matches("\"multipart/form-data\":").count();
     let first = text
         .matches("\"content\":{\"multipart/form-data\":")

@@ -76,14 +76,14 @@ pub fn openapi_document() -> OpenApi {
 }
 
 async fn without_cache(mut response: Response) -> Response {
-    let value = HeaderValue::from_static("no-store");
-    response.headers_mut().insert(CACHE_CONTROL, value);
+    let headers = response.headers_mut().entry(CACHE_CONTROL);
+    headers.or_insert(HeaderValue::from_static("no-store"));
     response
 }
 
 /// A camera of the list.
 #[derive(Serialize, ToSchema)]
-struct CameraRow {
+struct CountedCamera {
     /// The name.
     name: String,
     /// Time of the last counted frame.
@@ -110,7 +110,7 @@ struct Dropping {
     reason: &'static str,
 }
 
-impl CameraRow {
+impl CountedCamera {
     /// Returns the row of a camera without a counted report.
     fn new(name: &str, counter: &Counter) -> Self {
         let drops = counter.drops().of(name);
@@ -135,14 +135,14 @@ impl CameraRow {
 #[utoipa::path(
     get, path = "/counts", tag = "counts", operation_id = "list_counted_cameras",
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
-    responses((status = OK, description = "By name.", body = Vec<CameraRow>))
+    responses((status = OK, description = "By name.", body = Vec<CountedCamera>))
 )]
-async fn cameras(State(api): State<Shared>) -> Json<Vec<CameraRow>> {
+async fn cameras(State(api): State<Shared>) -> Json<Vec<CountedCamera>> {
     let counter = api.counter.lock();
     let snapshot = counter.snapshot(now_ms());
     let mut rows = BTreeMap::new();
     for camera in snapshot.cameras {
-        let row = CameraRow {
+        let row = CountedCamera {
             last_report: Some(time_of(camera.last_report_ms)),
             persons: camera.persons,
             too_low_since: camera.too_low_since_ms.map(time_of),
@@ -150,13 +150,13 @@ async fn cameras(State(api): State<Shared>) -> Json<Vec<CameraRow>> {
                 Some(Owner::Site(site)) => Some(site.clone()),
                 _ => None,
             },
-            ..CameraRow::new(&camera.name, &counter)
+            ..CountedCamera::new(&camera.name, &counter)
         };
         rows.insert(camera.name, row);
     }
     for (name, _) in counter.drops().iter() {
         let entry = rows.entry(name.to_owned());
-        entry.or_insert_with(|| CameraRow::new(name, &counter));
+        entry.or_insert_with(|| CountedCamera::new(name, &counter));
     }
     Json(rows.into_values().collect())
 }

@@ -7,6 +7,7 @@
 //! has the common parts of the API documents.
 
 pub mod csrf;
+pub mod entity_tags;
 pub mod header_limits;
 pub mod host;
 pub mod keys;

@@ -1,10 +1,7 @@
 //! Detection for all routes: waits for the report until the deadline, and counts, traces and stores
 //! it.
 
-use std::{
-    sync::Arc,
-    time::{Duration, Instant},
-};
+use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use lookdown_common::report::Report;
@@ -75,7 +72,6 @@ pub(in crate::api) async fn run_detection<T: Send + 'static>(
     let timeline = job.ticket.timeline.clone();
     let is_stored = job.parameters.store;
     let concealment = state.options.conceal_images;
-    let images_of = Arc::clone(&state.options.images_of);
     let observer = state.clone();
     let work = state.workers.detect_and(job, move |detected| {
         if is_stored {
@@ -83,7 +79,7 @@ pub(in crate::api) async fn run_detection<T: Send + 'static>(
         }
         // Drawing needs the frame after the report has been taken.
         let report = detected.report.clone();
-        let is_kept = is_stored && images_of.include(&report.camera);
+        let is_kept = is_stored && observer.keeps_image(&report.camera);
         let image = is_kept.then(|| new_image(&detected, concealment)).flatten();
         Finished {
             report,

@@ -129,7 +129,7 @@ mod tests {
 
     #[test]
     fn every_example_has_a_place_in_the_document() {
-        let document = crate::api::openapi_document().unwrap();
+        let document = crate::api::openapi_document(None).unwrap();
         let text = serde_json::to_string(&document).unwrap();
         assert_eq!(text.matches("the bytes of frame.jpg").count(), 3);
         assert_eq!(text.matches("\"focal\":534.76").count(), 3);

@@ -17,6 +17,7 @@ use axum::{
     },
     response::{IntoResponse, Response},
 };
+use lookdown_http::entity_tags::{entity_tag, is_unmodified};
 
 use self::{
     address::{CalibrationAddress, NewCalibrationAddress},
@@ -29,7 +30,6 @@ use crate::{
         ApiState,
         http::{
             deadline::{CALIBRATIONS, Deadline},
-            entity_tags::{entity_tag, is_unmodified},
             problem::{Problem, ProblemKind},
         },
         openapi::RawBytes,

@@ -14,8 +14,9 @@ use axum::{
     },
     response::{IntoResponse, Response},
 };
-use lookdown_common::Secret;
+use lookdown_common::{Secret, text::one_line};
 use serde::{Deserialize, de::DeserializeOwned};
+use serde_json::{Map, Value};
 use tokio::time::{sleep, timeout};
 use utoipa::ToSchema;
 
@@ -66,6 +67,9 @@ pub(in crate::api) struct NewCamera {
     /// `true` if no frames are read.
     #[serde(default)]
     paused: bool,
+    /// `true` if the latest image is kept, as for a camera in the setting `results.images`.
+    #[serde(default)]
+    keep_image: bool,
 }
 
 /// A change of a camera.
@@ -74,7 +78,12 @@ pub(in crate::api) struct NewCamera {
 #[schema(example = json!({ "paused": true }))]
 pub(in crate::api) struct CameraChange {
     /// `true` to read no frames.
-    paused: bool,
+    #[schema(nullable = false)]
+    paused: Option<bool>,
+    /// `true` to keep the latest image, as for a camera in the setting `results.images`. After
+    /// `false`, the next frame removes it.
+    #[schema(nullable = false)]
+    keep_image: Option<bool>,
 }
 
 /// The JSON of a request about a camera.
@@ -89,10 +98,36 @@ impl<T: DeserializeOwned> FromRequest<ApiState> for CameraBody<T> {
         let reader = state.body_reader(&context, MAX_BYTES, "send a camera");
         let bytes = reader.read(&parts.headers, body).await?.into_bytes();
         serde_json::from_slice(&bytes).map(Self).map_err(|error| {
-            // The value is not repeated: it may hold a password.
-            let fault = format!("line {}: not a camera: compare it with /docs", error.line());
-            Problem::of_parameter(ProblemKind::InvalidParameter, "body", &fault)
+            let (field, fault) = fault::<T>(&bytes, &error);
+            Problem::of_parameter(ProblemKind::InvalidParameter, &field, &fault)
         })
+    }
+}
+
+/// Returns the field at fault and its fault. Values are not repeated: one may be a password.
+fn fault<T: DeserializeOwned>(body: &[u8], error: &serde_json::Error) -> (String, String) {
+    let is_without_fault = |fields: &Map<String, Value>, name: &str| {
+        let mut others = fields.clone();
+        others.remove(name);
+        serde_json::from_value::<T>(others.into()).is_ok()
+    };
+    let fields = serde_json::from_slice::<Map<String, Value>>(body).unwrap_or_default();
+    let field = fields.keys().find(|name| is_without_fault(&fields, name));
+    let message = error.to_string();
+    match field {
+        Some(field) if message.starts_with("unknown field") => {
+            let known: Vec<_> = message.split('`').skip(3).step_by(2).collect();
+            let fault = format!("there is no such field: use {}", known.join(", "));
+            (one_line(field), fault)
+        }
+        Some(field) => {
+            let fault = "it has a value of another type: compare it with /docs";
+            (field.clone(), fault.to_owned())
+        }
+        None => {
+            let fault = format!("line {}: not a camera: compare it with /docs", error.line());
+            ("body".to_owned(), fault)
+        }
     }
 }
 
@@ -105,6 +140,7 @@ impl NewCamera {
             calibration: self.calibration,
             profile: self.profile,
             paused: self.paused,
+            keep_image: self.keep_image,
         };
         (camera, self.password.map(Secret::from))
     }
@@ -183,9 +219,10 @@ pub(in crate::api) async fn put(
     })
 }
 
-/// Pause or resume a camera
+/// Change a camera
 ///
-/// It stays so after a restart. This change applies to cameras of the settings, too.
+/// Pauses or resumes it, and switches whether its latest image is kept. It stays so after a
+/// restart. This change applies to cameras of the settings, too.
 #[utoipa::path(
     patch, path = "/cameras/{camera}", tag = "cameras", operation_id = "change_camera",
     params(("camera" = String, Path, description = "The name of the camera.", example = "hall")),
@@ -198,16 +235,16 @@ pub(in crate::api) async fn patch(
     _admin: RequireAdmin,
     deadline: Deadline,
     Path(name): Path<String>,
-    CameraBody(CameraChange { paused }): CameraBody<CameraChange>,
+    CameraBody(CameraChange { paused, keep_image }): CameraBody<CameraChange>,
 ) -> Result<StatusCode, Problem> {
     let changed_name = name.clone();
     let is_known = using_files(&state, deadline, move |cameras| {
-        cameras.set_detection(&changed_name, !paused)
+        cameras.change(&changed_name, paused, keep_image)
     });
     if !is_known.await? {
         return Err(unknown());
     }
-    tracing::info!(camera = name, paused, "the camera was changed");
+    tracing::info!(camera = name, paused, keep_image, "the camera was changed");
     Ok(StatusCode::NO_CONTENT)
 }
 

@@ -9,7 +9,7 @@ use axum::{
     extract::{Request, State},
     http::{
         Method, StatusCode, Uri,
-        header::{ACCEPT, CACHE_CONTROL, CONTENT_TYPE},
+        header::{ACCEPT, CACHE_CONTROL, CONTENT_TYPE, ETAG, IF_NONE_MATCH},
     },
     response::Response,
     routing::{get, put},
@@ -107,7 +107,7 @@ async fn answer(state: &ApiState, request: Request) -> Result<Response, Problem>
         }
     };
     match response.status() {
-        status if status.is_success() => Ok(response),
+        status if status.is_success() || status == StatusCode::NOT_MODIFIED => Ok(response),
         status => Err(problem(status, response).await),
     }
 }
@@ -131,11 +131,13 @@ fn outgoing(client: &ServerClient, request: &Request) -> Result<RequestBuilder, 
         Method::DELETE => client.delete(url),
         _ => client.get(url),
     };
-    let outgoing = outgoing.timeout(TIMEOUT);
-    Ok(match request.headers().get(ACCEPT) {
-        Some(accept) => outgoing.header(ACCEPT, accept),
-        None => outgoing,
-    })
+    let mut outgoing = outgoing.timeout(TIMEOUT);
+    for name in [ACCEPT, IF_NONE_MATCH] {
+        if let Some(value) = request.headers().get(&name) {
+            outgoing = outgoing.header(name, value);
+        }
+    }
+    Ok(outgoing)
 }
 
 /// Requests the counts of another host with the key of that host: the key of the caller was checked
@@ -159,7 +161,7 @@ async fn forward(client: &ServerClient, outgoing: RequestBuilder) -> Result<Resp
     }
     let mut response = Response::new(Body::empty());
     *response.status_mut() = answered.status();
-    for name in [CONTENT_TYPE, CACHE_CONTROL] {
+    for name in [CONTENT_TYPE, CACHE_CONTROL, ETAG] {
         if let Some(value) = answered.headers().get(&name) {
             response.headers_mut().insert(name, value.clone());
         }

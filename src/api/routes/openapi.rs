@@ -1,20 +1,29 @@
 //! The OpenAPI document of the server.
 
-use axum::{Extension, Json};
+use axum::{Extension, Json, extract::State};
 
-use crate::api::{http::problem::Problem, openapi::Document};
+use utoipa::openapi::OpenApi;
 
-/// Builds the OpenAPI document of all routes.
+use crate::api::{ApiState, http::problem::Problem, openapi::Document};
+
+/// Builds the OpenAPI document of all routes, with those of the counts if their document is given.
 #[derive(Clone, Copy)]
-pub(in crate::api) struct DocumentSource(pub(in crate::api) fn() -> serde_json::Result<Document>);
+pub(in crate::api) struct DocumentSource(
+    pub(in crate::api) fn(Option<OpenApi>) -> serde_json::Result<Document>,
+);
 
 /// Get the OpenAPI document
+///
+/// It has the routes of the counts if this server has counts.
 #[utoipa::path(
     get, path = "/openapi.json", tag = "operation", operation_id = "get_openapi",
     responses((status = OK, description = "OpenAPI 3.1.", body = Object))
 )]
 pub(in crate::api) async fn openapi_json(
+    State(state): State<ApiState>,
     Extension(DocumentSource(document)): Extension<DocumentSource>,
 ) -> Result<Json<Document>, Problem> {
-    document().map(Json).map_err(Problem::internal)
+    document(state.options.companions.counts_document())
+        .map(Json)
+        .map_err(Problem::internal)
 }

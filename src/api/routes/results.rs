@@ -14,11 +14,16 @@ mod row;
 use axum::{
     Json,
     extract::State,
-    http::{HeaderValue, header::CACHE_CONTROL},
-    response::IntoResponse,
+    http::{
+        HeaderMap, HeaderValue, StatusCode,
+        header::{CACHE_CONTROL, ETAG},
+    },
+    response::{IntoResponse, Response},
 };
 use jiff::Timestamp;
 use lookdown_common::text::Quoted;
+use lookdown_http::entity_tags::{is_unmodified, weak_entity_tag};
+use lookdown_calibration::revision::revision_of;
 
 use self::row::CameraRow;
 use crate::{
@@ -35,16 +40,24 @@ const NO_CACHE: HeaderValue = HeaderValue::from_static("no-cache");
 
 /// List cameras with reports
 ///
-/// Each entry has the age of the latest report and the number of persons there now.
+/// Each entry has the age of the latest report and the number of persons there now. `If-None-Match`
+/// with the `ETag` of a known list returns 304 until a report or a number is new.
 #[utoipa::path(
     get, path = "/results", tag = "results", operation_id = "list_results",
+    params(("If-None-Match" = Option<String>, Header, nullable = false, pattern = r#"^(\*|(W/)?"[!#-~]*")$"#,
+        description = "The ETag of the known list.")),
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
-    responses((status = OK, description = "By name.", body = Vec<CameraRow>))
+    responses(
+        (status = OK, description = "By name.", body = Vec<CameraRow>,
+         headers(("ETag" = String, description = "It ignores the ages."))),
+        (status = NOT_MODIFIED, description = "No report and no number is new."),
+    )
 )]
 pub(in crate::api) async fn list(
     State(state): State<ApiState>,
     _reader: RequireRead,
-) -> Result<impl IntoResponse, Problem> {
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
     let now = Timestamp::now();
     let own = state.options.companions.own_cameras();
     let latest = state.results.latest_of_all().await?;
@@ -54,7 +67,18 @@ pub(in crate::api) async fn list(
         rows.push(CameraRow::at(report, headline, now));
     }
     rows.sort_unstable_by(|one, other| one.camera.cmp(&other.camera));
-    Ok(([(CACHE_CONTROL, NO_CACHE)], Json(rows)))
+    let tag = revision_of(
+        format!(
+            "{:?}",
+            rows.iter().map(CameraRow::state).collect::<Vec<_>>()
+        )
+        .as_bytes(),
+    );
+    let about = [(ETAG, weak_entity_tag(&tag)), (CACHE_CONTROL, NO_CACHE)];
+    if is_unmodified(&headers, &tag)? {
+        return Ok((StatusCode::NOT_MODIFIED, about).into_response());
+    }
+    Ok((about, Json(rows)).into_response())
 }
 
 /// Returns the problem of a camera without a stored report.

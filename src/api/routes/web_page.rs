@@ -15,17 +15,17 @@ use axum::{
     routing::get,
 };
 use lookdown_calibration::revision::revision_of;
-use lookdown_http::page_headers;
+use lookdown_http::{
+    entity_tags::{entity_tag, is_unmodified},
+    page_headers,
+};
 
 use serde::Serialize;
 
 use crate::{
     api::{
         ApiState,
-        http::{
-            entity_tags::{entity_tag, is_unmodified},
-            problem::{Problem, ProblemKind},
-        },
+        http::problem::{Problem, ProblemKind},
         require_scope::RequireAdmin,
     },
     samples::SAMPLES,
@@ -91,6 +91,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "plot.js",
         "floor.js",
         "lens.js",
+        "lens_choice.js",
         "calibrate.js",
         "calibration_sources.js",
         "calibration_values.js",
@@ -139,6 +140,8 @@ struct PageOptions {
     has_cameras: bool,
     /// True if the request may change calibrations and cameras.
     can_change: bool,
+    /// Longest time that the latest image of a camera is kept.
+    image_age_seconds: u64,
 }
 
 /// Returns the routes of the page and its files.
@@ -152,6 +155,7 @@ pub(in crate::api) fn router() -> Router<ApiState> {
             has_counts: state.options.companions.has_counts(),
             has_cameras: state.options.companions.cameras().is_some(),
             can_change: admin.is_ok(),
+            image_age_seconds: state.options.image_age.as_secs(),
         };
         let no_store = [(CACHE_CONTROL, HeaderValue::from_static("no-store"))];
         (no_store, Json(options)).into_response()

@@ -45,10 +45,14 @@ use crate::{
 const DEFAULT_EVERY: Duration = Duration::from_millis(200);
 /// The score threshold of counted frames (docs/count.md).
 const SCORE_THRESHOLD: (&str, &str) = (DetectParameters::SCORE_THRESHOLD, "0.06");
+/// The help of this flag, whose default is not that of other commands.
+const THRESHOLD_HELP: &str = "Minimum score of a person in a recording: counts weigh lower scores \
+                              themselves [default: 0.06]";
 
 /// Flags of recordings.
 #[derive(Debug, Args)]
 #[group(id = "recording_flags", multiple = true)]
+#[command(mut_arg(SCORE_THRESHOLD.0, |flag| flag.help(THRESHOLD_HELP).long_help(THRESHOLD_HELP)))]
 pub(super) struct RecordingFlags {
     /// The calibration of the recordings: a file, or the ID of one in the calibration folder
     #[arg(long, value_name = "FILE|ID")]

@@ -24,7 +24,8 @@ pageTest(
     await dialog.getByRole("button", { name: /Streaming\/Channels/ }).click();
     assert.equal(await dialog.getByLabel("URL").inputValue(), "rtsp://HOST:554/Streaming/Channels/102");
     await dialog.getByLabel("URL").fill(`${CAMERA}/snapshot.jpg?token=1`);
-    await dialog.locator("#camera-name").fill("hall");
+    await dialog.locator("#camera-name").fill("Hall");
+    await dialog.getByText("it is deleted after 24 hours").waitFor();
     await dialog.getByRole("button", { name: "Test" }).click();
     await dialog.getByText("the camera requires a user name and a password").waitFor();
     await dialog.getByLabel("User").fill("viewer");
@@ -37,7 +38,15 @@ pageTest(
     assert.match(page.url(), /#camera\/hall$/);
     const card = page.getByRole("article", { name: "Camera hall" });
     await card.locator(".plot.hours").waitFor();
-    await card.getByText("Images of this camera are not kept.").waitFor();
+    const image = card.getByAltText("The latest frame of hall");
+    await image.waitFor();
+    const keep = card.getByLabel("Keep the latest image");
+    await keep.uncheck();
+    await card.locator(".sketch").waitFor();
+    await card.getByText("it is deleted after 24 hours").waitFor();
+    assert.equal((await camera("hall")).keep_image, false);
+    await keep.check();
+    await image.waitFor();
     await assertFits(page);
     await assertAccessible(page);
     // The frame is read from the camera, because no image of it is kept.
@@ -108,7 +117,7 @@ pageTest(
     page.on("request", (request) => request.url().includes("/suggested-calibration") && asked.push(request.url()));
     await add("lab", "/snapshot.jpg?token=1");
     const suggestion = suggestionOf(page, "lab");
-    await suggestion.getByText(/^No calibration was found: .*give the model of the lens/).waitFor({ timeout: 180_000 });
+    await suggestion.getByText("No calibration was found. Calibrate compares the usual lenses").waitFor({ timeout: 180_000 });
     for (const viewport of [{ width: 1280, height: 800 }, PHONE]) {
       await page.setViewportSize(viewport);
       await assertFits(page);

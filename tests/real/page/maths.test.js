@@ -5,7 +5,7 @@ import test from "node:test";
 import { corners, holds, roundStep } from "../../../web/geometry.js";
 import { replacedIn } from "../../../web/calibration_sources.js";
 import { valuesOf } from "../../../web/calibration_values.js";
-import { assumedCircle, calibrationOf, circleOf, rimOf, withFound } from "../../../web/lens.js";
+import { assumedCircle, calibrationOf, circleOf, pixelOfFloor, rimOf, withFound } from "../../../web/lens.js";
 import { countedNumbers, steps } from "../../../web/plot.js";
 import { parseEvent } from "../../../web/server.js";
 import { continued, straighten } from "../../../web/straighten.js";
@@ -39,6 +39,20 @@ test("the circle of a found lens follows its polynomial", () => {
   // 1.5 + 0.1 · 1.5³ - 0.02 · 1.5⁵ = 1.685625
   near(radius, 200 * 1.685625);
   assert.equal(rimOf({ image: { width: 640, height: 480 }, lens: { ...lens, fy: 190 } }), null);
+});
+
+test("places on the floor are seen where the server sees them", () => {
+  const lens = { model: "equidistant", focal: 300, cx: 479.5, cy: 479.5, max_theta: 1.5 };
+  // A camera at 3 m looks straight down, then it is tilted by 0.1 radians.
+  const level = pixelOfFloor({ lens, mount: { world_up: [0, 0, -1], height_m: 3 } });
+  assert.deepEqual(level([0, 0]), [480, 480]);
+  near(level([3, 0])[0], 480 + (300 * Math.PI) / 4);
+  near(level([0, -3])[1], 480 - (300 * Math.PI) / 4);
+  assert.equal(level([1000, 0]), null);
+  const tilted = pixelOfFloor({ lens, mount: { world_up: [0, Math.sin(0.1), -Math.cos(0.1)], height_m: 3 } });
+  near(tilted([0, 0])[1], 480 - 30);
+  near(tilted([0, 3 * Math.tan(0.3)])[1], 480 + 60);
+  assert.equal(pixelOfFloor({ lens, mount: {} }), null);
 });
 
 test("a circle survives conversion to a lens and back", () => {

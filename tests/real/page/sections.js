@@ -99,6 +99,17 @@ pageTest("a camera with kept images is shown with them", "#cameras", async (page
   await page.getByRole("article", { name: "Camera gate" }).getByAltText("The latest frame of gate").waitFor();
 });
 
+pageTest("the skip link leads to the content, and Tab passes over boxes", "#cameras", async (page) => {
+  await post("gate", "office");
+  const card = page.getByRole("article", { name: "Camera gate" });
+  await card.locator("[data-box]").first().waitFor();
+  await page.keyboard.press("Tab");
+  await page.getByRole("link", { name: "Skip to the content" }).press("Enter");
+  assert.equal(await page.evaluate(() => document.activeElement.id), "main");
+  assert.match(page.url(), /#cameras$/);
+  assert.equal(await card.locator("[data-box][tabindex]").count(), 0);
+});
+
 pageTest("a later visitor sees earlier results", "#detect", async (page) => {
   await post("yard", "office");
   await post("yard", "lounge", "profile=fast&max_detections=1");
@@ -120,7 +131,7 @@ pageTest("a click on a false box ignores its place, and Undo takes it back", "#c
   };
   const before = await send("stall");
   const card = page.getByRole("article", { name: "Camera stall", exact: true });
-  await card.getByRole("button", { name: /^Ignore the place of person 1,/ }).dispatchEvent("pointerdown");
+  await card.locator("[data-box='0']").dispatchEvent("pointerdown");
   await card.getByText("The place is ignored from the next frame on.").waitFor();
   assert.equal((await stored("stall")).ignore.length, 1);
   assert.ok((await send("stall")).persons.length < before.persons.length);
@@ -132,7 +143,7 @@ pageTest("a click on a false box ignores its place, and Undo takes it back", "#c
   // A calibration that two cameras use becomes one of the camera's own.
   await send("stall-2");
   const second = page.getByRole("article", { name: "Camera stall-2" });
-  await second.getByRole("button", { name: /^Ignore the place of person 1,/ }).dispatchEvent("pointerdown");
+  await second.locator("[data-box='0']").dispatchEvent("pointerdown");
   await second.getByText("stall is also used by stall: stall-2 now has the calibration stall-2.").waitFor();
   assert.deepEqual([(await stored("stall")).ignore, (await stored("stall-2")).ignore.length], [undefined, 1]);
 });

@@ -1,28 +1,27 @@
 //! Counts per step as JSON and CSV.
 
-use std::{
-    collections::{BTreeMap, BTreeSet},
-    fmt::Write as _,
-};
+mod body;
+
+use std::collections::{BTreeMap, BTreeSet};
 
 use axum::{
     Json,
+    body::to_bytes,
     extract::{Path, Query, State, rejection::QueryRejection},
     http::{
-        HeaderMap,
-        header::{ACCEPT, CONTENT_TYPE},
+        HeaderMap, HeaderValue, StatusCode,
+        header::{ACCEPT, CACHE_CONTROL, CONTENT_TYPE, ETAG},
     },
     response::{IntoResponse, Response},
 };
-use jiff::Timestamp;
 use lookdown_common::text::{one_line, shortened, with_causes};
-use lookdown_http::problem::Problem;
-use serde::Serialize;
-use utoipa::{
-    ToSchema,
-    openapi::{Object, ObjectBuilder, OneOfBuilder, Ref, RefOr, Schema, Type},
+use lookdown_http::{
+    entity_tags::{entity_tag, is_unmodified},
+    problem::Problem,
 };
+use lookdown_calibration::revision::revision_of;
 
+use self::body::{Counts, PersonCounts, StepCounts, csv};
 use super::{
     shared::{Shared, blocking, check_known, stored},
     time::TimeParameters,
@@ -35,89 +34,30 @@ use crate::{
     time_span::TimeSpan,
 };
 
+pub(super) use body::ZoneCounts;
+
 /// Most values of an answer: steps times directions of lines and zones. An answer has 12 MB at
 /// most.
 pub(crate) const MAX_VALUES: usize = 100_000;
-
-/// The counts of a camera or a site.
-#[derive(Debug, Serialize, ToSchema)]
-struct Counts {
-    /// The camera; absent for a site.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
-    camera: Option<String>,
-    /// The site; absent for a camera.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
-    site: Option<String>,
-    from: Timestamp,
-    to: Timestamp,
-    step_seconds: i64,
-    steps: Vec<StepCounts>,
-}
-
-/// The counts of a step. Unknown counts are null.
-#[derive(Debug, Serialize, ToSchema)]
-struct StepCounts {
-    from: Timestamp,
-    to: Timestamp,
-    /// Seconds of the step in which reports arrived.
-    known_seconds: f64,
-    /// Seconds of those with fewer frames than lines need, so that crossings may be missed; absent
-    /// for a site.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
-    slow_seconds: Option<f64>,
-    persons: Option<PersonCounts>,
-    /// Crossings by line and direction; absent for a site.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
-    lines: Option<BTreeMap<String, BTreeMap<String, Option<u64>>>>,
-    /// Counts by zone; absent for a site.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(schema_with = zones_schema)]
-    zones: Option<BTreeMap<String, Option<ZoneCounts>>>,
-}
-
-/// Persons of a step.
-#[derive(Debug, Serialize, ToSchema)]
-struct PersonCounts {
-    mean: f64,
-    max: u64,
-}
-
-/// Counts of a zone in a step.
-#[derive(Debug, Serialize, ToSchema)]
-pub(super) struct ZoneCounts {
-    entries: u64,
-    mean: f64,
-    max: u64,
-    /// Visits that ended in the step, and their mean duration.
-    visits: u64,
-    dwell_seconds: Option<f64>,
-}
-
-/// Describes counts or null by zone, which the derived schema cannot.
-fn zones_schema() -> Object {
-    let counts = OneOfBuilder::new()
-        .item(ObjectBuilder::new().schema_type(Type::Null))
-        .item(Ref::from_schema_name(ZoneCounts::name()));
-    ObjectBuilder::new()
-        .description(Some("Counts by zone; absent for a site."))
-        .additional_properties(Some(RefOr::T(Schema::from(counts))))
-        .build()
-}
 
 /// The lines with their directions, and the zones.
 type Names = (BTreeSet<(String, String)>, BTreeSet<String>);
 
 /// Get the counts of a camera
+///
+/// `If-None-Match` with the `ETag` of known counts returns 304 until they change.
 #[utoipa::path(
     get, path = "/counts/{camera}", tag = "counts", operation_id = "get_camera_counts",
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
-    params(("camera" = String, Path, description = "The name of the camera."), TimeParameters),
-    responses((status = OK, description = "Counts per step. Unknown counts are null.",
-        content((Counts = "application/json"), (String = "text/csv"))))
+    params(("camera" = String, Path, description = "The name of the camera."), TimeParameters,
+        ("If-None-Match" = Option<String>, Header, nullable = false, pattern = r#"^(\*|"[!#-~]*")$"#,
+            description = "The ETag of the known counts.")),
+    responses(
+        (status = OK, description = "Counts per step. Unknown counts are null.",
+            content((Counts = "application/json"), (String = "text/csv")),
+            headers(("ETag" = String, description = "It changes with the counts."))),
+        (status = NOT_MODIFIED, description = "The counts are the same."),
+    )
 )]
 pub(super) async fn of_camera(
     State(api): State<Shared>,
@@ -129,12 +69,20 @@ pub(super) async fn of_camera(
 }
 
 /// Get the counts of a site
+///
+/// `If-None-Match` with the `ETag` of known counts returns 304 until they change.
 #[utoipa::path(
     get, path = "/sites/{site}", tag = "sites", operation_id = "get_site_counts",
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
-    params(("site" = String, Path, description = "The name of the site."), TimeParameters),
-    responses((status = OK, description = "Counts per step. Unknown counts are null.",
-        content((Counts = "application/json"), (String = "text/csv"))))
+    params(("site" = String, Path, description = "The name of the site."), TimeParameters,
+        ("If-None-Match" = Option<String>, Header, nullable = false, pattern = r#"^(\*|"[!#-~]*")$"#,
+            description = "The ETag of the known counts.")),
+    responses(
+        (status = OK, description = "Counts per step. Unknown counts are null.",
+            content((Counts = "application/json"), (String = "text/csv")),
+            headers(("ETag" = String, description = "It changes with the counts."))),
+        (status = NOT_MODIFIED, description = "The counts are the same."),
+    )
 )]
 pub(super) async fn of_site(
     State(api): State<Shared>,
@@ -167,7 +115,7 @@ async fn answer(
     check_known(api, &owner).await?;
     let names = current_names(api, &owner);
     let store = api.store.clone();
-    blocking(move || {
+    let response = blocking(move || {
         let sums = stored(store.steps(&owner, span, MAX_VALUES))?.ok_or_else(too_large)?;
         let counts = counts(owner, span, &sums, names).ok_or_else(too_large)?;
         if !is_csv {
@@ -176,7 +124,19 @@ async fn answer(
         let content_type = [(CONTENT_TYPE, "text/csv; charset=utf-8; header=present")];
         Ok((content_type, csv(&counts)).into_response())
     })
-    .await
+    .await?;
+    let (parts, body) = response.into_parts();
+    let body = to_bytes(body, usize::MAX).await;
+    let body = body.map_err(|_| Problem::internal())?;
+    let revision = revision_of(&body);
+    let about = [
+        (ETAG, entity_tag(&revision)),
+        (CACHE_CONTROL, HeaderValue::from_static("no-cache")),
+    ];
+    if is_unmodified(headers, &revision)? {
+        return Ok((StatusCode::NOT_MODIFIED, about).into_response());
+    }
+    Ok((parts, about, body).into_response())
 }
 
 fn too_large() -> Problem {
@@ -306,54 +266,6 @@ fn step_counts(
         }),
         zones: is_camera.then(|| zone_counts.collect()),
         lines: is_camera.then_some(line_counts),
-    }
-}
-
-/// Writes the counts as a table. Unknown counts are empty cells.
-fn csv(counts: &Counts) -> String {
-    let mut text = "from,to,known_seconds,slow_seconds,persons_mean,persons_max".to_owned();
-    let first = counts.steps.first();
-    let lines = first.and_then(|step| step.lines.as_ref());
-    for (line, directions) in lines.into_iter().flatten() {
-        for direction in directions.keys() {
-            let _ = write!(text, ",line.{line}.{direction}");
-        }
-    }
-    let zones = first.and_then(|step| step.zones.as_ref());
-    for zone in zones.into_iter().flat_map(BTreeMap::keys) {
-        for column in ["entries", "mean", "max", "visits", "dwell_seconds"] {
-            let _ = write!(text, ",zone.{zone}.{column}");
-        }
-    }
-    text.push_str("\r\n");
-    for step in &counts.steps {
-        let _ = write!(text, "{},{},{}", step.from, step.to, step.known_seconds);
-        cell(&mut text, step.slow_seconds);
-        let persons = step.persons.as_ref();
-        cell(&mut text, persons.map(|persons| persons.mean));
-        cell(&mut text, persons.map(|persons| persons.max));
-        for directions in step.lines.iter().flat_map(BTreeMap::values) {
-            for crossings in directions.values() {
-                cell(&mut text, *crossings);
-            }
-        }
-        for zone in step.zones.iter().flat_map(BTreeMap::values) {
-            let zone = zone.as_ref();
-            cell(&mut text, zone.map(|zone| zone.entries));
-            cell(&mut text, zone.map(|zone| zone.mean));
-            cell(&mut text, zone.map(|zone| zone.max));
-            cell(&mut text, zone.map(|zone| zone.visits));
-            cell(&mut text, zone.and_then(|zone| zone.dwell_seconds));
-        }
-        text.push_str("\r\n");
-    }
-    text
-}
-
-fn cell(text: &mut String, value: Option<impl std::fmt::Display>) {
-    text.push(',');
-    if let Some(value) = value {
-        let _ = write!(text, "{value}");
     }
 }
 

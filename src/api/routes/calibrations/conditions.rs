@@ -5,11 +5,10 @@ use axum::http::{
     header::{IF_MATCH, IF_NONE_MATCH},
 };
 
+use lookdown_http::entity_tags::{Named, named};
+
 use crate::{
-    api::http::{
-        entity_tags::{Named, named},
-        problem::{Problem, ProblemKind},
-    },
+    api::http::problem::{Problem, ProblemKind},
     calibration_store::WriteCondition,
 };
 

@@ -29,6 +29,8 @@ pub(in crate::api) struct CameraInfo {
     stored: bool,
     /// `true` if no frames are read. A change takes about two seconds.
     paused: bool,
+    /// `true` if the latest image is kept, by the camera or by the setting `results.images`.
+    keep_image: bool,
     /// The user name of a stored camera.
     user: Option<String>,
     /// The interval of a stored camera.
@@ -104,6 +106,7 @@ pub(super) async fn rows(
         row.profile = camera.profile;
     }
     for row in &mut rows {
+        row.keep_image = state.keeps_image(&row.name);
         row.suggestion = suggestion::state_of(state, &row.name);
         let of_counts = || state.options.companions.count_warning(&row.name);
         let of_counts = || (!row.paused).then(of_counts).flatten();

@@ -12,19 +12,14 @@ use axum::{
 };
 use lookdown_common::report::Report;
 use lookdown_detect::parameters::whole_number;
+use lookdown_http::entity_tags::{entity_tag, is_unmodified};
 use tokio::time::timeout_at;
 
 use super::{NO_CACHE, address::CameraAddress, unknown};
 use crate::{
     api::{
         ApiState,
-        http::{
-            caller::Caller,
-            deadline::Deadline,
-            entity_tags::{entity_tag, is_unmodified},
-            problem::Problem,
-            query::parameters_named,
-        },
+        http::{caller::Caller, deadline::Deadline, problem::Problem, query::parameters_named},
         require_scope::RequireRead,
     },
     results::{Cameras, StoredReport},

@@ -10,6 +10,7 @@ use axum::{
 };
 use bytes::Bytes;
 use lookdown_common::text::{Quoted, one_line};
+use lookdown_http::entity_tags::{entity_tag, is_unmodified};
 
 use super::{address::CameraAddress, unknown};
 use crate::{
@@ -19,7 +20,6 @@ use crate::{
         http::{
             caller::Caller,
             deadline::Deadline,
-            entity_tags::{entity_tag, is_unmodified},
             problem::{Problem, ProblemKind},
             query::{pairs, query_parameters},
         },
@@ -109,7 +109,7 @@ fn none_kept(camera: &str) -> Problem {
     let camera = Quoted(camera);
     let detail = format!(
         "there is no image of the camera {camera}: images are stored from the next frame on, for the cameras in \
-         the setting results.images (* for all), for at most results.max_images cameras"
+         the setting results.images (* for all) or with keep_image, for at most results.max_images cameras"
     );
     Problem::new(ProblemKind::ImageNotKept, detail)
 }

@@ -34,6 +34,11 @@ pub(in crate::api) struct CameraRow {
 }
 
 impl CameraRow {
+    /// Returns the values that change with a report or a number, not with time.
+    pub(super) fn state(&self) -> (&str, &str, usize, &'static str) {
+        (&self.camera, &self.id, self.persons, self.persons_source)
+    }
+
     pub(super) fn at(latest: &StoredReport, headline: Headline, now: Timestamp) -> Self {
         let age = now.duration_since(latest.id.time()).as_secs_f64();
         Self {

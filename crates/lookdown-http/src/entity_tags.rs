@@ -2,22 +2,35 @@
 
 use axum::http::{HeaderMap, HeaderName, HeaderValue, header::IF_NONE_MATCH};
 
-use super::problem::{Problem, ProblemKind};
+use crate::problem::{Kind, Problem};
 
 /// The entity tags that a header lists.
-pub(in crate::api) enum Named {
+#[derive(Debug)]
+pub enum Named {
+    /// `*`: any tag.
     Any,
+    /// These tags, without their quotes.
     Tags(Vec<String>),
 }
 
 /// Returns the entity tag of an opaque value.
-pub(in crate::api) fn entity_tag(value: &str) -> HeaderValue {
+#[must_use]
+pub fn entity_tag(value: &str) -> HeaderValue {
     // Revisions and report IDs are digits.
     HeaderValue::from_str(&format!("\"{value}\"")).unwrap_or(HeaderValue::from_static("\"\""))
 }
 
+/// Returns the weak entity tag of an opaque value, for responses that are the same but for times.
+#[must_use]
+pub fn weak_entity_tag(value: &str) -> HeaderValue {
+    HeaderValue::from_str(&format!("W/\"{value}\"")).unwrap_or(HeaderValue::from_static("W/\"\""))
+}
+
 /// Returns `true` if `If-None-Match` lists this value: the client has the current version.
-pub(in crate::api) fn is_unmodified(headers: &HeaderMap, value: &str) -> Result<bool, Problem> {
+///
+/// # Errors
+/// A [`Problem`] for a header that is malformed.
+pub fn is_unmodified(headers: &HeaderMap, value: &str) -> Result<bool, Problem> {
     Ok(match named(headers, &IF_NONE_MATCH, true)? {
         None => false,
         Some(Named::Any) => true,
@@ -26,8 +39,11 @@ pub(in crate::api) fn is_unmodified(headers: &HeaderMap, value: &str) -> Result<
 }
 
 /// Parses the entity tags of a header. Weak tags match nothing unless `weak` allows them. Empty
-/// list elements are ignored (RFC 9110, section 5.6.1.2). A header without any tag is an error.
-pub(in crate::api) fn named(
+/// list elements are ignored (RFC 9110, section 5.6.1.2).
+///
+/// # Errors
+/// A [`Problem`] for a header that is malformed or has no tag.
+pub fn named(
     headers: &HeaderMap,
     header: &HeaderName,
     weak: bool,
@@ -75,7 +91,7 @@ fn no_entity_tag(header: &HeaderName, text: &str) -> Problem {
     let detail = format!(
         "{header}: {text:?} is not an entity tag: repeat the ETag of a response with its quotes, or send *"
     );
-    Problem::new(ProblemKind::MalformedRequest, detail)
+    Problem::new(Kind::MalformedRequest, detail)
 }
 
 #[cfg(test)]
