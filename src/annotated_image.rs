@@ -50,7 +50,7 @@ pub fn annotated_image(
     format: ImageFormat,
     options: &AnnotationOptions,
 ) -> Result<Vec<u8>, AnnotationError> {
-    let sketch = Sketch::of(&detected, &options.layers);
+    let sketch = Sketch::new(&detected, &options.layers);
     let is_cancelled = || detected.withdrawn.is_cancelled();
     drawn(detected.frame, &sketch, format, options, &is_cancelled)
 }

@@ -79,13 +79,13 @@ pub fn openapi_document(counts: Option<OpenApi>) -> serde_json::Result<Document>
         tags.for_each(|tags| tags.retain(|tag| tag.name != "operation"));
         document.merge(counts);
     }
-    Document::of(&openapi::complete(document))
+    Document::from_document(&openapi::complete(document))
 }
 
 /// The routes of the native API and of the Open Inference Protocol.
 fn client_routes() -> OpenApiRouter<ApiState> {
     OpenApiRouter::with_openapi(<openapi::Common as utoipa::OpenApi>::openapi())
-        .merge(routes::of_clients())
+        .merge(routes::client_routes())
         .routes(routes!(open_inference::describe::model))
         .routes(routes!(open_inference::describe::model_ready))
         .routes(routes!(open_inference::infer::infer))
@@ -177,7 +177,7 @@ fn operation(metrics_elsewhere: bool) -> Router<ApiState> {
 
 /// The pages for browsers.
 fn pages() -> Router<ApiState> {
-    let api_page = api_page().route_layer(map_response(page_headers::of_api_page));
+    let api_page = api_page().route_layer(map_response(page_headers::for_api_page));
     web_page::router().merge(api_page)
 }
 
@@ -208,7 +208,7 @@ fn with_common_layers(router: Router<ApiState>, state: ApiState) -> Router {
             &sent,
             &read,
         )))
-        .layer(CatchPanicLayer::custom(envelope::of_panic))
+        .layer(CatchPanicLayer::custom(envelope::panic_response))
         .layer(from_fn_with_state(body_limits, drain_body::discard))
         .layer(from_fn_with_state(
             header_limits,

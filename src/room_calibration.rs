@@ -65,7 +65,7 @@ pub fn calibrate(
             image.height
         );
     }
-    let edges: Vec<_> = frames.iter().map(RoomFrame::of).collect();
+    let edges: Vec<_> = frames.iter().map(RoomFrame::new).collect();
     let fit = fit_room(&edges, known)?;
     let mut native = room_calibration(id, image, &fit, known);
     if let Some(height_m) = height_m {

@@ -123,7 +123,7 @@ impl Suggestions {
     }
 
     /// Returns the findings about a camera, if it is observed.
-    pub(crate) fn of(&self, camera: &str) -> Option<Suggestion> {
+    pub(crate) fn for_camera(&self, camera: &str) -> Option<Suggestion> {
         self.shared.suggestion(&camera.parse().ok()?)
     }
 

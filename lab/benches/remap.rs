@@ -54,9 +54,9 @@ fn print_times() -> Outcome<()> {
         for (how, mount) in [("straight down", Mount::default()), ("10° off", tilted())] {
             let views = plan.views(&mount, 416, 416);
             let lens = lens()?;
-            let tables = RemapTable::of_views(&views, &lens, FRAME_SIDE, FRAME_SIDE);
+            let tables = RemapTable::for_views(&views, &lens, FRAME_SIDE, FRAME_SIDE);
             let time = times(ROUNDS, || {
-                black_box(RemapTable::of_views(&views, &lens, FRAME_SIDE, FRAME_SIDE));
+                black_box(RemapTable::for_views(&views, &lens, FRAME_SIDE, FRAME_SIDE));
             });
             let bytes = RemapTable::bytes(&tables);
             println!("tables of {name}, {how}: {time}, {} KiB", bytes / 1024);
@@ -145,7 +145,7 @@ fn tilted() -> Mount {
 
 fn tables(side: u32) -> Outcome<Vec<RemapTable>> {
     let views = ViewPlan::balanced().views(&Mount::default(), side, side);
-    Ok(RemapTable::of_views(
+    Ok(RemapTable::for_views(
         &views,
         &lens()?,
         FRAME_SIDE,

@@ -29,7 +29,7 @@ pub struct KeyDigest([u8; BYTES]);
 impl KeyDigest {
     /// Computes the digest of a key as it was sent.
     #[must_use]
-    pub fn of(key: &[u8]) -> Self {
+    pub fn new(key: &[u8]) -> Self {
         Self(Sha256::digest(key).into())
     }
 
@@ -86,9 +86,9 @@ mod tests {
 
     #[test]
     fn the_digest_is_sha_256() {
-        assert_eq!(KeyDigest::of(b"abc").hexadecimal(), OF_ABC);
+        assert_eq!(KeyDigest::new(b"abc").hexadecimal(), OF_ABC);
         let parsed = KeyDigest::parse(&OF_ABC.to_uppercase()).unwrap();
-        assert_eq!(parsed, KeyDigest::of(b"abc"));
+        assert_eq!(parsed, KeyDigest::new(b"abc"));
     }
 
     #[test]
@@ -107,7 +107,7 @@ mod tests {
 
     #[test]
     fn digests_that_agree_in_all_but_one_byte_differ() {
-        let whole = KeyDigest::of(b"abc");
+        let whole = KeyDigest::new(b"abc");
         for at in 0..BYTES {
             let mut other = whole.clone();
             other.0[at] ^= 1;
@@ -120,6 +120,6 @@ mod tests {
         let (one, other) = (new_key().unwrap(), new_key().unwrap());
         assert_ne!(one, other);
         assert_eq!(one.len(), PREFIX.len() + 64);
-        assert_eq!(format!("{:?}", KeyDigest::of(b"abc")), "KeyDigest(…)");
+        assert_eq!(format!("{:?}", KeyDigest::new(b"abc")), "KeyDigest(…)");
     }
 }

@@ -92,7 +92,7 @@ impl KeyList {
     /// the number of keys: all are compared in constant time.
     #[must_use]
     pub fn holder_of(&self, key: &[u8]) -> Option<&Holder> {
-        let digest = KeyDigest::of(key);
+        let digest = KeyDigest::new(key);
         let mut found = 0_u64;
         for (position, (known, _)) in (1_u64..).zip(&self.0) {
             let same: Choice = known.equals(&digest);

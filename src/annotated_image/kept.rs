@@ -60,11 +60,11 @@ impl StoredFrame {
     ///
     /// # Errors
     /// [`StoredFrameError`] for a frame that cannot be kept.
-    pub fn of(
+    pub fn new(
         detected: &DetectedFrame,
         concealment: Option<Concealment>,
     ) -> Result<Self, StoredFrameError> {
-        let sketch = Sketch::of(detected, Layer::VARIANTS).rounded();
+        let sketch = Sketch::new(detected, Layer::VARIANTS).rounded();
         if let Some(concealment) = concealment {
             let mut frame = Frame::clone(&detected.frame);
             let marks = sketch.concealed(frame.width());

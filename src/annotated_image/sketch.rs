@@ -22,7 +22,7 @@ pub(super) struct Sketch {
 
 impl Sketch {
     /// Selects what these layers need from a detection.
-    pub(super) fn of(detected: &DetectedFrame, layers: &[Layer]) -> Self {
+    pub(super) fn new(detected: &DetectedFrame, layers: &[Layer]) -> Self {
         let report = &detected.report;
         let views = layers.contains(&Layer::Views);
         let views = views.then(|| detected.view_outlines());

@@ -7,7 +7,7 @@ use super::{AnnotatedBox, AnnotatedImage};
 impl AnnotatedImage {
     /// Returns the persons of a report as annotations of the image with this file name.
     #[must_use]
-    pub fn of(report: &DetectionReport, file_name: String) -> Self {
+    pub fn new(report: &DetectionReport, file_name: String) -> Self {
         let calibration = &report.calibration;
         Self {
             file_name,

@@ -72,7 +72,7 @@ impl<S: RequiredScope> FromRequestParts<ApiState> for RequireScope<S> {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, state: &ApiState) -> Result<Self, Problem> {
-        let context = RequestContext::of(&parts.extensions)?;
+        let context = RequestContext::from_extensions(&parts.extensions)?;
         Self::check(state, &parts.headers, &context.identity)
     }
 }

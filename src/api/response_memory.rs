@@ -26,7 +26,7 @@ const SMALL: u64 = 64 << 10;
 
 /// Makes a large response take a share of the budget, or refuses it with 429.
 pub(super) async fn bound(State(state): State<ApiState>, request: Request, next: Next) -> Response {
-    let context = match RequestContext::of(request.extensions()) {
+    let context = match RequestContext::from_extensions(request.extensions()) {
         Ok(context) => context,
         Err(problem) => return problem.into_response(),
     };

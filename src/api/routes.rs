@@ -16,7 +16,7 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 use super::{ApiState, detect};
 
 /// Returns the routes of clients, with their entries in the OpenAPI document.
-pub(super) fn of_clients() -> OpenApiRouter<ApiState> {
+pub(super) fn client_routes() -> OpenApiRouter<ApiState> {
     OpenApiRouter::new()
         .routes(routes!(detect::route::detect_persons))
         .routes(routes!(calibrations::list))
@@ -46,6 +46,6 @@ pub(super) fn of_clients() -> OpenApiRouter<ApiState> {
         .routes(routes!(results::latest::get_latest))
         .routes(routes!(results::latest_image::get_latest_image))
         .routes(routes!(results::history::get_history))
-        .routes(routes!(results::events::of_camera))
-        .routes(routes!(results::events::of_all))
+        .routes(routes!(results::events::camera_events))
+        .routes(routes!(results::events::all_events))
 }

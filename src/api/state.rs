@@ -265,7 +265,7 @@ impl ApiState {
         BodyReader {
             max_bytes,
             remedy,
-            budget: self.uploads.of(&context.caller.client),
+            budget: self.uploads.for_client(&context.caller.client),
             least_bytes_per_second: self.options.min_upload_bytes_per_second,
             deadline: context.deadline,
         }

@@ -54,7 +54,7 @@ impl App {
                     let scopes = holder.scopes.joined(", ");
                     let _ = write!(report, "\n  {}: {scopes}", holder.name);
                     if holder.scopes.allow(Scope::Detect) {
-                        let highest = Priority::of_level(holder.highest_priority.get());
+                        let highest = Priority::from_level(holder.highest_priority.get());
                         let _ = write!(report, "; priorities {} to 9", highest.highest_level());
                     }
                 }

@@ -91,7 +91,7 @@ fn remote_loader(settings: &Settings, server: Arc<RemoteServer>) -> ModelLoader 
     let sessions = settings.threads.sessions;
     Box::new(move |path| {
         let (first, others) = RemoteDetector::load_sessions(&server, path, options, sessions)?;
-        Ok(Model::of_sessions(first, others))
+        Ok(Model::from_sessions(first, others))
     })
 }
 

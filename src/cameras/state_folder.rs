@@ -73,7 +73,7 @@ impl StateFolder {
             .mode(0o700)
             .create(self.0.join(PASSWORDS))
             .map_err(unwritable)?;
-        Replacement::of_secret(path).fill(unwritable, |file| {
+        Replacement::for_secret(path).fill(unwritable, |file| {
             writeln!(file, "{content}").map_err(unwritable)
         })
     }

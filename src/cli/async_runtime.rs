@@ -44,7 +44,7 @@ fn raise_limit_of_open_files() {
 }
 
 /// Creates a runtime on the current thread.
-pub(super) fn of_this_thread() -> anyhow::Result<Runtime> {
+pub(super) fn for_this_thread() -> anyhow::Result<Runtime> {
     let runtime = Builder::new_current_thread().enable_all().build();
     runtime.context(NO_THREAD)
 }

@@ -51,7 +51,7 @@ pub(super) fn write_script(shell: Shell, script: &mut Vec<u8>) -> io::Result<()>
 }
 
 /// Completes the name of a model in the model repository of the default settings and variables.
-pub(super) fn of_model() -> ArgValueCompleter {
+pub(super) fn model_completer() -> ArgValueCompleter {
     ArgValueCompleter::new(models)
 }
 

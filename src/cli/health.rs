@@ -8,7 +8,7 @@ use std::{
 use anyhow::Context;
 use clap::Args;
 
-use super::{SettingsFile, async_runtime::of_this_thread, output::UNWRITABLE};
+use super::{SettingsFile, async_runtime::for_this_thread, output::UNWRITABLE};
 use crate::probe::{self, Probe};
 
 /// Arguments of `lookdown health`.
@@ -29,7 +29,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     } else {
         Probe::Readiness
     };
-    let runtime = of_this_thread()?;
+    let runtime = for_this_thread()?;
     let url = runtime.block_on(probe::ask(&settings, probe))?;
     writeln!(io::stdout(), "{url} answered yes").context(UNWRITABLE)?;
     Ok(ExitCode::SUCCESS)

@@ -41,7 +41,7 @@ pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
     }) = command;
     let key = new_key().context("the operating system returns no random numbers")?;
     let scopes = Scopes::new(scopes).context("--scope: give one")?;
-    let digest = KeyDigest::of(key.as_bytes()).hexadecimal();
+    let digest = KeyDigest::new(key.as_bytes()).hexadecimal();
     let quoted = scopes.joined("\", \"");
     let in_file = priority.map(|level| format!(", highest_priority = {level}"));
     let in_file = in_file.unwrap_or_default();

@@ -144,7 +144,7 @@ fn flag(spec: &ParameterSpec) -> Arg {
         .help(format!("{summary}{default}"))
         .long_help(format!("{}{default}", spec.help));
     if spec.name == DetectParameters::MODEL {
-        flag = flag.add(complete::of_model());
+        flag = flag.add(complete::model_completer());
     }
     match spec.kind {
         ParameterKind::Choice(names) => flag

@@ -149,7 +149,7 @@ fn own_key(settings: &mut Settings) -> anyhow::Result<Option<Secret>> {
         return Ok(None);
     }
     let key = new_key().context("the operating system gives no random numbers")?;
-    let digest = KeyDigest::of(key.as_bytes()).hexadecimal();
+    let digest = KeyDigest::new(key.as_bytes()).hexadecimal();
     let own: KeyList = format!("{OWN_KEY}:detect+read:{digest}:1").parse()?;
     let keys = std::mem::take(&mut settings.access.keys).with(&own);
     settings.access.keys = keys.context("access.keys")?;

@@ -199,7 +199,7 @@ impl CountsPublisher {
         published: &Retained,
         unknown: &mut RetainedTopics,
     ) -> Option<Message> {
-        let (owner, rest) = Owner::of_topic(self.topics.below_counts(&message.topic)?)?;
+        let (owner, rest) = Owner::from_topic(self.topics.below_counts(&message.topic)?)?;
         // The echo of a message that removes a topic.
         if message.payload.is_empty() {
             return None;
@@ -229,10 +229,10 @@ impl CountsPublisher {
         let mut topics = Vec::new();
         for (path, parts) in unknown.take() {
             let first = format!("{path}/{AVAILABILITY}");
-            let Some((owner, _)) = Owner::of_topic(&first) else {
+            let Some((owner, _)) = Owner::from_topic(&first) else {
                 continue;
             };
-            let numbers = parts.iter().filter_map(|part| Number::of_topic(part));
+            let numbers = parts.iter().filter_map(|part| Number::from_topic(part));
             let numbers = numbers.flat_map(Number::with_companions);
             for number in numbers.chain([Number::Persons]) {
                 topics.push(self.state_topic(owner, number));
@@ -291,7 +291,7 @@ impl CountsPublisher {
             }
             for zone in &camera.zones {
                 let name = level(&zone.zone);
-                let [persons, entries, dwell] = Number::of_zone(&name);
+                let [persons, entries, dwell] = Number::for_zone(&name);
                 let shown = |what: &str| format!("{what} {}", zone.zone);
                 device.state(&shown("Tracked persons in"), persons, zone.persons);
                 device.total(&shown("Entries into"), entries, zone.entries, &json!({}));

@@ -302,7 +302,7 @@ impl Publication {
     /// Returns the headline number after a report: that of the frame if the store does not answer.
     async fn headline(&self, report: &StoredReport) -> usize {
         // A paused camera is unavailable, whatever its number.
-        let headline = Headline::of(&*self.results, report, &OwnCameras::default()).await;
+        let headline = Headline::for_latest(&*self.results, report, &OwnCameras::default()).await;
         let persons = headline.ok().and_then(|headline| headline.persons);
         persons.unwrap_or(report.report.persons)
     }

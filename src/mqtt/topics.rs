@@ -41,22 +41,22 @@ impl Topics {
 
     /// The topic of the number of persons in the latest frame of a camera.
     pub(super) fn frame_persons(&self, camera: &str) -> String {
-        format!("{}/frame_persons", self.of_camera(camera))
+        format!("{}/frame_persons", self.camera(camera))
     }
 
     /// The topic of the number of persons that a camera sees now.
     pub(super) fn persons(&self, camera: &str) -> String {
-        format!("{}/persons", self.of_camera(camera))
+        format!("{}/persons", self.camera(camera))
     }
 
     /// The topic of the number of persons in a zone.
     pub(super) fn zone(&self, camera: &str, zone: &str) -> String {
-        format!("{}/zones/{}", self.of_camera(camera), level(zone))
+        format!("{}/zones/{}", self.camera(camera), level(zone))
     }
 
     /// The topic of a camera's occupancy.
     pub(super) fn occupancy(&self, camera: &str) -> String {
-        format!("{}/occupancy", self.of_camera(camera))
+        format!("{}/occupancy", self.camera(camera))
     }
 
     /// The topic of a zone's occupancy.
@@ -66,22 +66,22 @@ impl Topics {
 
     /// The topic of a camera's availability.
     pub(super) fn availability(&self, camera: &str) -> String {
-        format!("{}/availability", self.of_camera(camera))
+        format!("{}/availability", self.camera(camera))
     }
 
     /// The topic of the attributes of a camera's entities.
     pub(super) fn attributes(&self, camera: &str) -> String {
-        format!("{}/attributes", self.of_camera(camera))
+        format!("{}/attributes", self.camera(camera))
     }
 
     /// The topic of a camera's latest image.
     pub(super) fn image(&self, camera: &str) -> String {
-        format!("{}/image", self.of_camera(camera))
+        format!("{}/image", self.camera(camera))
     }
 
     /// The topic of the state of a camera's switch for detection.
     pub(super) fn detection(&self, camera: &str) -> String {
-        format!("{}/detection", self.of_camera(camera))
+        format!("{}/detection", self.camera(camera))
     }
 
     /// The topic of the commands of a camera's switch for detection.
@@ -133,10 +133,10 @@ impl Topics {
 
     /// The topic of a camera's reports.
     pub(super) fn report(&self, camera: &str) -> String {
-        format!("{}/report", self.of_camera(camera))
+        format!("{}/report", self.camera(camera))
     }
 
-    fn of_camera(&self, camera: &str) -> String {
+    fn camera(&self, camera: &str) -> String {
         format!("{}/cameras/{}", self.prefix, level(camera))
     }
 

@@ -40,7 +40,7 @@ impl Headline {
     ///
     /// # Errors
     /// [`Unreachable`].
-    pub async fn of(
+    pub async fn for_latest(
         store: &dyn ResultStore,
         latest: &StoredReport,
         own: &OwnCameras,
@@ -150,7 +150,7 @@ mod tests {
             (&[5, 5, 8, 5, 14, 5, 3], 5),
         ] {
             let (store, latest) = store_of(numbers);
-            let headline = Headline::of(&store, &latest, &OwnCameras::default())
+            let headline = Headline::for_latest(&store, &latest, &OwnCameras::default())
                 .await
                 .unwrap();
             assert_eq!(headline.persons, Some(expected), "{numbers:?}");
@@ -167,7 +167,7 @@ mod tests {
             let at = Timestamp::now() - jiff::SignedDuration::from_secs(age);
             let number = FollowedNumber { persons, at };
             assert!(store.follow("hall", number).await.unwrap());
-            Headline::of(&store, &latest, &OwnCameras::default())
+            Headline::for_latest(&store, &latest, &OwnCameras::default())
                 .await
                 .unwrap()
         };
@@ -194,7 +194,7 @@ mod tests {
         let own = OwnCameras::default();
         for (is_paused, persons, source) in [(true, None, "paused"), (false, Some(7), "median")] {
             own.set([("hall".to_owned(), is_paused)].into());
-            let headline = Headline::of(&store, &latest, &own).await.unwrap();
+            let headline = Headline::for_latest(&store, &latest, &own).await.unwrap();
             assert_eq!(
                 (headline.persons, headline.source.name()),
                 (persons, source)

@@ -26,7 +26,7 @@ impl ReportId {
 
     /// Returns the ID of this number.
     #[must_use]
-    pub(super) fn of_micros(micros: u64) -> Self {
+    pub(super) fn from_micros(micros: u64) -> Self {
         Self(micros)
     }
 

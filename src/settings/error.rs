@@ -88,7 +88,7 @@ pub enum SettingsError {
 
 impl SettingsError {
     /// The refusal of the value of `key`, which is `shown` where the refusal lets it be repeated.
-    pub(super) fn of(key: &'static str, shown: impl FnOnce() -> String, refusal: Refusal) -> Self {
+    pub(super) fn new(key: &'static str, shown: impl FnOnce() -> String, refusal: Refusal) -> Self {
         match refusal {
             Refusal::Shown(remedy) => Self::value(key, shown(), remedy),
             Refusal::Part(value, remedy) => Self::value(key, value, remedy),

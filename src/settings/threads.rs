@@ -42,7 +42,7 @@ impl ThreadKeys {
     /// The plan for this process.
     pub(super) fn plan(&self, device: Device, is_remote: bool) -> ThreadPlan {
         let cores = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
-        ThreadPlan::of(cores, Computing::of(device, is_remote), self)
+        ThreadPlan::new(cores, Computing::new(device, is_remote), self)
     }
 }
 
@@ -56,7 +56,7 @@ enum Computing {
 }
 
 impl Computing {
-    fn of(device: Device, is_remote: bool) -> Self {
+    fn new(device: Device, is_remote: bool) -> Self {
         if device.is_processor() && !is_remote {
             Self::Here
         } else {
@@ -82,7 +82,7 @@ pub struct ThreadPlan {
 }
 
 impl ThreadPlan {
-    fn of(cores: NonZeroUsize, computing: Computing, keys: &ThreadKeys) -> Self {
+    fn new(cores: NonZeroUsize, computing: Computing, keys: &ThreadKeys) -> Self {
         let share = |count: NonZeroUsize| {
             NonZeroUsize::new(cores.get() / count.get()).unwrap_or(NonZeroUsize::MIN)
         };
@@ -120,8 +120,8 @@ mod tests {
             threads: NonZeroUsize::new(threads),
             ..ThreadKeys::default()
         };
-        let computing = Computing::of(device, is_remote);
-        let plan = ThreadPlan::of(NonZeroUsize::new(8).unwrap(), computing, &keys);
+        let computing = Computing::new(device, is_remote);
+        let plan = ThreadPlan::new(NonZeroUsize::new(8).unwrap(), computing, &keys);
         (plan.sessions.get(), plan.per_session.get())
     }
 
@@ -140,13 +140,13 @@ mod tests {
         assert_eq!(plan(Device::TensorRt(0), false, 1, 2), (1, 2));
         assert_eq!(plan(Device::Cpu, true, 0, 0), (2, 1));
         let eight_cores = NonZeroUsize::new(8).unwrap();
-        let plan = ThreadPlan::of(eight_cores, Computing::Elsewhere, &ThreadKeys::default());
+        let plan = ThreadPlan::new(eight_cores, Computing::Elsewhere, &ThreadKeys::default());
         assert_eq!(plan.batch_views.get(), 8);
     }
 
     #[test]
     fn one_core_is_enough() {
-        let plan = ThreadPlan::of(NonZeroUsize::MIN, Computing::Here, &ThreadKeys::default());
+        let plan = ThreadPlan::new(NonZeroUsize::MIN, Computing::Here, &ThreadKeys::default());
         assert_eq!((plan.sessions.get(), plan.per_session.get()), (1, 1));
         assert_eq!((plan.remapping.get(), plan.frame_workers.get()), (1, 2));
     }

@@ -115,7 +115,7 @@ impl Values {
         };
         (form.read)(written)
             .map(Some)
-            .map_err(|refusal| SettingsError::of(key, || written.shown(), refusal))
+            .map_err(|refusal| SettingsError::new(key, || written.shown(), refusal))
     }
 }
 

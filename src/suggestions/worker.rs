@@ -66,7 +66,7 @@ impl Worker {
         let Ok(decoded) = decode(image, &self.0.limits) else {
             return;
         };
-        let edges = RoomFrame::of(&decoded.frame);
+        let edges = RoomFrame::new(&decoded.frame);
         drop(decoded);
         let mut cameras = self.0.cameras.lock();
         let Some(observed) = cameras.get_mut(camera) else {

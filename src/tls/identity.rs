@@ -37,7 +37,7 @@ impl Identity {
         let validity = certified
             .end_entity_cert()
             .ok()
-            .and_then(|certificate| Validity::of(certificate));
+            .and_then(|certificate| Validity::from_der(certificate));
         let builder = ServerConfig::builder_with_provider(Arc::clone(&provider))
             .with_protocol_versions(&[&TLS13, &TLS12])?;
         let builder = match files.authorities(options)? {

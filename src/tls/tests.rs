@@ -52,13 +52,13 @@ fn has_metric(tls: &Tls, line: &str) {
 #[tokio::test]
 async fn clients_of_both_versions_of_tls_are_served_over_http_1() {
     let authority = Authority::new();
-    let tls = open(&Files::of(&authority.issue()));
+    let tls = open(&Files::new(&authority.issue()));
     let address = echo(&tls).await;
     for (versions, expected) in [
         (&[&TLS12][..], ProtocolVersion::TLSv1_2),
         (&[&TLS13], ProtocolVersion::TLSv1_3),
     ] {
-        let client = Client::of(&authority, None, versions);
+        let client = Client::new(&authority, None, versions);
         let connection = client.talk(address).await.unwrap();
         let session = connection.get_ref().1;
         assert_eq!(session.protocol_version(), Some(expected));
@@ -74,9 +74,9 @@ async fn clients_of_both_versions_of_tls_are_served_over_http_1() {
 
 #[tokio::test]
 async fn a_client_without_the_authority_ends_the_handshake() {
-    let tls = open(&Files::of(&Authority::new().issue()));
+    let tls = open(&Files::new(&Authority::new().issue()));
     let address = echo(&tls).await;
-    let stranger = Client::of(&Authority::new(), None, BOTH);
+    let stranger = Client::new(&Authority::new(), None, BOTH);
     assert!(stranger.talk(address).await.is_err());
 }
 
@@ -84,10 +84,10 @@ async fn a_client_without_the_authority_ends_the_handshake() {
 async fn a_changed_certificate_applies_to_new_connections_only() {
     let authority = Authority::new();
     let (old, new) = (authority.issue(), authority.issue_until(2080));
-    let files = Files::of(&old);
+    let files = Files::new(&old);
     let tls = open(&files);
     let address = echo(&tls).await;
-    let client = Client::of(&authority, None, BOTH);
+    let client = Client::new(&authority, None, BOTH);
     let mut before = client.talk(address).await.unwrap();
     assert_eq!(shown(&before), der(&old));
 
@@ -113,11 +113,11 @@ async fn a_changed_certificate_applies_to_new_connections_only() {
 #[tokio::test]
 async fn a_changed_symbolic_link_changes_the_files() {
     let authority = Authority::new();
-    let (old, new) = (Files::of(&authority.issue()), authority.issue());
-    let newer = Files::of(&new);
+    let (old, new) = (Files::new(&authority.issue()), authority.issue());
+    let newer = Files::new(&new);
     let folder = tempfile::tempdir().unwrap();
     let link = folder.path().join("current");
-    let mut linked = Files::of(&new);
+    let mut linked = Files::new(&new);
     linked.options.certificate = link.join("server.pem");
     linked.options.private_key = link.join("server.key");
     symlink(old.options.certificate.parent().unwrap(), &link).unwrap();
@@ -128,7 +128,7 @@ async fn a_changed_symbolic_link_changes_the_files() {
     symlink(newer.options.certificate.parent().unwrap(), &other).unwrap();
     fs::rename(&other, &link).unwrap();
     tls.refresh();
-    let client = Client::of(&authority, None, BOTH);
+    let client = Client::new(&authority, None, BOTH);
     assert_eq!(shown(&client.talk(address).await.unwrap()), der(&new));
 }
 
@@ -136,10 +136,10 @@ async fn a_changed_symbolic_link_changes_the_files() {
 async fn an_invalid_replacement_is_logged_once_and_not_used() {
     let authority = Authority::new();
     let (pair, other) = (authority.issue(), authority.issue());
-    let files = Files::of(&pair);
+    let files = Files::new(&pair);
     let tls = open(&files);
     let address = echo(&tls).await;
-    let client = Client::of(&authority, None, BOTH);
+    let client = Client::new(&authority, None, BOTH);
 
     fs::write(&files.options.certificate, &other.certificate).unwrap();
     let log = logged_by(|| {
@@ -170,22 +170,22 @@ async fn an_invalid_replacement_is_logged_once_and_not_used() {
 #[tokio::test]
 async fn only_clients_certified_by_the_authorities_are_served() {
     let (authority, of_clients) = (Authority::new(), Authority::new());
-    let mut files = Files::of(&authority.issue());
+    let mut files = Files::new(&authority.issue());
     files.ask_clients(&of_clients.pem());
     let tls = open(&files);
     let address = echo(&tls).await;
     for version in [&[&TLS12][..], &[&TLS13]] {
         let own = of_clients.issue();
-        let client = Client::of(&authority, Some(&own), version);
+        let client = Client::new(&authority, Some(&own), version);
         client.talk(address).await.unwrap();
 
-        let uncertified = Client::of(&authority, None, version);
+        let uncertified = Client::new(&authority, None, version);
         assert!(uncertified.talk(address).await.is_err());
         let strange = authority.issue();
-        let stranger = Client::of(&authority, Some(&strange), version);
+        let stranger = Client::new(&authority, Some(&strange), version);
         assert!(stranger.talk(address).await.is_err());
         let expired = of_clients.issue_until(2001);
-        let late = Client::of(&authority, Some(&expired), version);
+        let late = Client::new(&authority, Some(&expired), version);
         assert!(late.talk(address).await.is_err());
     }
     has_metric(&tls, "lookdown_tls_handshakes_total{result=\"failure\"} 6");
@@ -194,11 +194,11 @@ async fn only_clients_certified_by_the_authorities_are_served() {
 #[tokio::test]
 async fn changed_client_authorities_apply_to_resumed_sessions_too() {
     let (authority, old, new) = (Authority::new(), Authority::new(), Authority::new());
-    let mut files = Files::of(&authority.issue());
+    let mut files = Files::new(&authority.issue());
     let of_clients = files.ask_clients(&old.pem());
     let tls = open(&files);
     let address = echo(&tls).await;
-    let client = Client::of(&authority, Some(&old.issue()), BOTH);
+    let client = Client::new(&authority, Some(&old.issue()), BOTH);
     client.talk(address).await.unwrap();
     client.talk(address).await.unwrap();
 
@@ -209,7 +209,7 @@ async fn changed_client_authorities_apply_to_resumed_sessions_too() {
 
 #[tokio::test]
 async fn plain_http_gets_an_answer_that_names_tls() {
-    let tls = open(&Files::of(&Authority::new().issue()));
+    let tls = open(&Files::new(&Authority::new().issue()));
     let mut connection = TcpStream::connect(echo(&tls).await).await.unwrap();
     let request = format!(
         "POST /detect HTTP/1.1\r\nContent-Length: 9\r\n\r\n{}",
@@ -225,7 +225,7 @@ async fn plain_http_gets_an_answer_that_names_tls() {
 
 #[tokio::test]
 async fn a_silent_client_is_disconnected_after_the_timeout() {
-    let mut files = Files::of(&Authority::new().issue());
+    let mut files = Files::new(&Authority::new().issue());
     files.options.handshake_timeout = Duration::from_millis(20);
     let tls = open(&files);
     let address = echo(&tls).await;
@@ -284,7 +284,7 @@ fn errors_of_files_name_setting_file_and_remedy() {
             "cannot be used: give an RSA key",
         ),
     ] {
-        let files = Files::of(&Pair {
+        let files = Files::new(&Pair {
             certificate: certificate.to_owned(),
             private_key: private_key.to_owned(),
         });
@@ -300,7 +300,7 @@ fn errors_of_files_name_setting_file_and_remedy() {
 #[test]
 fn errors_of_missing_or_large_files_and_authorities_name_them() {
     let pair = Authority::new().issue();
-    let mut files = Files::of(&pair);
+    let mut files = Files::new(&pair);
     for (authorities, expected) in [
         (
             "",
@@ -327,7 +327,7 @@ fn errors_of_missing_or_large_files_and_authorities_name_them() {
 fn certificate_and_private_key_may_be_in_one_file() {
     let mut pair = Authority::new().issue();
     pair.certificate.push_str(&pair.private_key);
-    let mut files = Files::of(&pair);
+    let mut files = Files::new(&pair);
     files.options.private_key = files.options.certificate.clone();
     open(&files);
 }
@@ -335,7 +335,7 @@ fn certificate_and_private_key_may_be_in_one_file() {
 #[test]
 fn only_certificates_with_problems_cause_warnings() {
     let authority = Authority::new();
-    let files = Files::of(&authority.issue());
+    let files = Files::new(&authority.issue());
     let quiet = logged_by(|| drop(open(&files)));
     assert!(!quiet.contains("WARN"), "{quiet}");
 
@@ -349,7 +349,7 @@ fn only_certificates_with_problems_cause_warnings() {
         "{readable}"
     );
 
-    let expired = Files::of(&authority.issue_until(2001));
+    let expired = Files::new(&authority.issue_until(2001));
     let expired = logged_by(|| drop(open(&expired)));
     assert!(expired.contains("has expired at 2001-01-01"), "{expired}");
 }

@@ -12,7 +12,7 @@ pub(super) struct Validity {
 
 impl Validity {
     /// Reads the validity of a DER certificate. Returns `None` if it cannot be parsed.
-    pub(super) fn of(certificate: &[u8]) -> Option<Self> {
+    pub(super) fn from_der(certificate: &[u8]) -> Option<Self> {
         let certificate = Certificate::from_der(certificate).ok()?;
         let validity = certificate.tbs_certificate().validity();
         Some(Self {

@@ -44,7 +44,7 @@ const GUARDED: [(&str, &str, &str); 20] = [
 
 /// A line of a file of keys.
 pub(crate) fn line(name: &str, scopes: &str, key: &str) -> String {
-    let digest = KeyDigest::of(key.as_bytes()).hexadecimal();
+    let digest = KeyDigest::new(key.as_bytes()).hexadecimal();
     format!("{name} = {{ scopes = [{scopes}], sha256 = \"{digest}\" }}\n")
 }
 
@@ -172,7 +172,7 @@ async fn parts_and_digests_of_keys_are_refused() {
     for end in 0..READER.len() {
         assert_eq!(reads_with(&service, &READER[..end]).await, 401, "{end}");
     }
-    let digest = KeyDigest::of(READER.as_bytes()).hexadecimal();
+    let digest = KeyDigest::new(READER.as_bytes()).hexadecimal();
     let longer = format!("{READER}0");
     let upper = READER.to_uppercase();
     for wrong in [digest.as_str(), &longer, &upper] {
@@ -186,7 +186,7 @@ async fn a_replaced_keys_file_revokes_the_old_key() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("keys.toml");
     write_keys(&file);
-    let lasting = format!("lasting:read:{}", KeyDigest::of(b"lasting").hexadecimal());
+    let lasting = format!("lasting:read:{}", KeyDigest::new(b"lasting").hexadecimal());
     let keys = Arc::new(AccessKeys::open(lasting.parse().unwrap(), Some(&file)).unwrap());
     let service = service_with(&keys);
     assert_eq!(reads_with(&service, READER).await, 200);
@@ -241,7 +241,7 @@ async fn an_invalid_keys_file_keeps_the_keys_and_is_logged_once() {
 
 #[test]
 fn debug_output_reveals_no_keys() {
-    let digest = KeyDigest::of(b"secret").hexadecimal();
+    let digest = KeyDigest::new(b"secret").hexadecimal();
     let variable = "LOOKDOWN__ACCESS__KEYS".to_owned();
     let environment = HashMap::from([(variable, format!("gate:detect:{digest}"))]);
     let settings = settings::load(None, environment).unwrap();

@@ -43,7 +43,7 @@ fn guarded(scope: &str) -> Service {
 }
 
 fn guarded_within(scope: &str, bounds: Bounds) -> Service {
-    let digest = KeyDigest::of(KEY.as_bytes()).hexadecimal();
+    let digest = KeyDigest::new(KEY.as_bytes()).hexadecimal();
     let keys = format!("home:{scope}:{digest}").parse().unwrap();
     Service::within(&Bounds {
         access: Access::Keys(Arc::new(AccessKeys::open(keys, None).unwrap())),

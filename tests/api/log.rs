@@ -57,7 +57,7 @@ impl Log {
     }
 
     /// Returns the lines of a request; those of others must be JSON, too.
-    fn of(self, request_id: &str) -> Vec<Value> {
+    fn for_request(self, request_id: &str) -> Vec<Value> {
         let text = self.text();
         let lines = text.lines().map(|line| serde_json::from_str(line).unwrap());
         lines
@@ -91,7 +91,7 @@ async fn a_panic_on_another_thread_is_logged_with_the_request_id() {
     let path = "/detect?calibration=lobby&profile=fast";
     let answer = service.send(request("POST", path, "panics", frame())).await;
     assert_eq!(answer.status, 500);
-    let lines = log.of("panics");
+    let lines = log.for_request("panics");
     assert_eq!(levels(&lines), ["ERROR", "ERROR", "INFO"], "{lines:#?}");
     for line in &lines {
         assert_eq!(line["span"]["trace_id"], TRACE, "{line}");
@@ -113,7 +113,7 @@ async fn an_invalid_image_is_no_error_in_the_log() {
     let body = b"words of the client".to_vec();
     let answer = service.send(request("POST", path, "no-image", body)).await;
     assert_eq!(answer.status, 415);
-    let lines = log.of("no-image");
+    let lines = log.for_request("no-image");
     assert_eq!(levels(&lines), ["DEBUG"], "{lines:#?}");
     assert!(!log.text().contains("words of the client"));
 }
@@ -130,7 +130,7 @@ async fn log_lines_of_a_calibration_change_have_the_request_id() {
     let put = request("PUT", "/calibrations/yard", "puts", calibration.into());
     let answer = service.send(put).await;
     assert_eq!(answer.status, 201, "{}", answer.text());
-    let lines = log.of("puts");
+    let lines = log.for_request("puts");
     assert_eq!(levels(&lines), ["INFO", "DEBUG"], "{lines:#?}");
     assert_eq!(lines[0]["calibration"], "yard");
     assert_eq!(lines[1]["message"], "answered");
@@ -142,7 +142,7 @@ async fn a_request_of_no_trace_has_no_trace_id() {
     let service = Service::start();
     let request = Request::get("/livez").header("x-request-id", "no-trace");
     service.send(request.body(Body::empty()).unwrap()).await;
-    let lines = log.of("no-trace");
+    let lines = log.for_request("no-trace");
     assert_eq!(levels(&lines), ["DEBUG"], "{lines:#?}");
     assert_eq!(lines[0]["span"].get("trace_id"), None);
     assert_eq!(lines[0]["status"], 200);
@@ -163,7 +163,7 @@ async fn each_occurrence_has_its_own_instance_that_is_logged() {
         instances.push(instance.strip_prefix("urn:uuid:").unwrap().to_owned());
     }
     assert_ne!(instances[0], instances[1]);
-    let lines = log.of("the-same");
+    let lines = log.for_request("the-same");
     let logged: Vec<_> = lines.iter().map(|line| &line["instance"]).collect();
     let expected: Vec<_> = instances.into_iter().map(Value::from).collect();
     assert_eq!(logged, expected.iter().collect::<Vec<_>>());

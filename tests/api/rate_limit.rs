@@ -102,7 +102,7 @@ async fn health_checks_metrics_and_pages_are_not_counted() {
 
 #[tokio::test]
 async fn each_key_has_its_own_rate_and_invalid_keys_share_the_address() {
-    let digest = |key: &str| KeyDigest::of(key.as_bytes()).hexadecimal();
+    let digest = |key: &str| KeyDigest::new(key.as_bytes()).hexadecimal();
     let [gate, office] = [digest("gate-key"), digest("office-key")];
     let keys = format!("gate:read:{gate},office:read:{office}").parse();
     let keys = AccessKeys::open(keys.unwrap(), None).unwrap();

@@ -119,7 +119,7 @@ fn curves_and_average_precisions_match_known_answers() {
         ("coco_matching_Ot0.75", MatchingRule::Coco, 0.75),
     ] {
         let known = &fixture.results[name];
-        let curve = PrecisionRecallCurve::of_images(&images, rule, min_iou).unwrap();
+        let curve = PrecisionRecallCurve::from_images(&images, rule, min_iou).unwrap();
         assert_eq!(curve.points().len(), known.order.len());
         for (rank, point) in curve.points().iter().enumerate() {
             let score = fixture.detections[known.order[rank]].score;
@@ -139,7 +139,7 @@ fn the_summary_agrees_with_pycocotools() {
     let fixture: Fixture =
         serde_json::from_str(include_str!("../fixtures/pipeline_ap.json")).unwrap();
     let images = images(&fixture.gt, &BTreeMap::new(), &fixture.detections);
-    let summary = Summary::of_images(&images, MatchingRule::Coco).unwrap();
+    let summary = Summary::from_images(&images, MatchingRule::Coco).unwrap();
     assert_eq!((summary.images, summary.persons), (8, fixture.n_gt));
     assert_agrees(&summary, &fixture.pycocotools_check);
 }
@@ -155,7 +155,7 @@ fn ignore_regions_and_equal_scores_count_as_in_pycocotools() {
         &fixture.ignore_regions,
         &fixture.detections,
     );
-    let summary = Summary::of_images(&images, MatchingRule::Coco).unwrap();
+    let summary = Summary::from_images(&images, MatchingRule::Coco).unwrap();
     assert_agrees(&summary, &fixture.pycocotools);
 }
 
@@ -168,5 +168,5 @@ fn assert_agrees(summary: &Summary, known: &CocoAnswer) {
 #[test]
 fn a_data_set_without_persons_has_no_summary() {
     let empty = images(&BTreeMap::from([(0, Vec::new())]), &BTreeMap::new(), &[]);
-    assert!(Summary::of_images(&empty, MatchingRule::Voc).is_err());
+    assert!(Summary::from_images(&empty, MatchingRule::Voc).is_err());
 }

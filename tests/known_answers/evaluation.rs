@@ -132,7 +132,7 @@ fn average_precision_of_rotated_boxes_agrees_with_pycocotools() {
         }
     });
     let images: Vec<_> = images.collect();
-    let summary = Summary::of_images(&images, MatchingRule::Coco).unwrap();
+    let summary = Summary::from_images(&images, MatchingRule::Coco).unwrap();
     let known = &fixture.pycocotools;
     let ap = |ap: lookdown_eval::AveragePrecision| ap.coco_101_point;
     assert_within(TOLERANCE, ap(summary.ap50), known.ap50, "AP50");

@@ -220,7 +220,7 @@ fn frame_polygon(
     if polygon.extent().max() < LEAST_PX {
         return Err(FormatError::invalid(field, too_small(&polygon, image)));
     }
-    if polygon.meets(&Polygon::of_frame(width, height)) {
+    if polygon.meets(&Polygon::for_frame(width, height)) {
         return Ok(polygon);
     }
     let problem = format!(

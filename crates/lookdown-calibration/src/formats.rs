@@ -107,7 +107,7 @@ fn read_document(text: &str, syntax: Syntax) -> Result<CalibrationFile, FormatEr
         Document::Tree(tree) => tree,
     };
     let explained = |error| foreign::text(text, Some(&tree), error);
-    let fields = Fields::of(&tree).map_err(explained)?;
+    let fields = Fields::new(&tree).map_err(explained)?;
     let format = recognize_tree(&fields).ok_or_else(|| explained(unrecognized()))?;
     if format == Format::Native {
         return native_file::read(&fields, text, syntax);

@@ -28,7 +28,7 @@ impl Replacement {
     /// The replacement of the file at `path`, which may be missing. Several writers may replace the
     /// same file: their names are random, as containers on one volume have the same process IDs.
     #[must_use]
-    pub fn of(path: &Path) -> Self {
+    pub fn new(path: &Path) -> Self {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         // Each state has keys of its own, random at first.
         let random = RandomState::new().hash_one(&name);
@@ -42,7 +42,7 @@ impl Replacement {
     /// The replacement of a file with secrets, which only this user can read, for one writer at a
     /// time: what a killed writer left is overwritten by the next one.
     #[must_use]
-    pub fn of_secret(path: &Path) -> Self {
+    pub fn for_secret(path: &Path) -> Self {
         Self {
             path: path.to_owned(),
             unfinished: path.with_extension("part"),
@@ -96,7 +96,7 @@ impl Replacement {
 /// The failure of the file system. The file then has its old content, or the new one if only the
 /// folder could not be synced.
 pub fn replace_file(path: &Path, content: &[u8]) -> io::Result<()> {
-    Replacement::of(path).fill(identity, |file| file.write_all(content))
+    Replacement::new(path).fill(identity, |file| file.write_all(content))
 }
 
 /// Syncs a folder: a rename or removal lasts only once the folder itself is on the disk. The empty
@@ -145,7 +145,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("file");
         fs::write(&path, "old").unwrap();
-        let written = Replacement::of(&path).fill(identity, |file| {
+        let written = Replacement::new(&path).fill(identity, |file| {
             file.write_all(b"ne")?;
             assert_eq!(fs::read_to_string(&path)?, "old");
             let unfinished = names(folder.path()).remove(0);
@@ -162,7 +162,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("file");
         fs::write(&path, "old").unwrap();
-        for replacement in [Replacement::of(&path), Replacement::of_secret(&path)] {
+        for replacement in [Replacement::new(&path), Replacement::for_secret(&path)] {
             let failed = replacement.fill(
                 |error| error.to_string(),
                 |file| {
@@ -186,7 +186,7 @@ mod tests {
         let path = folder.path().join("password");
         fs::write(&path, "old").unwrap();
         let written =
-            Replacement::of_secret(&path).fill(identity, |file| file.write_all(b"secret"));
+            Replacement::for_secret(&path).fill(identity, |file| file.write_all(b"secret"));
         written.unwrap();
         let mode = fs::metadata(&path).unwrap().permissions().mode();
         assert_eq!(mode & 0o777, 0o600);
@@ -194,7 +194,7 @@ mod tests {
 
     #[test]
     fn two_replacements_of_a_file_have_different_names() {
-        let [one, other] = [0, 1].map(|_| Replacement::of(Path::new("file")));
+        let [one, other] = [0, 1].map(|_| Replacement::new(Path::new("file")));
         assert_ne!(one, other);
     }
 }

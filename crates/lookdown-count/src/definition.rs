@@ -147,7 +147,7 @@ impl CameraDefinition {
     /// not see it.
     pub(crate) fn pixel_of(&self, floor_m: [f64; 2]) -> Option<[f64; 2]> {
         let geometry = self.geometry.as_ref()?;
-        let [x_m, y_m] = self.pose.of_site(floor_m);
+        let [x_m, y_m] = self.pose.from_site(floor_m);
         let pixel = pixel_of(FloorPosition { x_m, y_m }, &geometry.lens, &geometry.mount)?;
         Some([pixel.x, pixel.y])
     }

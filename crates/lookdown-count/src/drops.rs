@@ -125,12 +125,14 @@ impl Drops {
 
     /// Returns the reason why the reports of a camera are not counted now, as a sentence.
     pub(crate) fn reason(&self, camera: &str) -> Option<String> {
-        let drops = self.of(camera).filter(|drops| drops.since_ms.is_some())?;
+        let drops = self
+            .for_camera(camera)
+            .filter(|drops| drops.since_ms.is_some())?;
         Some(format!("its reports are not counted: {}", drops.reason))
     }
 
     /// Returns the dropped reports of a camera.
-    pub(crate) fn of(&self, camera: &str) -> Option<&CameraDrops> {
+    pub(crate) fn for_camera(&self, camera: &str) -> Option<&CameraDrops> {
         self.cameras.get(camera)
     }
 }

@@ -169,7 +169,7 @@ impl Follower {
                     let camera = &report.camera;
                     let messages = self
                         .conditions
-                        .of_report(id, camera, at_ms, now, &crossings, scene);
+                        .for_report(id, camera, at_ms, now, &crossings, scene);
                     self.messages.extend(messages);
                 }
             }
@@ -181,7 +181,7 @@ impl Follower {
     /// Evaluates what follows from the time alone, and stores what is due.
     async fn tick(&mut self) {
         let now_ms = Timestamp::now().as_millisecond();
-        self.messages.extend(self.conditions.of_time(now_ms));
+        self.messages.extend(self.conditions.for_time(now_ms));
         let snapshot = self.counter.lock().snapshot(now_ms);
         self.snapshots.send_if_modified(|last| {
             let is_changed = *last != snapshot;

@@ -46,16 +46,16 @@ pub(crate) fn router(api: Api) -> Router {
 fn routes() -> OpenApiRouter<Shared> {
     OpenApiRouter::new()
         .routes(routes!(cameras))
-        .routes(routes!(counts::of_camera, removal::delete))
-        .routes(routes!(tracks::of_camera))
+        .routes(routes!(counts::camera_counts, removal::delete))
+        .routes(routes!(tracks::camera_tracks))
         .routes(routes!(furniture::list))
         .routes(routes!(furniture::confirm, furniture::take_back))
         .routes(routes!(heat_map::json_of_camera))
         .routes(routes!(heat_map::png_of_camera))
         .routes(routes!(frame_heat_map::png))
         .routes(routes!(suggested_area::get))
-        .routes(routes!(counts::of_site))
-        .routes(routes!(tracks::of_site))
+        .routes(routes!(counts::site_counts))
+        .routes(routes!(tracks::site_tracks))
         .routes(routes!(heat_map::json_of_site))
         .routes(routes!(heat_map::png_of_site))
 }
@@ -113,7 +113,7 @@ struct Dropping {
 impl CountedCamera {
     /// Returns the row of a camera without a counted report.
     fn new(name: &str, counter: &Counter) -> Self {
-        let drops = counter.drops().of(name);
+        let drops = counter.drops().for_camera(name);
         let since_ms = drops.and_then(|drops| drops.since_ms);
         let dropping = drops.zip(since_ms).map(|(drops, since_ms)| Dropping {
             since: time_of(since_ms),

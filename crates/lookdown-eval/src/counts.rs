@@ -59,7 +59,7 @@ pub struct CalibrationError {
 impl Counts {
     /// Matches the detections of `images` by `rule` at `O_t` = 0.5.
     #[must_use]
-    pub fn of_images<B: Region>(images: &[EvaluatedImage<B>], rule: MatchingRule) -> Self {
+    pub fn from_images<B: Region>(images: &[EvaluatedImage<B>], rule: MatchingRule) -> Self {
         let counted = images.iter().map(|image| {
             let outcomes = rule.outcomes(&image.detections, &image.truth, MIN_IOU);
             let judged = image.detections.iter().zip(outcomes);

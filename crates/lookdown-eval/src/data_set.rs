@@ -47,7 +47,7 @@ impl DataSet {
             return coco::read_own_folder(path, &annotations);
         }
         let files = Files::below(path)?;
-        let json = files.of_coco_layout(path);
+        let json = files.in_coco_layout(path);
         if !json.is_empty() {
             return coco::read_files(&json, &files.image_files());
         }

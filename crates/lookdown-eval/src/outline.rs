@@ -43,7 +43,9 @@ impl Scoring {
     ) -> Outline {
         let rotated = match (self, oriented_box) {
             (Self::AxisParallel | Self::HeadPoint, _) => None,
-            (Self::Rotated, Some(oriented_box)) => RotatedBox::of_oriented_box(oriented_box, frame),
+            (Self::Rotated, Some(oriented_box)) => {
+                RotatedBox::from_oriented_box(oriented_box, frame)
+            }
             (Self::Rotated, None) => {
                 let [cx, cy] = bbox.center();
                 RotatedBox::new([cx, cy, bbox.width(), bbox.height()], 0.0, frame)

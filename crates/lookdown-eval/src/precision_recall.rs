@@ -28,7 +28,7 @@ impl PrecisionRecallCurve {
     /// Returns the curve at `O_t` = `min_iou`. `None` if no person counts, as recall is undefined
     /// then.
     #[must_use]
-    pub fn of_images<B: Region>(
+    pub fn from_images<B: Region>(
         images: &[EvaluatedImage<B>],
         rule: MatchingRule,
         min_iou: f64,
@@ -39,11 +39,11 @@ impl PrecisionRecallCurve {
             let scores = image.detections.iter().map(|detection| detection.score);
             scores.zip(outcomes)
         });
-        Self::of_outcomes(outcomes, persons)
+        Self::from_outcomes(outcomes, persons)
     }
 
     /// Returns the curve of scores and outcomes, image by image. `None` if no person counts.
-    pub(super) fn of_outcomes(
+    pub(super) fn from_outcomes(
         outcomes: impl Iterator<Item = (f64, Outcome)>,
         persons: usize,
     ) -> Option<Self> {
@@ -52,11 +52,11 @@ impl PrecisionRecallCurve {
             .filter(|(_, outcome)| *outcome != Outcome::Ignored)
             .map(|(score, outcome)| (score, outcome == Outcome::TruePositive))
             .collect();
-        Some(Self::of_detections(counted, persons))
+        Some(Self::from_detections(counted, persons))
     }
 
     /// Returns the curve of `(score, is right)` pairs.
-    fn of_detections(mut detections: Vec<(f64, bool)>, persons: NonZeroUsize) -> Self {
+    fn from_detections(mut detections: Vec<(f64, bool)>, persons: NonZeroUsize) -> Self {
         detections.sort_by(|a, b| b.0.total_cmp(&a.0));
         let persons = count(persons.get());
         let (mut right, mut all) = (0.0, 0.0);

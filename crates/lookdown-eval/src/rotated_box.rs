@@ -56,7 +56,7 @@ impl RotatedBox {
     /// Creates the oriented box of a detection, in a frame of `[width, height]` pixels. Returns
     /// `None` as [`RotatedBox::new`] does.
     #[must_use]
-    pub fn of_oriented_box(oriented_box: &OrientedBox, frame: [u32; 2]) -> Option<Self> {
+    pub fn from_oriented_box(oriented_box: &OrientedBox, frame: [u32; 2]) -> Option<Self> {
         let OrientedBox {
             center,
             width,

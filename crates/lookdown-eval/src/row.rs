@@ -101,9 +101,9 @@ impl DetectedRow {
     /// [`NoPersons`] if no person counts.
     pub fn evaluate(&self, data_set: &DataSet) -> Result<EvaluatedRow, NoPersons> {
         let images = self.evaluated_images(data_set);
-        let curve = |min_iou| PrecisionRecallCurve::of_images(&images, RULE, min_iou);
+        let curve = |min_iou| PrecisionRecallCurve::from_images(&images, RULE, min_iou);
         Ok(EvaluatedRow {
-            summary: Summary::of_images(&images, RULE)?,
+            summary: Summary::from_images(&images, RULE)?,
             curve_at_50: curve(0.5).ok_or(NoPersons)?,
             curve_at_75: curve(0.75).ok_or(NoPersons)?,
         })
@@ -112,7 +112,7 @@ impl DetectedRow {
     /// Counts the persons of each image. The data set may have no persons.
     #[must_use]
     pub fn counts(&self, data_set: &DataSet) -> Counts {
-        Counts::of_images(&self.evaluated_images(data_set), RULE)
+        Counts::from_images(&self.evaluated_images(data_set), RULE)
     }
 
     /// Scores the row against the persons of each stratum of its data set.

@@ -207,7 +207,7 @@ impl Range {
                 outcomes.push((detection.score, outcome));
             }
         }
-        let curve = PrecisionRecallCurve::of_outcomes(outcomes.into_iter(), persons);
+        let curve = PrecisionRecallCurve::from_outcomes(outcomes.into_iter(), persons);
         Stratum {
             name: self.name,
             persons,

@@ -37,12 +37,12 @@ impl Summary {
     ///
     /// # Errors
     /// [`NoPersons`] if no person counts.
-    pub fn of_images<B: Region>(
+    pub fn from_images<B: Region>(
         images: &[EvaluatedImage<B>],
         rule: MatchingRule,
     ) -> Result<Self, NoPersons> {
         let curve_at = |percent: u8| {
-            PrecisionRecallCurve::of_images(images, rule, f64::from(percent) / 100.0)
+            PrecisionRecallCurve::from_images(images, rule, f64::from(percent) / 100.0)
                 .ok_or(NoPersons)
         };
         let average_at = |percent| Ok(curve_at(percent)?.average_precision());

@@ -42,13 +42,13 @@ const ALWAYS: [(HeaderName, HeaderValue); 5] = [
 
 /// Adds the policy of the web page.
 #[expect(clippy::unused_async, reason = "layers of axum are async")]
-pub async fn of_web_page(response: Response) -> Response {
+pub async fn for_web_page(response: Response) -> Response {
     with_policy(response, WEB_PAGE_POLICY)
 }
 
 /// Adds the policy of the API page.
 #[expect(clippy::unused_async, reason = "layers of axum are async")]
-pub async fn of_api_page(response: Response) -> Response {
+pub async fn for_api_page(response: Response) -> Response {
     with_policy(response, API_PAGE_POLICY)
 }
 

@@ -147,7 +147,7 @@ impl Problem {
 
     /// Creates the problem of a parameter: the detail is `parameter: fault`.
     #[must_use]
-    pub fn of_parameter(parameter: &str, fault: &str) -> Self {
+    pub fn for_parameter(parameter: &str, fault: &str) -> Self {
         Self {
             parameter: Some(parameter.to_owned()),
             ..Self::new(Kind::InvalidParameter, format!("{parameter}: {fault}"))
@@ -222,7 +222,7 @@ impl IntoResponse for Problem {
 
 /// The layer around every route of a companion: request ID, problem document, security headers.
 pub async fn write(mut request: Request, next: Next) -> Response {
-    let request_id = RequestId::of(request.headers());
+    let request_id = RequestId::from_headers(request.headers());
     let method = request.method().clone();
     let path = request.uri().path().to_owned();
     request.extensions_mut().insert(request_id.clone());

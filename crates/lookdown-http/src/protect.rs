@@ -108,14 +108,14 @@ fn surrounded(router: Router, limits: &ConnectionLimits) -> Router {
     };
     let layers = ServiceBuilder::new()
         .layer(from_fn(problem::write))
-        .layer(CatchPanicLayer::custom(of_panic))
+        .layer(CatchPanicLayer::custom(panic_response))
         .layer(from_fn_with_state(limits, header_limits::within_bounds))
         .layer(from_fn(host::require));
     router.layer(layers)
 }
 
 /// Returns the response to a request whose handler panicked. The panic hook logs the cause.
-fn of_panic(_: Box<dyn Any + Send>) -> Response {
+fn panic_response(_: Box<dyn Any + Send>) -> Response {
     Problem::internal().into_response()
 }
 

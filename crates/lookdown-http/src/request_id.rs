@@ -14,7 +14,7 @@ pub struct RequestId(String);
 impl RequestId {
     /// Returns the ID of the request with these headers.
     #[must_use]
-    pub fn of(headers: &HeaderMap) -> Self {
+    pub fn from_headers(headers: &HeaderMap) -> Self {
         let given = headers.get(HEADER).and_then(|value| value.to_str().ok());
         match given {
             Some(id) if is_sane(id) => Self(id.to_owned()),
@@ -47,7 +47,7 @@ mod tests {
     fn id_for(given: &'static str) -> RequestId {
         let mut headers = HeaderMap::new();
         headers.insert(HEADER, HeaderValue::from_static(given));
-        RequestId::of(&headers)
+        RequestId::from_headers(&headers)
     }
 
     #[test]
@@ -63,6 +63,9 @@ mod tests {
     #[test]
     fn a_request_without_an_id_gets_a_new_one() {
         let none = HeaderMap::new();
-        assert_ne!(RequestId::of(&none), RequestId::of(&none));
+        assert_ne!(
+            RequestId::from_headers(&none),
+            RequestId::from_headers(&none)
+        );
     }
 }

@@ -41,7 +41,7 @@ fn curves_of_raster(frame: &Frame, circle: &LensCircle, divisor: u32) -> Vec<Edg
     }
     let luminance = Plane::luminance(frame, divisor);
     let surround = surround::mask(frame, divisor);
-    let gradient = Gradient::of(&luminance);
+    let gradient = Gradient::new(&luminance);
     let scale = f64::from(divisor);
     // The center of the first pixel of the smaller plane.
     let origin = (scale - 1.0) / 2.0;

@@ -23,7 +23,7 @@ pub struct FrameSignature {
 impl FrameSignature {
     /// Computes the signature of a frame.
     #[must_use]
-    pub fn of(frame: &Frame) -> Self {
+    pub fn new(frame: &Frame) -> Self {
         let longer = frame.width().max(frame.height());
         let cell = longer.div_ceil(MOST_CELLS).max(MIN_CELL);
         let across = frame.width().div_ceil(cell) as usize;
@@ -103,7 +103,7 @@ mod tests {
                 pixels.extend([if is_within { other } else { level }; 3]);
             }
         }
-        FrameSignature::of(&Frame::new(width, height, pixels).unwrap())
+        FrameSignature::new(&Frame::new(width, height, pixels).unwrap())
     }
 
     #[test]

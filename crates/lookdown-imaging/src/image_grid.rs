@@ -35,7 +35,7 @@ impl ImageGrid {
     /// # Errors
     /// [`FrameError`] when the size of the grid overflows.
     pub fn drawn(&self) -> Result<Frame, FrameError> {
-        let layout = Layout::of(self);
+        let layout = Layout::from_grid(self);
         let (width, height) = layout.size(self.columns.len(), self.rows.len());
         let bytes = width as usize * height as usize * 3;
         let mut sheet = Frame::new(width, height, vec![PAPER; bytes])?;
@@ -74,7 +74,7 @@ struct Layout {
 }
 
 impl Layout {
-    fn of(grid: &ImageGrid) -> Self {
+    fn from_grid(grid: &ImageGrid) -> Self {
         let cells = || grid.rows.iter().flat_map(|(_, cells)| cells);
         let widths = cells().map(|cell| cell.image.width());
         let heights = cells().map(|cell| cell.image.height());

@@ -56,7 +56,7 @@ pub fn find_lens_circle(frame: &Frame) -> Option<LensCircle> {
 }
 
 fn find_at_contrast(frame: &Frame, min_contrast: f64) -> Option<LensCircle> {
-    let surround = Surround::of(frame, min_contrast)?;
+    let surround = Surround::new(frame, min_contrast)?;
     let mut circle = consensus::circle(&outline::points(frame, &surround))?;
     let mut edge = Vec::new();
     for reach in REACHES {
@@ -75,7 +75,7 @@ pub fn surround_threshold(frame: &Frame) -> Option<f64> {
     if short_side(frame) < MIN_SIDE {
         return None;
     }
-    let surround = Surround::of(frame, MIN_CONTRASTS[1])?;
+    let surround = Surround::new(frame, MIN_CONTRASTS[1])?;
     Some(surround.threshold)
 }
 

@@ -66,7 +66,7 @@ impl RemapTable {
     /// The tables of `views` into frames of `frame_width` × `frame_height` pixels (both at least 2)
     /// taken through `lens`, one per view. Tables with a common grid share its memory.
     #[must_use]
-    pub fn of_views(
+    pub fn for_views(
         views: &[VirtualView],
         lens: &Lens,
         frame_width: u32,
@@ -93,7 +93,7 @@ impl RemapTable {
         let table = |(grid, turn): (usize, f64)| {
             let frame_from_plane = FrameFromPlane::new(lens.image_plane(), turn);
             let grid = Arc::clone(&grids[grid]);
-            Self::of_grid(grid, frame_from_plane, frame_width, frame_height)
+            Self::from_grid(grid, frame_from_plane, frame_width, frame_height)
         };
         shared.into_iter().map(table).collect()
     }
@@ -101,12 +101,12 @@ impl RemapTable {
     /// The table of a crop of frames of `frame_width` × `frame_height` pixels. Positions are exact
     /// between nodes as well; what lies beyond the lens image is shown as the frame has it.
     #[must_use]
-    pub fn of_crop(crop: &FrameCrop, frame_width: u32, frame_height: u32) -> Self {
-        let grid = Arc::new(NodeGrid::of_crop(crop));
-        Self::of_grid(grid, FrameFromPlane::identity(), frame_width, frame_height)
+    pub fn for_crop(crop: &FrameCrop, frame_width: u32, frame_height: u32) -> Self {
+        let grid = Arc::new(NodeGrid::for_crop(crop));
+        Self::from_grid(grid, FrameFromPlane::identity(), frame_width, frame_height)
     }
 
-    fn of_grid(
+    fn from_grid(
         grid: Arc<NodeGrid>,
         frame_from_plane: FrameFromPlane,
         frame_width: u32,

@@ -37,7 +37,7 @@ pub struct RoomFrame {
 impl RoomFrame {
     /// Finds the lens circle and the edges of a frame.
     #[must_use]
-    pub fn of(frame: &Frame) -> Self {
+    pub fn new(frame: &Frame) -> Self {
         let (width, height) = (frame.width(), frame.height());
         let circle = find_lens_circle(frame);
         let used = circle.unwrap_or_else(|| assumed_circle(width, height));
@@ -113,7 +113,7 @@ pub fn fit_room(frames: &[RoomFrame], known: KnownCamera) -> Result<RoomFit, Fit
     let guesses: Vec<_> = detected.into_iter().chain([centered]).collect();
     let fit = |raster| {
         let curves = frames.iter().map(|frame| frame.within(&circle, raster));
-        RoomFit::of(&curves.collect::<Vec<_>>(), &guesses, known)
+        RoomFit::new(&curves.collect::<Vec<_>>(), &guesses, known)
     };
     let mut best = fit(0);
     for raster in 1..RASTERS {
@@ -178,7 +178,7 @@ mod tests {
                 [..3 * width as usize * height as usize]
                 .to_vec();
             let frame = Frame::new(width, height, pixels).unwrap();
-            let fit = fit_room(&[RoomFrame::of(&frame)], KnownCamera::default());
+            let fit = fit_room(&[RoomFrame::new(&frame)], KnownCamera::default());
             assert!(fit.is_err(), "{width}×{height}: {fit:?}");
         }
     }

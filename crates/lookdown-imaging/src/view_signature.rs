@@ -23,7 +23,7 @@ pub struct ViewSignature {
 impl ViewSignature {
     /// Computes the signature of a view rendered for `input`, from its slot `[3, height, width]`.
     #[must_use]
-    pub fn of(slot: &[f32], input: &NetworkInput) -> Self {
+    pub fn new(slot: &[f32], input: &NetworkInput) -> Self {
         let (width, height) = (input.width as usize, input.height as usize);
         let (across, down) = (width.div_ceil(CELL), height.div_ceil(CELL));
         let mut levels = Vec::with_capacity(CHANNELS * across * down);
@@ -110,7 +110,7 @@ mod tests {
             let here = within(x, square[0]) && within(y, square[1]);
             *value = if here { other } else { level } * input.scale[plane] + input.offset[plane];
         }
-        ViewSignature::of(&slot, &input)
+        ViewSignature::new(&slot, &input)
     }
 
     #[test]

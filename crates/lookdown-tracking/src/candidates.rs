@@ -33,7 +33,7 @@ pub(super) fn candidates<'a>(
     let noise = &settings.noise;
     let measure = |person| match pose.height_m {
         Some(height_m) if on_floor => Measurement::on_floor(person, pose, height_m, noise),
-        _ => Measurement::of_bearing(person, noise),
+        _ => Measurement::from_bearing(person, noise),
     };
     let mut candidates: Vec<_> = persons
         .iter()

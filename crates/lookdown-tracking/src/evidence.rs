@@ -195,7 +195,7 @@ mod tests {
     }
 
     /// The evidence of 100 reports of a thing that stands still, and of one that walks.
-    fn of_score(score: f64) -> [Evidence; 2] {
+    fn from_score(score: f64) -> [Evidence; 2] {
         let settings = EvidenceSettings::default();
         [false, true].map(|walks| {
             let mut evidence = Evidence::first(score, &settings);
@@ -212,9 +212,9 @@ mod tests {
     #[test]
     fn low_scores_confirm_what_walks_and_not_what_stands() {
         let settings = EvidenceSettings::default();
-        let [standing, walking] = of_score(0.35);
+        let [standing, walking] = from_score(0.35);
         assert!(!standing.confirms(&settings) && walking.confirms(&settings));
-        let [standing, _] = of_score(0.6);
+        let [standing, _] = from_score(0.6);
         assert!(standing.confirms(&settings));
     }
 

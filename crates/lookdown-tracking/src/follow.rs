@@ -41,7 +41,7 @@ impl<P: FoundPerson> FollowedPeople<P> {
     /// Takes the people of a search at `at_s` (seconds), with the motion of those before it. A
     /// person in motion whom the search has missed is expected for a second.
     #[must_use]
-    pub fn of_search(persons: &[P], at_s: f64, before: Option<&Self>) -> Self {
+    pub fn from_search(persons: &[P], at_s: f64, before: Option<&Self>) -> Self {
         let before = before.map(|before| before.targets.as_slice());
         Self {
             targets: targets_of(persons, at_s, before),

@@ -107,7 +107,7 @@ pub struct Furniture {
 }
 
 impl Shape {
-    fn of(person: &Observation) -> Self {
+    fn new(person: &Observation) -> Self {
         Self {
             center_px: person.center_px,
             log_size: person.size_px.map(f64::ln),
@@ -270,7 +270,7 @@ impl Furniture {
         } else {
             0.0
         };
-        let shapes: Vec<Shape> = persons.iter().map(|person| Shape::of(person)).collect();
+        let shapes: Vec<Shape> = persons.iter().map(|person| Shape::new(person)).collect();
         let mut pairs = Vec::new();
         for (thing, known) in self.things.iter().enumerate() {
             for (person, shape) in shapes.iter().enumerate() {
@@ -307,7 +307,7 @@ impl Furniture {
 
     /// Starts a thing.
     pub(super) fn start(&mut self, person: &Observation) {
-        let shape = Shape::of(person);
+        let shape = Shape::new(person);
         if !shape.is_finite() {
             return;
         }

@@ -44,7 +44,7 @@ impl HeatMap {
                 if point.at_s <= until {
                     continue;
                 }
-                if let Some(cell) = point.place(Plane::FloorM).and_then(Cell::of) {
+                if let Some(cell) = point.place(Plane::FloorM).and_then(Cell::at) {
                     let milliseconds = (point.at_s - until).min(MAX_GAP_S) * 1000.0;
                     #[expect(
                         clippy::cast_possible_truncation,
@@ -70,7 +70,7 @@ impl HeatMap {
 impl Cell {
     /// Returns the cell of a place in meters. `None` for places more than a kilometer away.
     #[must_use]
-    pub fn of([x, y]: [f64; 2]) -> Option<Self> {
+    pub fn at([x, y]: [f64; 2]) -> Option<Self> {
         let index = |meters: f64| {
             let cell = (meters / CELL_M).floor();
             #[expect(clippy::cast_possible_truncation, reason = "within the limit")]

@@ -77,7 +77,7 @@ impl Measurement {
     }
 
     /// Returns the measurement as a direction; `None` when the angles are not finite.
-    pub fn of_bearing(person: &Observation, noise: &MeasurementNoise) -> Option<Self> {
+    pub fn from_bearing(person: &Observation, noise: &MeasurementNoise) -> Option<Self> {
         let (sin_azimuth, cos_azimuth) = person.azimuth_deg.to_radians().sin_cos();
         let (sin, cos) = person.off_axis_deg.to_radians().sin_cos();
         let direction = Vector3::new(sin * cos_azimuth, sin * sin_azimuth, cos);

@@ -35,7 +35,7 @@ impl CameraPose {
 
     /// Returns the floor place of this camera at the site's coordinates, meters.
     #[must_use]
-    pub fn of_site(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+    pub fn from_site(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let (x, y) = (x - self.position_m[0], y - self.position_m[1]);
         let (sin, cos) = self.yaw_deg.to_radians().sin_cos();
         [cos * x + sin * y, cos * y - sin * x]
@@ -61,7 +61,7 @@ mod tests {
         };
         let [x, y] = pose.to_site([1.0, 2.0]);
         assert!((x - 8.0).abs() < 1e-9 && (y - 21.0).abs() < 1e-9, "{x} {y}");
-        let [x, y] = pose.of_site([x, y]);
+        let [x, y] = pose.from_site([x, y]);
         assert!((x - 1.0).abs() < 1e-9 && (y - 2.0).abs() < 1e-9, "{x} {y}");
     }
 }

@@ -94,7 +94,7 @@ impl Ffmpeg {
             .stderr(Stdio::piped());
         let mut child = child::spawn(&mut command, Task::Decode)
             .map_err(|error| no_ffmpeg(error.to_string()))?;
-        let usage = Usage::of(child.id().unwrap_or_default());
+        let usage = Usage::for_process(child.id().unwrap_or_default());
         let pipes = (child.stdin.take(), child.stdout.take(), child.stderr.take());
         let (Some(mut pipe), Some(output), Some(errors)) = pipes else {
             return Err(no_ffmpeg("it has no pipes".to_owned()));

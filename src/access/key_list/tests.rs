@@ -1,7 +1,7 @@
 use super::*;
 
 fn digest_of(key: &str) -> String {
-    KeyDigest::of(key.as_bytes()).hexadecimal()
+    KeyDigest::new(key.as_bytes()).hexadecimal()
 }
 
 fn line(name: &str, scopes: &str, key: &str) -> String {

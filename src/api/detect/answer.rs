@@ -75,7 +75,7 @@ impl AnswerOptions {
             }
             AnswerFormat::Annotations(format, boxes) => {
                 let name = self.file_name.unwrap_or_else(|| NAMELESS.to_owned());
-                let image = AnnotatedImage::of(report, name);
+                let image = AnnotatedImage::new(report, name);
                 format.document(&image, boxes).into()
             }
         };

@@ -67,7 +67,7 @@ pub(in crate::api) async fn detect_persons(
     let (job, answer) = job(&state, upload)?;
     let write = move |input: AnswerInput<'_>| answer.content(input.frame, input.json);
     let answered = run_detection(&state, &context, job, write).await;
-    let answered = answered.map_err(|problem| problem.of_frame_field(field))?;
+    let answered = answered.map_err(|problem| problem.for_frame_field(field))?;
     let headers = AppendHeaders(report_headers(&answered.report));
     let Content { media_type, bytes } = answered.answer;
     let media_type = [(CONTENT_TYPE, HeaderValue::from_static(media_type))];

@@ -164,7 +164,7 @@ fn written<T>(
 
 /// Returns the image to store with the report. A failure here does not fail the request.
 fn new_image(detected: &DetectedFrame, concealment: Option<Concealment>) -> Option<StoredFrame> {
-    match StoredFrame::of(detected, concealment) {
+    match StoredFrame::new(detected, concealment) {
         Ok(frame) => Some(frame),
         Err(error) => {
             tracing::warn!("the image of this frame is not stored: {error}");

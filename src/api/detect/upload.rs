@@ -81,7 +81,7 @@ impl Upload {
         state: &ApiState,
         use_of: fn(&str) -> Result<FieldUse, Problem>,
     ) -> Result<Self, Problem> {
-        let context = RequestContext::of(request.extensions())?;
+        let context = RequestContext::from_extensions(request.extensions())?;
         let access = &state.options.access;
         access.check(request.headers(), &context.identity, Scope::Detect)?;
         let uri = request.uri().clone();

@@ -22,7 +22,7 @@ struct MediaRange {
 impl Accepted {
     /// Parses the headers and ignores invalid parts. Without a valid range, everything is accepted,
     /// as without the header.
-    pub(in crate::api) fn of(headers: &HeaderMap) -> Self {
+    pub(in crate::api) fn from_headers(headers: &HeaderMap) -> Self {
         let values = headers.get_all(ACCEPT).iter();
         let texts = values.filter_map(|value| value.to_str().ok());
         let ranges: Vec<_> = texts
@@ -127,7 +127,7 @@ mod tests {
         for value in accept {
             headers.append(ACCEPT, HeaderValue::from_str(value).unwrap());
         }
-        Accepted::of(&headers).best_of(&OFFERS)
+        Accepted::from_headers(&headers).best_of(&OFFERS)
     }
 
     #[test]

@@ -33,7 +33,7 @@ pub(in crate::api) struct Caller {
 
 impl Caller {
     /// Returns the caller with this identity. The routes check the key itself.
-    pub(super) fn of(
+    pub(super) fn new(
         access: &Access,
         identity: &Identity,
         request_id: &RequestId,
@@ -115,7 +115,7 @@ fn key_or_address(holder: Option<&Holder>, address: Option<IpAddr>) -> Client {
 /// On a server without keys that other machines reach, no client is preferred to another.
 fn highest_priority(access: &Access, holder: Option<&Holder>) -> Priority {
     match (access, holder) {
-        (_, Some(holder)) => Priority::of_level(holder.highest_priority.get()),
+        (_, Some(holder)) => Priority::from_level(holder.highest_priority.get()),
         (
             Access::Open {
                 own_machine_only: true,

@@ -54,12 +54,12 @@ impl ContextSource {
         parts: &mut Parts,
         name: impl FnOnce() -> String,
     ) -> Arc<RequestContext> {
-        let id = RequestId::of(&parts.headers);
+        let id = RequestId::from_headers(&parts.headers);
         let identity = self.access.identify(&parts.headers);
         let context = Arc::new(RequestContext {
             trace: incoming_trace::begin(&self.tracer, name, &parts.headers),
             deadline: Deadline::begin(self.request_timeout),
-            caller: Caller::of(&self.access, &identity, &id, parts),
+            caller: Caller::new(&self.access, &identity, &id, parts),
             is_own: parts.extensions.get::<OwnRequest>().is_some(),
             identity,
             id,
@@ -74,7 +74,7 @@ impl RequestContext {
     ///
     /// # Errors
     /// [`Problem`] if the route is outside of the layer that determines it.
-    pub(in crate::api) fn of(extensions: &Extensions) -> Result<Arc<Self>, Problem> {
+    pub(in crate::api) fn from_extensions(extensions: &Extensions) -> Result<Arc<Self>, Problem> {
         extensions.get().cloned().ok_or_else(Problem::fault)
     }
 
@@ -89,7 +89,7 @@ impl<S: Sync> FromRequestParts<S> for Deadline {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Problem> {
-        Ok(RequestContext::of(&parts.extensions)?.deadline)
+        Ok(RequestContext::from_extensions(&parts.extensions)?.deadline)
     }
 }
 
@@ -97,6 +97,8 @@ impl<S: Sync> FromRequestParts<S> for Caller {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Problem> {
-        Ok(RequestContext::of(&parts.extensions)?.caller.clone())
+        Ok(RequestContext::from_extensions(&parts.extensions)?
+            .caller
+            .clone())
     }
 }

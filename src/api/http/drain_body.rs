@@ -47,7 +47,7 @@ pub(in crate::api) async fn discard(
     next: Next,
 ) -> Response {
     let (parts, body) = request.into_parts();
-    let deadline = match RequestContext::of(&parts.extensions) {
+    let deadline = match RequestContext::from_extensions(&parts.extensions) {
         Ok(context) => context.deadline,
         Err(problem) => return problem.into_response(),
     };

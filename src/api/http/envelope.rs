@@ -43,7 +43,7 @@ struct Failure {
 }
 
 /// Returns the response to a request whose handler panicked.
-pub(in crate::api) fn of_panic(_: Box<dyn Any + Send>) -> Response {
+pub(in crate::api) fn panic_response(_: Box<dyn Any + Send>) -> Response {
     Problem::fault().into_response()
 }
 
@@ -206,7 +206,7 @@ mod tests {
         let router = Router::new()
             .route("/panics", get(panics))
             .route("/works", get(async || "fine"))
-            .layer(CatchPanicLayer::custom(of_panic))
+            .layer(CatchPanicLayer::custom(panic_response))
             .layer(from_fn_with_state(envelope, wrap));
 
         let get = |path| Request::get(path).body(Body::empty()).unwrap();

@@ -58,7 +58,7 @@ impl Problem {
     }
 
     /// Creates a problem of one parameter or form field: the detail is `parameter: fault`.
-    pub(in crate::api) fn of_parameter(kind: ProblemKind, parameter: &str, fault: &str) -> Self {
+    pub(in crate::api) fn for_parameter(kind: ProblemKind, parameter: &str, fault: &str) -> Self {
         Self::new(kind, format!("{parameter}: {fault}")).with_parameter(parameter)
     }
 
@@ -146,7 +146,7 @@ impl Problem {
     }
 
     /// Names the form field in which the client sent the frame, if the frame is at fault.
-    pub(in crate::api) fn of_frame_field(self, field: Option<String>) -> Self {
+    pub(in crate::api) fn for_frame_field(self, field: Option<String>) -> Self {
         match field {
             Some(field) if self.parameter.as_deref() == Some(FRAME) => self.with_parameter(field),
             _ => self,
@@ -154,7 +154,7 @@ impl Problem {
     }
 
     /// Names the element of an input that has the problem.
-    pub(in crate::api) fn of_element(self, input: &str, index: usize) -> Self {
+    pub(in crate::api) fn for_element(self, input: &str, index: usize) -> Self {
         Self {
             detail: format!("{input}[{index}]: {}", self.detail),
             ..self

@@ -106,7 +106,7 @@ pub(in crate::api) async fn apply(
     mut request: Request,
     next: Next,
 ) -> Response {
-    let context = match RequestContext::of(request.extensions()) {
+    let context = match RequestContext::from_extensions(request.extensions()) {
         Ok(context) => context,
         Err(problem) => return problem.into_response(),
     };

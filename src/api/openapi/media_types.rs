@@ -25,7 +25,7 @@ impl Document {
     ///
     /// # Errors
     /// A document that is not JSON.
-    pub fn of(document: &OpenApi) -> serde_json::Result<Self> {
+    pub fn from_document(document: &OpenApi) -> serde_json::Result<Self> {
         let mut root: Node = serde_json::from_str(&document.to_json()?)?;
         root.put_forms_first();
         Ok(Self(root))

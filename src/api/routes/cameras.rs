@@ -94,12 +94,12 @@ impl<T: DeserializeOwned> FromRequest<ApiState> for CameraBody<T> {
 
     async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
         let (parts, body) = request.into_parts();
-        let context = RequestContext::of(&parts.extensions)?;
+        let context = RequestContext::from_extensions(&parts.extensions)?;
         let reader = state.body_reader(&context, MAX_BYTES, "send a camera");
         let bytes = reader.read(&parts.headers, body).await?.into_bytes();
         serde_json::from_slice(&bytes).map(Self).map_err(|error| {
             let (field, fault) = fault::<T>(&bytes, &error);
-            Problem::of_parameter(ProblemKind::InvalidParameter, &field, &fault)
+            Problem::for_parameter(ProblemKind::InvalidParameter, &field, &fault)
         })
     }
 }

@@ -208,7 +208,7 @@ async fn read_cameras(state: &ApiState) {
     let cameras = latest.iter().map(|report| report.report.camera.clone());
     state.metrics.retain_cameras(&cameras.collect::<Vec<_>>());
     for report in latest.iter().filter(|_| state.options.camera_metrics) {
-        let Ok(headline) = Headline::of(&*state.results, report, &own).await else {
+        let Ok(headline) = Headline::for_latest(&*state.results, report, &own).await else {
             return;
         };
         let Some(persons) = headline.persons else {

@@ -131,7 +131,7 @@ fn format_for(headers: &HeaderMap) -> PageFormat {
         (PageFormat::Markdown, "text/markdown"),
         (PageFormat::Html, "text/html"),
     ];
-    let best = Accepted::of(headers).best_of(&offers);
+    let best = Accepted::from_headers(headers).best_of(&offers);
     // A page in another format helps more than a refusal.
     best.unwrap_or(PageFormat::Markdown)
 }

@@ -164,7 +164,7 @@ pub(in crate::api) fn router() -> Router<ApiState> {
         .route("/", get(page))
         .route("/assets/options.json", get(options))
         .route("/assets/{name}", get(asset))
-        .route_layer(map_response(page_headers::of_web_page))
+        .route_layer(map_response(page_headers::for_web_page))
 }
 
 fn answer(name: &str, headers: &HeaderMap, path: &str) -> Result<Response, Problem> {

@@ -62,7 +62,7 @@ impl Calibrations {
         if before.store_problem.is_some() {
             tracing::info!("calibrations can be read again");
         }
-        self.replace(Snapshot::of(files));
+        self.replace(Snapshot::new(files));
         Ok(())
     }
 

@@ -52,7 +52,7 @@ pub struct CalibrationsHealth {
 impl Snapshot {
     /// The calibrations of these files. A file that has an ID's name goes before one that has it
     /// among others.
-    pub(super) fn of(files: BTreeMap<CalibrationId, Arc<LoadedFile>>) -> Self {
+    pub(super) fn new(files: BTreeMap<CalibrationId, Arc<LoadedFile>>) -> Self {
         let mut by_id = HashMap::new();
         for (id, file) in &files {
             if let Some(entry) = file.cameras.get(id) {

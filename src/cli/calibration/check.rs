@@ -97,7 +97,7 @@ fn report(camera: &NamedCamera, calibration: &Calibration) -> Vec<(&'static str,
         None => ", up to the farthest corner of the frame or the end of the curve",
     };
     let views = views(calibration);
-    let coverage = Coverage::of(lens, &views, width, height);
+    let coverage = Coverage::new(lens, &views, width, height);
     let mut lines = vec![
         ("  lens", lens.model().to_owned()),
         ("  frame", format!("{width}×{height} pixels")),

@@ -17,7 +17,7 @@ use serde::Deserialize;
 use serde_json::json;
 use tokio::time;
 
-use crate::cli::{async_runtime::of_this_thread, output::UNWRITABLE, server_flags::ServerFlags};
+use crate::cli::{async_runtime::for_this_thread, output::UNWRITABLE, server_flags::ServerFlags};
 
 /// Longest time for the tracks of a camera.
 const TIMEOUT: Duration = Duration::from_secs(10);
@@ -65,7 +65,7 @@ struct Walks(BTreeMap<u64, Walk>);
 
 /// Prints the place as a part of a calibration in the native format, with its sources.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
-    let (first, second) = of_this_thread()?.block_on(follow(arguments))?;
+    let (first, second) = for_this_thread()?.block_on(follow(arguments))?;
     let Arguments {
         first: on, camera, ..
     } = arguments;

@@ -44,7 +44,7 @@ pub(super) struct NamedCamera {
 
 impl Source {
     /// The only camera of a file.
-    pub(super) fn of(file: PathBuf) -> Self {
+    pub(super) fn new(file: PathBuf) -> Self {
         Self {
             file,
             camera: None,

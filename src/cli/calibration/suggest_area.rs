@@ -12,7 +12,7 @@ use lookdown_common::{ServerClient, read_body};
 use serde::Deserialize;
 use serde_json::json;
 
-use crate::cli::{async_runtime::of_this_thread, output::UNWRITABLE, server_flags::ServerFlags};
+use crate::cli::{async_runtime::for_this_thread, output::UNWRITABLE, server_flags::ServerFlags};
 
 /// Longest time for the answer.
 const TIMEOUT: Duration = Duration::from_secs(30);
@@ -40,7 +40,7 @@ struct SuggestedArea {
 
 /// Prints the field `areas` of a calibration.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
-    let area = of_this_thread()?.block_on(suggested_area(arguments))?;
+    let area = for_this_thread()?.block_on(suggested_area(arguments))?;
     eprintln!(
         "lookdown: the floor on which people walked, and 0.5 m around it: check it in Zones of the \
          web page"

@@ -30,7 +30,7 @@ use crate::{
     app::{engine_for, open_calibrations},
     cli::{
         SettingsFile, annotate,
-        async_runtime::of_this_thread,
+        async_runtime::for_this_thread,
         detect::stream::{interval, is_video},
         output::UNWRITABLE,
         parameters::ParameterFlags,
@@ -134,7 +134,7 @@ pub(super) fn run(
         (None, Some(id), _) => id.to_owned(),
         (None, None, files) => files.first().map(|file| stem(file)).unwrap_or_default(),
     };
-    let runtime = of_this_thread()?;
+    let runtime = for_this_thread()?;
     let clips = clips(files, flags.start, &runtime)?;
     let (Some(first), Some(last)) = (clips.first(), clips.last()) else {
         bail!("there is no recording: give a video such as clip.mp4");

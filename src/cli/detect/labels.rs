@@ -55,7 +55,7 @@ impl Labels {
 
     /// Takes in what was found in an image.
     pub(super) fn add(&mut self, image_file: &ImageFile, report: &DetectionReport) {
-        let image = AnnotatedImage::of(report, image_file.name.clone());
+        let image = AnnotatedImage::new(report, image_file.name.clone());
         self.images.push(image);
     }
 

@@ -12,7 +12,7 @@ use lookdown_common::parse_duration;
 use lookdown_watch::{ImageReader, VideoFrames, VideoOptions, VideoWriter, video_duration};
 use tokio::runtime::Runtime;
 
-use crate::cli::{async_runtime::of_this_thread, progress::Progress};
+use crate::cli::{async_runtime::for_this_thread, progress::Progress};
 
 /// Endings of video files, in lower case.
 const ENDINGS: [&str; 10] = [
@@ -43,7 +43,7 @@ impl Stream {
     /// # Errors
     /// Returns an error if there are further paths.
     pub(super) fn among(paths: &[PathBuf]) -> anyhow::Result<Option<Self>> {
-        let Some(stream) = paths.iter().find_map(|path| Self::of(path)) else {
+        let Some(stream) = paths.iter().find_map(|path| Self::from_path(path)) else {
             return Ok(None);
         };
         if paths.len() > 1 {
@@ -53,7 +53,7 @@ impl Stream {
         Ok(Some(stream))
     }
 
-    fn of(path: &Path) -> Option<Self> {
+    fn from_path(path: &Path) -> Option<Self> {
         if path.as_os_str() == "-" {
             return Some(Self::StandardInput);
         }
@@ -106,7 +106,7 @@ impl StreamReader {
     /// # Errors
     /// Returns an error if `ffmpeg` is missing.
     pub(super) fn open(stream: &Stream, every: Option<Duration>) -> anyhow::Result<Self> {
-        let runtime = of_this_thread()?;
+        let runtime = for_this_thread()?;
         let name = stream.name();
         let options = VideoOptions::default();
         let every = every.unwrap_or(DEFAULT_EVERY);

@@ -12,7 +12,7 @@ pub(super) enum Owner<'a> {
 
 impl<'a> Owner<'a> {
     /// Recognizes an owner by its path. Returns the rest of the topic, too.
-    pub(super) fn of_topic(topic: &'a str) -> Option<(Self, &'a str)> {
+    pub(super) fn from_topic(topic: &'a str) -> Option<(Self, &'a str)> {
         let (kind, rest) = topic.split_once('/')?;
         let (name, rest) = rest.split_once('/')?;
         match kind {
@@ -61,7 +61,7 @@ pub(super) enum Number<'a> {
 
 impl<'a> Number<'a> {
     /// Recognizes a number by its topic below that of its owner.
-    pub(super) fn of_topic(topic: &'a str) -> Option<Self> {
+    pub(super) fn from_topic(topic: &'a str) -> Option<Self> {
         let levels: Vec<_> = topic.split('/').collect();
         match levels[..] {
             ["persons"] => Some(Self::Persons),
@@ -78,13 +78,13 @@ impl<'a> Number<'a> {
         match self {
             Self::Persons | Self::Crossings { .. } => vec![self],
             Self::ZonePersons { zone } | Self::Entries { zone } | Self::DwellSeconds { zone } => {
-                Self::of_zone(zone).to_vec()
+                Self::for_zone(zone).to_vec()
             }
         }
     }
 
     /// The numbers of a zone.
-    pub(super) fn of_zone(zone: &'a str) -> [Self; 3] {
+    pub(super) fn for_zone(zone: &'a str) -> [Self; 3] {
         [
             Self::ZonePersons { zone },
             Self::Entries { zone },

@@ -52,7 +52,7 @@ impl Images {
         self.of_cameras.remove(camera);
     }
 
-    pub(super) fn of(&self, camera: &str) -> Option<Arc<StoredImage>> {
+    pub(super) fn for_camera(&self, camera: &str) -> Option<Arc<StoredImage>> {
         self.of_cameras.get(camera).cloned()
     }
 

@@ -201,7 +201,7 @@ impl BoundedReports {
     }
 
     pub(super) fn image(&self, camera: &str) -> Option<Arc<StoredImage>> {
-        self.images.of(camera)
+        self.images.for_camera(camera)
     }
 
     pub(super) fn usage(&self) -> ResultUse {

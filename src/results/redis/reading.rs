@@ -135,10 +135,10 @@ impl Reader<'_> {
         let earlier = earlier.into_iter().filter_map(|(element, micros)| {
             // The ID, the size and the camera.
             let camera = element.splitn(3, ':').nth(2)?.to_owned();
-            Some((ReportId::of_micros(micros), camera))
+            Some((ReportId::from_micros(micros), camera))
         });
         let latest = latest.into_iter();
-        let latest = latest.map(|(camera, micros)| (ReportId::of_micros(micros), camera));
+        let latest = latest.map(|(camera, micros)| (ReportId::from_micros(micros), camera));
         let mut places: Vec<Place> = earlier.chain(latest).collect();
         places.sort_unstable();
         places.truncate(most.get());

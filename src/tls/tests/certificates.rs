@@ -58,7 +58,7 @@ pub(super) struct Files {
 }
 
 impl Files {
-    pub(super) fn of(pair: &Pair) -> Self {
+    pub(super) fn new(pair: &Pair) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let options = TlsOptions {
             certificate: folder.path().join("server.pem"),

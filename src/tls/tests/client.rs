@@ -47,7 +47,7 @@ pub(super) struct Client {
 }
 
 impl Client {
-    pub(super) fn of(
+    pub(super) fn new(
         authority: &Authority,
         shown: Option<&Pair>,
         versions: &[&'static SupportedProtocolVersion],

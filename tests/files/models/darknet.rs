@@ -7,14 +7,14 @@ use lookdown_imaging::{Frame, Letterbox, ViewBatch};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::models::folder::{library, of_repository, options};
+use crate::models::folder::{in_repository, library, options};
 
 const SIZE: u32 = 416;
 
 /// Runs one of the repository's scripts in the converters' environment.
 fn script(name: &str, arguments: &[&Path]) {
-    let output = Command::new(of_repository(".setup/venv/bin/python"))
-        .arg(of_repository("packaging/scripts").join(name))
+    let output = Command::new(in_repository(".setup/venv/bin/python"))
+        .arg(in_repository("packaging/scripts").join(name))
         .args(arguments)
         .output()
         .unwrap();
@@ -57,7 +57,7 @@ fn full_size_yolov2_matches_the_reference() {
     let mut found = detector.detect(&batch).unwrap().per_view.remove(0);
     found.sort_by(|a, b| b.score.total_cmp(&a.score));
 
-    let answers = of_repository("tests/fixtures/models/yolov2_answers.json");
+    let answers = in_repository("tests/fixtures/models/yolov2_answers.json");
     let answers: Value = serde_json::from_slice(&fs::read(answers).unwrap()).unwrap();
     assert_eq!(found.len(), answers["candidates"]);
     let sum: f64 = found.iter().map(|found| found.score).sum();

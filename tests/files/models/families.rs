@@ -6,12 +6,12 @@ use std::fs;
 use lookdown_detect::inference::{Detector, OnnxDetector};
 use lookdown_imaging::ViewBatch;
 
-use crate::models::folder::{library, of_repository, options};
+use crate::models::folder::{in_repository, library, options};
 
 #[test]
 fn manifests_of_the_families_are_documented_and_run() {
-    let documentation = fs::read_to_string(of_repository("docs/models.md")).unwrap();
-    let folders = fs::read_dir(of_repository("tests/fixtures/models/families")).unwrap();
+    let documentation = fs::read_to_string(in_repository("docs/models.md")).unwrap();
+    let folders = fs::read_dir(in_repository("tests/fixtures/models/families")).unwrap();
     let folders: Vec<_> = folders.map(|entry| entry.unwrap().path()).collect();
     assert_eq!(folders.len(), 6);
     for folder in folders {

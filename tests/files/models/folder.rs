@@ -14,18 +14,18 @@ use tempfile::TempDir;
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 
 /// A file of the repository.
-pub(crate) fn of_repository(path: &str) -> PathBuf {
+pub(crate) fn in_repository(path: &str) -> PathBuf {
     Path::new(ROOT).join(path)
 }
 
 /// An ONNX file made for tests.
 pub(crate) fn fixture(name: &str) -> PathBuf {
-    of_repository("tests/fixtures/models").join(format!("{name}.onnx"))
+    in_repository("tests/fixtures/models").join(format!("{name}.onnx"))
 }
 
 /// The ONNX Runtime library installed by `make setup`.
 pub(crate) fn library() -> PathBuf {
-    of_repository("runtime/libonnxruntime.so")
+    in_repository("runtime/libonnxruntime.so")
 }
 
 /// Options for networks in tests.

@@ -4,7 +4,7 @@ use std::{collections::BTreeSet, fs};
 
 use lookdown_detect::inference::{ModelManifest, heads::Head};
 
-use crate::models::folder::of_repository;
+use crate::models::folder::in_repository;
 
 /// The words in backticks.
 fn quoted(text: &str) -> impl Iterator<Item = String> {
@@ -23,7 +23,7 @@ fn expected<T: serde::de::DeserializeOwned>(text: &str) -> Vec<String> {
 
 #[test]
 fn the_table_has_each_key_of_a_manifest_and_no_other() {
-    let documentation = fs::read_to_string(of_repository("docs/models.md")).unwrap();
+    let documentation = fs::read_to_string(in_repository("docs/models.md")).unwrap();
     let (_, table) = documentation
         .split_once("<!-- keys of manifests -->")
         .unwrap();

@@ -16,15 +16,15 @@ use lookdown_detect::{
 };
 use serde_json::Value;
 
-use crate::models::folder::of_repository;
+use crate::models::folder::in_repository;
 
 /// Runs detection on the office sample.
 fn detect(parameters: &[(&str, &str)]) -> DetectionReport {
     let settings = settings::load(None, []).unwrap();
     let parameters = DetectParameters::parse(parameters.iter().copied()).unwrap();
     let engine = engine_for(&settings, std::slice::from_ref(&parameters)).unwrap();
-    let calibration = of_repository("samples/calibrations/office.json");
-    let image = fs::read(of_repository("samples/office.jpg")).unwrap();
+    let calibration = in_repository("samples/calibrations/office.json");
+    let image = fs::read(in_repository("samples/office.jpg")).unwrap();
     let calibration = Arc::new(Calibration::read(&calibration).unwrap());
     let job = DetectJob::local(
         "test".to_owned(),
@@ -37,7 +37,7 @@ fn detect(parameters: &[(&str, &str)]) -> DetectionReport {
 
 /// Boxes of the persons in the office.
 fn annotated() -> Vec<BBox<FramePixels>> {
-    let file = fs::read_to_string(of_repository("samples/annotations.json")).unwrap();
+    let file = fs::read_to_string(in_repository("samples/annotations.json")).unwrap();
     let file: Value = serde_json::from_str(&file).unwrap();
     let images = file["images"].as_array().unwrap();
     let is_office = |image: &&Value| image["file_name"] == "office.jpg";
@@ -71,7 +71,7 @@ fn the_default_models_find_all_persons_of_a_sample() {
 
 #[test]
 fn every_fetched_model_finds_the_persons_of_a_sample() {
-    let folders = fs::read_dir(of_repository("models")).unwrap();
+    let folders = fs::read_dir(in_repository("models")).unwrap();
     let folders = folders.map(|entry| entry.unwrap().path());
     let fetched: Vec<_> = folders.filter(|folder| is_fetched(folder)).collect();
     assert!(
@@ -104,7 +104,7 @@ fn the_detector_finds_no_person_in_a_concealed_frame() {
     let parse = |threshold| DetectParameters::parse([("score_threshold", threshold)]).unwrap();
     let (careful, usual) = (parse("0.1"), parse("0.3"));
     let engine = engine_for(&settings, std::slice::from_ref(&usual)).unwrap();
-    let calibration = of_repository("samples/calibrations/office.json");
+    let calibration = in_repository("samples/calibrations/office.json");
     let calibration = Arc::new(Calibration::read(&calibration).unwrap());
     let detect = |image: Vec<u8>, parameters: &DetectParameters| {
         let job = DetectJob::local(
@@ -115,7 +115,7 @@ fn the_detector_finds_no_person_in_a_concealed_frame() {
         );
         engine.detect(&job).unwrap()
     };
-    let office = fs::read(of_repository("samples/office.jpg")).unwrap();
+    let office = fs::read(in_repository("samples/office.jpg")).unwrap();
     let persons = detect(office.clone(), &usual).report.persons.len();
     assert!(persons >= annotated().len() - 1, "{persons}");
     for layer in ["blur", "silhouette"] {
@@ -131,7 +131,7 @@ fn the_detector_finds_no_person_in_a_concealed_frame() {
 #[test]
 fn every_manifest_has_the_sum_of_its_file() {
     let mut names = 0;
-    for entry in fs::read_dir(of_repository("models")).unwrap() {
+    for entry in fs::read_dir(in_repository("models")).unwrap() {
         let text = fs::read_to_string(entry.unwrap().path().join("model.toml")).unwrap();
         assert!(text.contains("\nsha256 = \""), "{text}");
         names += 1;

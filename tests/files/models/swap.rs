@@ -34,7 +34,7 @@ use tempfile::TempDir;
 use tokio::task::spawn_blocking;
 use tower::ServiceExt;
 
-use crate::models::folder::{model_of_two_sessions, of_repository, write};
+use crate::models::folder::{in_repository, model_of_two_sessions, write};
 
 const CLIENTS: usize = 3;
 const SWAPS: usize = 6;
@@ -110,10 +110,10 @@ async fn a_model_is_swapped_under_load_without_a_failed_request() {
     let folder = TempDir::new().unwrap();
     let person = folder.path().join("person");
     let weights = ["nanodet_g_views_416", "nanodet_g_views_416_fp16"]
-        .map(|name| of_repository(&format!("models/{name}/model.onnx")));
+        .map(|name| in_repository(&format!("models/{name}/model.onnx")));
     write(&person, "person", "", &weights[0]);
     let (router, models) = service(folder.path());
-    let frame = fs::read(of_repository("samples/office.jpg")).unwrap();
+    let frame = fs::read(in_repository("samples/office.jpg")).unwrap();
 
     let done = Arc::new(AtomicBool::new(false));
     let clients = (0..CLIENTS).map(|_| {

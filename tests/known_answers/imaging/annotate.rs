@@ -28,7 +28,7 @@ fn aligned(bbox: [f64; 4]) -> Mark {
 
 fn annotated(width: u32, height: u32, marks: &[Mark]) -> Frame {
     let mut frame = gray_frame(width, height);
-    annotate(&mut frame, &Drawing::of(marks.to_vec()));
+    annotate(&mut frame, &Drawing::new(marks.to_vec()));
     frame
 }
 
@@ -91,7 +91,7 @@ fn drawing_stops_at_the_next_mark_when_cancelled() {
         asked.get() > 3
     };
     let mut frame = gray_frame(400, 400);
-    let drawing = Drawing::of(vec![aligned([50.0, 50.0, 90.0, 90.0]); 900]);
+    let drawing = Drawing::new(vec![aligned([50.0, 50.0, 90.0, 90.0]); 900]);
     let outcome = annotate_unless(&mut frame, &drawing, &is_cancelled);
     assert_eq!(outcome, Err(Cancelled));
     assert_eq!(asked.get(), 4);
@@ -114,7 +114,7 @@ fn only_the_boxes_that_are_asked_for_are_outlined() {
         let drawing = Drawing {
             boxes,
             oriented,
-            ..Drawing::of(vec![mark.clone()])
+            ..Drawing::new(vec![mark.clone()])
         };
         annotate(&mut frame, &drawing);
         assert_eq!(is_painted(&frame, 40, 100), boxes);
@@ -130,7 +130,7 @@ fn an_outline_stands_out_from_bright_and_from_dark_floors() {
                 Frame::new(side, side, vec![floor; 3 * (side * side) as usize]).unwrap();
             let size = f64::from(side);
             let bbox = [0.25, 0.25, 0.75, 0.75].map(|part| part * size);
-            annotate(&mut frame, &Drawing::of(vec![aligned(bbox)]));
+            annotate(&mut frame, &Drawing::new(vec![aligned(bbox)]));
             let light = |x: u32| {
                 let channels = frame.pixel(x, side / 2).map(u32::from);
                 channels.into_iter().sum::<u32>() / 3
@@ -154,7 +154,7 @@ fn lines_are_drawn_below_the_marks() {
             vec![[10.5, 30.5], [190.5, 30.5], [190.5, 180.5]],
             vec![[0.0, 100.0], [f64::NAN, 100.0]],
         ],
-        ..Drawing::of(vec![aligned([100.5, 10.5, 150.5, 150.5])])
+        ..Drawing::new(vec![aligned([100.5, 10.5, 150.5, 150.5])])
     };
     annotate(&mut frame, &drawing);
     assert!(is_painted(&frame, 50, 30) && is_painted(&frame, 190, 100));
@@ -297,7 +297,7 @@ fn a_caption_is_complete_and_labels_keep_clear_of_it() {
         let mut frame = gray_frame(width, height);
         let drawing = Drawing {
             caption: caption.to_owned(),
-            ..Drawing::of(Vec::new())
+            ..Drawing::new(Vec::new())
         };
         annotate(&mut frame, &drawing);
         let painted = |x: u32| (0..height).any(|y| is_painted(&frame, x, y));
@@ -385,7 +385,7 @@ proptest! {
         let head = oriented.map(|mark| Head { cx: mark.cx, cy: mark.cy, radius: mark.width });
         let mark = Mark { bbox, oriented, head, label };
         let lines = vec![vec![[bbox[0], bbox[1]], [bbox[2], bbox[3]]]];
-        let drawing = Drawing { lines, caption, ..Drawing::of(vec![mark]) };
+        let drawing = Drawing { lines, caption, ..Drawing::new(vec![mark]) };
         let mut frame = gray_frame(width, height);
         annotate(&mut frame, &drawing);
         prop_assert_eq!((frame.width(), frame.height()), (width, height));

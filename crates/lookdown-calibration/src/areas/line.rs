@@ -78,7 +78,7 @@ fn in_frame(
 ) -> Result<LineEnds, FormatError> {
     let farthest = 2.0 * f64::from(width.max(height));
     let ends = two_ends(field, ends, SHORTEST_PX, farthest, "pixels")?;
-    let frame = Polygon::of_frame(width, height);
+    let frame = Polygon::for_frame(width, height);
     if frame.holds(ends[0]) || frame.holds(ends[1]) {
         return Ok(LineEnds::Frame(ends));
     }

@@ -43,7 +43,7 @@ const NAMES: [(Distortion, &[&str]); 4] = [
 
 impl Distortion {
     /// The model of that name.
-    pub(super) fn of_name(name: &str) -> Option<Self> {
+    pub(super) fn from_name(name: &str) -> Option<Self> {
         let name = name.to_ascii_lowercase().replace('-', "_");
         let known = NAMES.iter().find(|(_, names)| names.contains(&&*name));
         known.map(|(distortion, _)| *distortion)

@@ -14,7 +14,7 @@ pub(super) struct Fields<'a> {
 
 impl<'a> Fields<'a> {
     /// The document itself.
-    pub(super) fn of(tree: &'a Value) -> Result<Self, FormatError> {
+    pub(super) fn new(tree: &'a Value) -> Result<Self, FormatError> {
         let map = tree
             .as_object()
             .ok_or_else(|| FormatError::malformed("it has no named fields at its top"))?;

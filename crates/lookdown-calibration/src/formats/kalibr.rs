@@ -93,7 +93,7 @@ fn distortion(camera: &Fields<'_>) -> Result<(Distortion, Vec<f64>), FormatError
         return Ok((Distortion::None, Vec::new()));
     }
     let name = camera.text(MODEL)?;
-    let distortion = Distortion::of_name(name).ok_or_else(|| {
+    let distortion = Distortion::from_name(name).ok_or_else(|| {
         camera.invalid(
             MODEL,
             format!("it is {name:?}: equidistant, radtan, fov and none are read"),

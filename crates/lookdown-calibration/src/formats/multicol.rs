@@ -14,7 +14,7 @@ use crate::native::NativeImage;
 const MAX_COEFFICIENTS: u32 = 64;
 
 pub(super) fn read(text: &str) -> Result<Camera, FormatError> {
-    let settings = Settings::of(text);
+    let settings = Settings::new(text);
     let count = settings.whole("nrpol")?;
     if !(1..=MAX_COEFFICIENTS).contains(&count) {
         return Err(FormatError::invalid(
@@ -44,7 +44,7 @@ pub(super) fn read(text: &str) -> Result<Camera, FormatError> {
 struct Settings<'a>(HashMap<&'a str, &'a str>);
 
 impl<'a> Settings<'a> {
-    fn of(text: &'a str) -> Self {
+    fn new(text: &'a str) -> Self {
         let entries = text.lines().filter_map(|line| {
             let line = line.split('#').next()?;
             let (key, value) = line.split_once(':')?;

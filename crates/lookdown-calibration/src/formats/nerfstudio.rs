@@ -80,7 +80,7 @@ fn read_camera<'a>(with: impl Fn(&str) -> &'a Fields<'a>) -> Result<Camera, Form
         ""
     };
     let is_fisheye = with("is_fisheye").map().get("is_fisheye") == Some(&Value::Bool(true));
-    if is_fisheye || Distortion::of_name(model) == Some(Distortion::Fisheye) {
+    if is_fisheye || Distortion::from_name(model) == Some(Distortion::Fisheye) {
         return Ok(Camera::new(Some(image), KannalaBrandt::new(pinhole, k)));
     }
     let is_pinhole = ["", "PINHOLE", "SIMPLE_PINHOLE", "OPENCV"].contains(&model);

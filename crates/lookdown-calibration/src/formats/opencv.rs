@@ -157,7 +157,7 @@ fn without_xi(
 fn said_distortion<'a>(fields: &Fields<'a>) -> Result<(&'a str, Option<Distortion>), FormatError> {
     if let Some(key) = present(fields, &["distortion_model", "camera_model", "model"], "") {
         let name = fields.text(key)?;
-        let known = Distortion::of_name(name).ok_or_else(|| {
+        let known = Distortion::from_name(name).ok_or_else(|| {
             fields.invalid(
                 key,
                 format!("it is {name:?}: fisheye or equidistant is read"),

@@ -23,7 +23,7 @@ pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
     }
     let coefficients = spelled(["distortion_coefficients", "D", "d"]);
     let name = fields.text("distortion_model")?;
-    let distortion = Distortion::of_name(name).ok_or_else(|| {
+    let distortion = Distortion::from_name(name).ok_or_else(|| {
         fields.invalid(
             "distortion_model",
             format!("it is {name:?}: equidistant (also called fisheye or kannala_brandt) is read"),

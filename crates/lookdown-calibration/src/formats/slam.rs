@@ -62,7 +62,7 @@ fn read_camera(common: &Fields<'_>, parameters: &Fields<'_>) -> Result<Camera, F
     } else {
         "PinHole"
     };
-    if Distortion::of_name(model) == Some(Distortion::Fisheye) {
+    if Distortion::from_name(model) == Some(Distortion::Fisheye) {
         let lens = named_parameters::read(NamedModel::KannalaBrandt, parameters)?;
         return Ok(Camera::new(image, lens));
     }

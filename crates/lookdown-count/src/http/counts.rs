@@ -59,7 +59,7 @@ type Names = (BTreeSet<(String, String)>, BTreeSet<String>);
         (status = NOT_MODIFIED, description = "The counts are the same."),
     )
 )]
-pub(super) async fn of_camera(
+pub(super) async fn camera_counts(
     State(api): State<Shared>,
     Path(camera): Path<String>,
     parameters: Result<Query<TimeParameters>, QueryRejection>,
@@ -84,7 +84,7 @@ pub(super) async fn of_camera(
         (status = NOT_MODIFIED, description = "The counts are the same."),
     )
 )]
-pub(super) async fn of_site(
+pub(super) async fn site_counts(
     State(api): State<Shared>,
     Path(site): Path<String>,
     parameters: Result<Query<TimeParameters>, QueryRejection>,
@@ -109,7 +109,7 @@ async fn answer(
             .is_some_and(|accept| accept.as_bytes().starts_with(b"text/csv")),
         Some(other) => {
             let fault = format!("{:?} is not a format: give json or csv", shortened(other));
-            return Err(Problem::of_parameter("format", &fault));
+            return Err(Problem::for_parameter("format", &fault));
         }
     };
     check_known(api, &owner).await?;
@@ -140,7 +140,7 @@ async fn answer(
 }
 
 fn too_large() -> Problem {
-    Problem::of_parameter(
+    Problem::for_parameter(
         "step",
         "the steps of this time have too many values: give a longer step, or a shorter time",
     )
@@ -154,7 +154,7 @@ pub(super) fn unusable_query(refused: &QueryRejection) -> Problem {
         "{}: give each parameter of docs/count.md once",
         one_line(cause)
     );
-    Problem::of_parameter("query", &fault)
+    Problem::for_parameter("query", &fault)
 }
 
 /// Returns the lines and zones that are counted now: a step without any has the count 0.

@@ -66,7 +66,7 @@ fn drawn(cells: &BTreeMap<Cell, u64>, definition: &Arc<CameraDefinition>) -> (Ve
     for y in 0..height {
         for x in 0..WIDTH {
             let middle = [x, y].map(|pixel| (f64::from(pixel) + 0.5) * scale);
-            let cell = definition.floor_at(middle).and_then(Cell::of);
+            let cell = definition.floor_at(middle).and_then(Cell::at);
             let time = cell.and_then(|cell| cells.get(&cell));
             pixels.extend(color(time.copied().map_or(0.0, seconds), most));
         }

@@ -68,11 +68,11 @@ impl TimeParameters {
         if from >= to {
             let from = time_of(from * MINUTE_MS);
             let fault = format!("{from} is not before `to`: give an earlier time");
-            return Err(Problem::of_parameter("from", &fault));
+            return Err(Problem::for_parameter("from", &fault));
         }
         if (to - from + step - 1) / step > MAX_STEPS {
             let fault = "the time has more than 10000 steps: give a later time, or a longer step";
-            return Err(Problem::of_parameter("from", fault));
+            return Err(Problem::for_parameter("from", fault));
         }
         Ok(Span {
             from_minute: from,
@@ -140,7 +140,7 @@ fn timestamp(name: &str, text: Option<&str>) -> Result<Option<i64>, Problem> {
 /// Returns the problem of a value. `remedy` completes "… is not".
 fn is_not(name: &str, value: &str, remedy: &str) -> Problem {
     let fault = format!("{:?} is not {remedy}", shortened(value));
-    Problem::of_parameter(name, &fault)
+    Problem::for_parameter(name, &fault)
 }
 
 /// Parses a step in whole minutes.

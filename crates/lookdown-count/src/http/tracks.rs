@@ -103,7 +103,7 @@ struct TrackRow {
     params(("camera" = String, Path, description = "The name of the camera.")),
     responses((status = OK, description = "The current tracks.", body = Tracks))
 )]
-pub(super) async fn of_camera(
+pub(super) async fn camera_tracks(
     State(api): State<Shared>,
     Path(camera): Path<String>,
 ) -> Result<Json<Tracks>, Problem> {
@@ -122,7 +122,7 @@ pub(super) async fn of_camera(
     params(("site" = String, Path, description = "The name of the site.")),
     responses((status = OK, description = "The current tracks.", body = Tracks))
 )]
-pub(super) async fn of_site(
+pub(super) async fn site_tracks(
     State(api): State<Shared>,
     Path(site): Path<String>,
 ) -> Result<Json<Tracks>, Problem> {

@@ -69,7 +69,7 @@ impl Conditions {
     }
 
     /// Returns the messages of a counted report of the time `at_ms`, which arrived now.
-    pub(crate) fn of_report(
+    pub(crate) fn for_report(
         &mut self,
         event: u64,
         camera: &str,
@@ -143,7 +143,7 @@ impl Conditions {
     }
 
     /// Returns the messages of the time: cameras that became silent.
-    pub(crate) fn of_time(&mut self, now_ms: i64) -> Vec<Message> {
+    pub(crate) fn for_time(&mut self, now_ms: i64) -> Vec<Message> {
         let mut messages = Vec::new();
         for (index, webhook) in self.webhooks.iter().enumerate() {
             let Condition::Silent { after } = webhook.condition else {

@@ -41,7 +41,7 @@ pub struct BBox<S> {
 impl BBox<FramePixels> {
     /// The box that covers a whole frame.
     #[must_use]
-    pub fn of_frame(width: u32, height: u32) -> Self {
+    pub fn for_frame(width: u32, height: u32) -> Self {
         Self::from_ordered([0.0, 0.0, f64::from(width), f64::from(height)])
     }
 }

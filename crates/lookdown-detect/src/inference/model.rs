@@ -31,19 +31,19 @@ impl Model {
     /// A model with one session.
     #[must_use]
     pub fn new(session: Box<dyn Detector>) -> Self {
-        Self::of_boxed(session, Vec::new())
+        Self::from_boxed(session, Vec::new())
     }
 
     /// Returns a model with several sessions of the same network.
     #[must_use]
-    pub fn of_sessions<D: Detector + 'static>(first: D, others: Vec<D>) -> Self {
+    pub fn from_sessions<D: Detector + 'static>(first: D, others: Vec<D>) -> Self {
         let others = others.into_iter();
         let others = others.map(|session| Box::new(session) as Box<dyn Detector>);
-        Self::of_boxed(Box::new(first), others.collect())
+        Self::from_boxed(Box::new(first), others.collect())
     }
 
     /// [`Model::of_sessions`] with boxed sessions.
-    pub(crate) fn of_boxed(first: Box<dyn Detector>, others: Vec<Box<dyn Detector>>) -> Self {
+    pub(crate) fn from_boxed(first: Box<dyn Detector>, others: Vec<Box<dyn Detector>>) -> Self {
         Self {
             name: first.name().to_owned(),
             revision: first.revision().to_owned(),

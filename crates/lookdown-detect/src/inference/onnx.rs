@@ -93,7 +93,7 @@ impl OnnxDetector {
         })?;
         let metadata = description::metadata(&session);
         let (inputs, outputs) = description::tensors(&session);
-        let signature = Signature::of(&inputs, &manifest.input, &metadata).map_err(unusable)?;
+        let signature = Signature::new(&inputs, &manifest.input, &metadata).map_err(unusable)?;
         let shapes: Vec<_> = description::float_shapes(&outputs).collect();
         let size = (signature.width, signature.height);
         manifest.output.check(&shapes, size).map_err(unusable)?;

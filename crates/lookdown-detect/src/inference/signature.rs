@@ -28,7 +28,7 @@ pub(super) struct Signature {
 
 impl Signature {
     /// Reads the declared inputs. Open dimensions come from the manifest, then from the metadata.
-    pub(super) fn of(
+    pub(super) fn new(
         inputs: &[OnnxTensor],
         manifest: &ManifestInput,
         metadata: &Metadata,

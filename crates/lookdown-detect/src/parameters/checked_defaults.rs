@@ -34,7 +34,7 @@ impl DetectDefaults {
         // Motion detection needs a camera, which the request names.
         let camera = [(DetectParameters::CAMERA, "camera")];
         DetectParameters::parse(pairs.into_iter().chain(camera))?;
-        Ok(Self::of(values))
+        Ok(Self::new(values))
     }
 
     /// Returns the default of the parameter `follow` for a frame of a camera.

@@ -38,7 +38,7 @@ pub struct DetectDefaults(Vec<(&'static str, String)>);
 
 impl DetectDefaults {
     /// Wraps checked values.
-    pub(super) fn of(values: Vec<(&'static str, String)>) -> Self {
+    pub(super) fn new(values: Vec<(&'static str, String)>) -> Self {
         Self(values)
     }
 

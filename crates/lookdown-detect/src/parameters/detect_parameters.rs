@@ -274,7 +274,7 @@ impl DetectParameters {
             motion: given.value(&MOTION)?,
             follow: given.value(&FOLLOW)?,
             store: given.optional(&STORE)?.unwrap_or(is_named),
-            priority: Priority::of_level(given.value(&PRIORITY)?),
+            priority: Priority::from_level(given.value(&PRIORITY)?),
             timeout: timeout.map(Duration::from_millis),
             defaults: given.defaults_used(),
         };

@@ -15,7 +15,7 @@ pub enum Priority {
 impl Priority {
     /// Returns the priority of a level in a request: 1 to 3 are high, 4 to 6 normal, 7 to 9 low.
     #[must_use]
-    pub fn of_level(level: u32) -> Self {
+    pub fn from_level(level: u32) -> Self {
         match level {
             ..=3 => Self::High,
             4..=6 => Self::Normal,

@@ -24,7 +24,7 @@ pub(crate) enum ScoreCalibration {
 
 impl ScoreCalibration {
     /// Returns the calibration for persons of a profile with this tuning.
-    pub(crate) fn of(tuning: &Tuning, refinement: Refinement) -> Self {
+    pub(crate) fn new(tuning: &Tuning, refinement: Refinement) -> Self {
         match refinement {
             // Suppression keeps the detector's scores.
             Refinement::Nms | Refinement::SoftNmsLinear | Refinement::SoftNmsGaussian => {
@@ -95,7 +95,7 @@ mod tests {
     #[test]
     fn suppression_keeps_the_scores_of_the_detector() {
         let calibration =
-            ScoreCalibration::of(&Profile::Fast.tuning(), Refinement::SoftNmsGaussian);
+            ScoreCalibration::new(&Profile::Fast.tuning(), Refinement::SoftNmsGaussian);
         assert_eq!(calibration.reported(0.42), 0.42);
     }
 

@@ -57,11 +57,11 @@ impl CameraRig {
         plan: Option<&ViewPlan>,
         input: &NetworkInput,
     ) -> Self {
-        let hidden = Hidden::of(&geometry, frame_width, frame_height);
+        let hidden = Hidden::new(&geometry, frame_width, frame_height);
         let Some(plan) = plan else {
             return Self {
                 geometry,
-                frame: BBox::of_frame(frame_width, frame_height),
+                frame: BBox::for_frame(frame_width, frame_height),
                 hidden,
                 views: Views::Direct(Letterbox::new(frame_width, frame_height, input)),
                 details: Vec::new(),
@@ -69,13 +69,13 @@ impl CameraRig {
             };
         };
         let views = plan.views(&geometry.mount, input.width, input.height);
-        let tables = RemapTable::of_views(&views, &geometry.lens, frame_width, frame_height);
+        let tables = RemapTable::for_views(&views, &geometry.lens, frame_width, frame_height);
         let mut planned = views.into_iter().zip(tables);
-        let views = Visible::of(planned.by_ref().take(plan.constant_count()), &hidden);
-        let details = Visible::of(planned, &hidden);
+        let views = Visible::new(planned.by_ref().take(plan.constant_count()), &hidden);
+        let details = Visible::new(planned, &hidden);
         Self {
             geometry,
-            frame: BBox::of_frame(frame_width, frame_height),
+            frame: BBox::for_frame(frame_width, frame_height),
             hidden,
             left_out: views.left_out.and(details.left_out),
             views: Views::Virtual(views.views),
@@ -116,11 +116,11 @@ impl CameraRig {
     ) -> Self {
         let tables = crops
             .iter()
-            .map(|crop| RemapTable::of_crop(crop, frame_width, frame_height));
-        let visible = Visible::of(crops.iter().copied().zip(tables), &self.hidden);
+            .map(|crop| RemapTable::for_crop(crop, frame_width, frame_height));
+        let visible = Visible::new(crops.iter().copied().zip(tables), &self.hidden);
         Self {
             geometry: self.geometry.clone(),
-            frame: BBox::of_frame(frame_width, frame_height),
+            frame: BBox::for_frame(frame_width, frame_height),
             hidden: self.hidden.clone(),
             left_out: visible.left_out,
             views: Views::Crops(visible.views),
@@ -139,7 +139,7 @@ impl CameraRig {
     ) -> Self {
         let mut rig = self.with_crops(crops, frame_width, frame_height);
         if let Views::Crops(crops) = rig.views {
-            rig.views = Views::Mosaics(Mosaic::of(grid, &crops));
+            rig.views = Views::Mosaics(Mosaic::for_crops(grid, &crops));
         }
         rig
     }
@@ -260,7 +260,7 @@ impl CameraRig {
         back_projection: BackProjection,
     ) -> Option<Footprint> {
         match &self.views {
-            Views::Virtual(views) => Footprint::of_view_box(
+            Views::Virtual(views) => Footprint::from_view_box(
                 bbox.corners(),
                 back_projection,
                 &views[view].0,
@@ -268,13 +268,13 @@ impl CameraRig {
                 &self.geometry.mount,
             ),
             Views::Crops(crops) => {
-                Footprint::of_crop_box(bbox.corners(), &crops[view].0, &self.geometry.lens)
+                Footprint::from_crop_box(bbox.corners(), &crops[view].0, &self.geometry.lens)
             }
             Views::Mosaics(mosaics) => {
                 let (crop, corners) = mosaics[view].tile_of(bbox)?;
-                Footprint::of_crop_box(corners, crop, &self.geometry.lens)
+                Footprint::from_crop_box(corners, crop, &self.geometry.lens)
             }
-            Views::Direct(letterbox) => Some(Footprint::of_frame_box(
+            Views::Direct(letterbox) => Some(Footprint::from_frame_box(
                 bbox.corners().map(|side| letterbox.frame_from_input(side)),
             )),
         }

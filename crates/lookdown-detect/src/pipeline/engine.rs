@@ -166,12 +166,12 @@ impl Engine {
             persons,
             margin,
             outside,
-        } = Placed::of(persons, foot_filter);
+        } = Placed::new(persons, foot_filter);
         let views = observation.view_counts();
         let search = observation.search();
         let searches = &self.metrics.frame_searches;
         searches.with_label_values(&[search.name()]).inc();
-        let zones = ZoneCount::of(&observation.camera.rig.geometry().areas.zones, &persons);
+        let zones = ZoneCount::for_zones(&observation.camera.rig.geometry().areas.zones, &persons);
         let calibration = observation.camera.used.clone();
         let camera = parameters.camera.clone();
         let report = DetectionReport {
@@ -311,7 +311,10 @@ impl Engine {
     /// Returns the camera's views in the motion cache, if the request enables motion detection.
     fn cached_views(&self, job: &DetectJob, seen: &Observation) -> Option<Arc<CameraViews>> {
         let camera = job.parameters.motion_camera()?;
-        Some(self.motion_cache.of(camera, &seen.camera.rig, &seen.model))
+        Some(
+            self.motion_cache
+                .camera_views(camera, &seen.camera.rig, &seen.model),
+        )
     }
 
     /// Returns the options.

@@ -113,7 +113,7 @@ pub enum PipelineError {
 }
 
 /// Converts an inference error to a pipeline error.
-pub(super) fn of_inference(error: &InferenceError) -> PipelineError {
+pub(super) fn from_inference(error: &InferenceError) -> PipelineError {
     match error {
         InferenceError::RemoteBusy { retry_after } => PipelineError::InferenceBusy {
             retry_after: *retry_after,

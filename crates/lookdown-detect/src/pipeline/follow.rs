@@ -53,7 +53,7 @@ impl FollowCache {
         let kept = self.0.get_or_renew(camera, Mutex::default, |_| false);
         let before = kept.lock().take();
         let before = before.filter(|before| before.origin.is_same(&origin));
-        let signature = FrameSignature::of(frame);
+        let signature = FrameSignature::new(frame);
         let moving = before.as_ref();
         let moving = moving.and_then(|before| before.moving(&signature, at));
         FollowedFrame {
@@ -235,7 +235,11 @@ impl FollowedFrame {
                     at: self.at,
                     searched: self.signature,
                     visible,
-                    people: FollowedPeople::of_search(&persons, seconds(self.at), before.as_ref()),
+                    people: FollowedPeople::from_search(
+                        &persons,
+                        seconds(self.at),
+                        before.as_ref(),
+                    ),
                 };
                 (persons, state)
             }

@@ -15,7 +15,7 @@ const INPUTS_PER_PERMIT: usize = 32;
 
 /// Returns the cost of a frame by the size in its header, its profile and its drawing. A frame of
 /// more than `max_pixels` will be refused.
-pub(super) fn of_frame(job: &DetectJob, max_pixels: u64) -> usize {
+pub(super) fn for_frame(job: &DetectJob, max_pixels: u64) -> usize {
     let size = job.image.size().unwrap_or((0, 0));
     if u64::from(size.0) * u64::from(size.1) > max_pixels {
         return 1;
@@ -56,8 +56,8 @@ mod tests {
     fn a_frame_that_will_be_refused_costs_one_permit() {
         let image = frame_with_disc(100, [30.0, 50.0], 8.0);
         let job = job(image, &[("profile", "paper")]);
-        assert_eq!(of_frame(&job, 9_999), 1);
-        assert_eq!(of_frame(&job, 10_000), 5);
+        assert_eq!(for_frame(&job, 9_999), 1);
+        assert_eq!(for_frame(&job, 10_000), 5);
     }
 
     #[test]
@@ -71,7 +71,7 @@ mod tests {
         ] {
             let image = frame_with_disc(100, [30.0, 50.0], 8.0);
             assert_eq!(
-                of_frame(&job(image, &[("profile", profile)]), u64::MAX),
+                for_frame(&job(image, &[("profile", profile)]), u64::MAX),
                 expected,
                 "{profile}"
             );

@@ -78,7 +78,7 @@ mod tests {
 
     fn ticket(level: u32, name: &str) -> Ticket {
         Ticket {
-            priority: Priority::of_level(level),
+            priority: Priority::from_level(level),
             client: Client::with_key(name),
             ..Ticket::default()
         }

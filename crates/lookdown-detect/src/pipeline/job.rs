@@ -137,7 +137,7 @@ impl DetectedFrame {
         // All rigs belong to one camera.
         let camera = self.rigs.first().map(|rig| rig.geometry());
         let outlines = camera.into_iter().flat_map(|camera| {
-            let outline = |zone| ZoneOutline::of(zone, &camera.lens, &camera.mount);
+            let outline = |zone| ZoneOutline::new(zone, &camera.lens, &camera.mount);
             camera.areas.zones.iter().map(outline)
         });
         outlines.collect()

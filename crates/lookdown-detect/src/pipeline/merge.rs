@@ -71,7 +71,7 @@ pub(super) fn persons(
     let Some(Pass { rig, .. }) = passes.first() else {
         return Vec::new();
     };
-    let calibration = ScoreCalibration::of(tuning, parameters.refinement);
+    let calibration = ScoreCalibration::new(tuning, parameters.refinement);
     let parameters = RefinementParameters {
         score_threshold: calibration.merged(parameters.score_threshold),
         ..*parameters
@@ -111,7 +111,7 @@ pub(super) fn possible_persons(
     profile: Profile,
     tuning: &Tuning,
 ) -> Vec<CropTarget> {
-    let calibration = ScoreCalibration::of(tuning, Refinement::Fusion);
+    let calibration = ScoreCalibration::new(tuning, Refinement::Fusion);
     let parameters = RefinementParameters {
         refinement: Refinement::Fusion,
         iou_threshold: 0.5,
@@ -253,7 +253,7 @@ pub(super) fn placed(
         bearing: bearing(nalgebra::Point2::from(bbox.center()), &geometry.lens),
         floor,
         views,
-        height: PersonHeight::of(&oriented_box, &geometry.lens, &geometry.mount),
+        height: PersonHeight::new(&oriented_box, &geometry.lens, &geometry.mount),
         zones: Person::zones_of(&geometry.areas.zones, foot, floor),
     }
 }

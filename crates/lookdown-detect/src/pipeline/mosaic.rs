@@ -36,7 +36,7 @@ pub(super) struct Mosaic {
 
 impl Mosaic {
     /// Distributes crops, whose sides are those of the grid's tiles, to as few inputs as possible.
-    pub(super) fn of(grid: Grid, crops: &[(FrameCrop, RemapTable)]) -> Vec<Self> {
+    pub(super) fn for_crops(grid: Grid, crops: &[(FrameCrop, RemapTable)]) -> Vec<Self> {
         let chunks = crops.chunks(grid.tiles());
         let mosaics = chunks.map(|tiles| Self {
             grid,
@@ -148,9 +148,9 @@ mod tests {
             [40.0, 40.0],
         ];
         let crops = crops.map(|[x, y]| crop(x, y));
-        let tables = crops.map(|crop| RemapTable::of_crop(&crop, 200, 200));
+        let tables = crops.map(|crop| RemapTable::for_crop(&crop, 200, 200));
         let crops: Vec<_> = crops.into_iter().zip(tables).collect();
-        let mosaics = Mosaic::of(Grid::Two, &crops);
+        let mosaics = Mosaic::for_crops(Grid::Two, &crops);
         assert_eq!(mosaics.len(), 2);
         let input = NetworkInput::plain(80, 80);
         let mut slot = vec![0.0; input.view_len()];
@@ -164,7 +164,7 @@ mod tests {
             let shown = [slot[index], slot[input.plane_len() + index]].map(f64::from);
             assert!((shown[0] - x).abs() < 0.6 && (shown[1] - y).abs() < 0.6);
         }
-        let wide = Mosaic::of(Grid::Three, &crops);
+        let wide = Mosaic::for_crops(Grid::Three, &crops);
         assert_eq!(wide.len(), 1);
         let last = BBox::new([45.0, 45.0, 65.0, 65.0]).unwrap();
         let (crop, _) = wide[0].tile_of(&last).unwrap();

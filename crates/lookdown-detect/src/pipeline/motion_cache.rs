@@ -56,7 +56,7 @@ struct CachedView {
 impl MotionCache {
     /// Returns the cached views of a camera. They are empty if the camera is new or if its rig or
     /// its model has changed.
-    pub(super) fn of(
+    pub(super) fn camera_views(
         &self,
         camera: &str,
         rig: &Arc<CameraRig>,
@@ -74,7 +74,7 @@ impl MotionCache {
 
     /// Returns the cached detail views of a camera, filled where the last frame had the same view.
     /// `None` if the camera is not in the cache.
-    pub(super) fn of_details(
+    pub(super) fn detail_views(
         &self,
         camera: &str,
         rig: &Arc<CameraRig>,
@@ -87,7 +87,7 @@ impl MotionCache {
 
     /// Returns the cached crops of a camera, filled where the last frame had the same crop. `None`
     /// if the camera is not in the cache.
-    pub(super) fn of_crops(
+    pub(super) fn crop_views(
         &self,
         camera: &str,
         rig: &Arc<CameraRig>,

@@ -26,7 +26,7 @@ use self::{claim::Claim, view_queue::ViewQueue};
 use super::{
     Ticket,
     camera_rig::CameraRig,
-    error::{PipelineError, internal, of_inference},
+    error::{PipelineError, from_inference, internal},
     motion_cache::CameraViews,
 };
 use crate::inference::Model;
@@ -98,7 +98,7 @@ fn serve(queue: &ViewQueue, session: usize, remappers: &ThreadPool) {
         let run = || run::execute(&claims, session, remappers, &mut batch);
         match catch_unwind(AssertUnwindSafe(run)) {
             Ok(Ok(run)) => run.dispatch(&claims),
-            Ok(Err(error)) => fail(&claims, || of_inference(&error)),
+            Ok(Err(error)) => fail(&claims, || from_inference(&error)),
             Err(_) => fail(&claims, || {
                 internal(anyhow::anyhow!("the network's thread panicked on a batch"))
             }),

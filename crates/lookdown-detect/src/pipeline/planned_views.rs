@@ -104,7 +104,7 @@ impl Engine {
         });
         let coverage = views
             .as_ref()
-            .map(|views| Coverage::of(lens, views, image_width, image_height));
+            .map(|views| Coverage::new(lens, views, image_width, image_height));
         let images = views.as_ref().map_or(1, Vec::len);
         Ok(PlannedViews {
             profile,

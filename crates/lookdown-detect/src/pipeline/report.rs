@@ -122,7 +122,7 @@ pub struct ZoneCount {
 
 impl ZoneCount {
     /// Counts the persons in each zone.
-    pub(super) fn of(zones: &[Zone], persons: &[Person]) -> Vec<Self> {
+    pub(super) fn for_zones(zones: &[Zone], persons: &[Person]) -> Vec<Self> {
         let count = |zone: &Zone| Self {
             name: zone.name.clone(),
             persons: persons

@@ -26,7 +26,7 @@ pub struct Ticket {
 impl Ticket {
     /// Creates a ticket that is not withdrawn.
     #[must_use]
-    pub fn of(priority: Priority) -> Self {
+    pub fn new(priority: Priority) -> Self {
         Self {
             priority,
             ..Self::default()

@@ -103,7 +103,7 @@ impl Timeline {
     pub(super) fn timings(&self) -> StageTimings {
         let mut timings = StageTimings::default();
         for span in &self.lock().over {
-            *timings.of_mut(span.stage) += span.ended - span.began;
+            *timings.stage_mut(span.stage) += span.ended - span.began;
         }
         timings
     }
@@ -142,7 +142,7 @@ impl Timeline {
 }
 
 impl StageTimings {
-    fn of_mut(&mut self, stage: Stage) -> &mut Duration {
+    fn stage_mut(&mut self, stage: Stage) -> &mut Duration {
         match stage {
             Stage::Decode => &mut self.decode,
             Stage::Calibrate => &mut self.calibrate,

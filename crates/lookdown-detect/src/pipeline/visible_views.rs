@@ -16,7 +16,7 @@ pub(super) struct Hidden {
 }
 
 impl Hidden {
-    pub(super) fn of(geometry: &CameraGeometry, width: u32, height: u32) -> Self {
+    pub(super) fn new(geometry: &CameraGeometry, width: u32, height: u32) -> Self {
         let CameraGeometry { lens, mount, areas } = geometry;
         let reach = AreaReach::new(&areas.foot_filter, lens, mount, width, height);
         Self {
@@ -66,7 +66,7 @@ pub(super) struct Visible<V> {
 }
 
 impl<V> Visible<V> {
-    pub(super) fn of(planned: impl Iterator<Item = (V, RemapTable)>, hidden: &Hidden) -> Self {
+    pub(super) fn new(planned: impl Iterator<Item = (V, RemapTable)>, hidden: &Hidden) -> Self {
         let mut views = Vec::new();
         let mut left_out = LeftOut::default();
         let masked = &hidden.masked;

@@ -121,7 +121,7 @@ impl WorkerPool {
     ) -> Result<T, PipelineError> {
         let ticket = job.ticket.clone();
         ticket.timeline.enter(Stage::Queue, job.arrived);
-        let cost = frame_cost::of_frame(&job, self.engine().options().decode_limits.max_pixels);
+        let cost = frame_cost::for_frame(&job, self.engine().options().decode_limits.max_pixels);
         let work = move |engine: &Engine| engine.detect(&job).map(finish);
         self.queue(ticket, cost, work).await
     }

@@ -60,7 +60,7 @@ impl Files {
 
     /// The JSON files of a COCO layout: `annotations.json`, or else those in `annotations/`, or
     /// else those in `root` itself.
-    pub(super) fn of_coco_layout(&self, root: &Path) -> Vec<PathBuf> {
+    pub(super) fn in_coco_layout(&self, root: &Path) -> Vec<PathBuf> {
         let single = root.join("annotations.json");
         if self.0.binary_search(&single).is_ok() {
             return vec![single];
@@ -105,7 +105,7 @@ impl ImageFileIndex {
     /// The image with the name `file_name` in annotations, with or without folders before it.
     pub(super) fn by_file_name(&self, file_name: &Path) -> Result<PathBuf, String> {
         let name = file_name.file_name();
-        let same_name = self.of_stem(file_name.file_stem());
+        let same_name = self.with_stem(file_name.file_stem());
         let same_name: Vec<_> = same_name
             .iter()
             .filter(|path| path.file_name() == name)
@@ -124,7 +124,7 @@ impl ImageFileIndex {
     /// folder, else in a folder of the same name except for underscores (PIROPO's `omni1A_test2` is
     /// `omni_1A_test2` in its box annotations), else anywhere.
     pub(super) fn named_like(&self, beside: &Path) -> Result<PathBuf, String> {
-        let same_stem: Vec<_> = self.of_stem(beside.file_stem()).iter().collect();
+        let same_stem: Vec<_> = self.with_stem(beside.file_stem()).iter().collect();
         let here = same_stem
             .iter()
             .find(|path| path.parent() == beside.parent());
@@ -144,7 +144,7 @@ impl ImageFileIndex {
         the_only(&found, Path::new(beside.file_stem().unwrap_or_default()))
     }
 
-    fn of_stem(&self, stem: Option<&OsStr>) -> &[PathBuf] {
+    fn with_stem(&self, stem: Option<&OsStr>) -> &[PathBuf] {
         stem.and_then(|stem| self.by_stem.get(stem))
             .map_or(&[], Vec::as_slice)
     }

@@ -74,7 +74,7 @@ mod tests {
                 })
                 .collect(),
         };
-        let curve = PrecisionRecallCurve::of_images(&[image], MatchingRule::Coco, 0.5).unwrap();
+        let curve = PrecisionRecallCurve::from_images(&[image], MatchingRule::Coco, 0.5).unwrap();
         let steps = steps(&curve);
         assert_eq!(steps, [[0.0, 1.0], [0.5, 1.0], [0.5, 0.6], [0.75, 0.6]]);
         let area: f64 = steps

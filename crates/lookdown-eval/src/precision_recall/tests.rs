@@ -8,7 +8,7 @@ use super::PrecisionRecallCurve;
 use crate::AveragePrecision;
 
 fn curve(detections: &[(f64, bool)], persons: usize) -> PrecisionRecallCurve {
-    PrecisionRecallCurve::of_detections(detections.to_vec(), NonZeroUsize::new(persons).unwrap())
+    PrecisionRecallCurve::from_detections(detections.to_vec(), NonZeroUsize::new(persons).unwrap())
 }
 
 fn assert_close(actual: f64, expected: f64) {

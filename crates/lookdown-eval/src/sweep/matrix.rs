@@ -30,7 +30,7 @@ pub fn matrix(
     frame: &Frame,
     position: usize,
 ) -> Result<Frame, FrameError> {
-    let boxes = cells.iter().filter(|cell| of_matrix(cell).is_some());
+    let boxes = cells.iter().filter(|cell| matrix_scores(cell).is_some());
     let boxes = boxes.filter_map(|(detected, _)| detected.images.get(position));
     let (columns, rows) = part_with(boxes.flatten(), frame);
     let corner = [f64::from(columns.start), f64::from(rows.start)];
@@ -40,14 +40,14 @@ pub fn matrix(
     let cell = |score_threshold: f64, sigma: f64| {
         let (detected, evaluated) = cells
             .iter()
-            .find(|cell| of_matrix(cell) == Some((score_threshold, sigma)))?;
+            .find(|cell| matrix_scores(cell) == Some((score_threshold, sigma)))?;
         let found = detected.images.get(position)?;
         let marks: Vec<Mark> = found
             .iter()
             .map(|person| mark(person, corner, scale))
             .collect();
         let mut image = small.clone();
-        annotate(&mut image, &Drawing::of(marks));
+        annotate(&mut image, &Drawing::new(marks));
         let boxes = if found.len() == 1 { "box" } else { "boxes" };
         let ap = evaluated.summary.ap50.all_point_area;
         Some(GridCell {
@@ -70,7 +70,7 @@ pub fn matrix(
 }
 
 /// `C_t` and σ of a cell of the matrix.
-fn of_matrix((detected, _): &(DetectedRow, EvaluatedRow)) -> Option<(f64, f64)> {
+fn matrix_scores((detected, _): &(DetectedRow, EvaluatedRow)) -> Option<(f64, f64)> {
     let numbers = detected.refinement?;
     (numbers.refinement == Refinement::SoftNmsGaussian)
         .then_some((numbers.score_threshold, numbers.sigma))

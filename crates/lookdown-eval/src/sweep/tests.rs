@@ -64,9 +64,9 @@ fn swept() -> Vec<(DetectedRow, EvaluatedRow)> {
                 .collect(),
         }];
         let curve =
-            |iou| PrecisionRecallCurve::of_images(&images, MatchingRule::Coco, iou).unwrap();
+            |iou| PrecisionRecallCurve::from_images(&images, MatchingRule::Coco, iou).unwrap();
         let evaluated = EvaluatedRow {
-            summary: Summary::of_images(&images, MatchingRule::Coco).unwrap(),
+            summary: Summary::from_images(&images, MatchingRule::Coco).unwrap(),
             curve_at_50: curve(0.5),
             curve_at_75: curve(0.75),
         };

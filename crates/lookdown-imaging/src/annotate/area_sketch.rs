@@ -33,7 +33,7 @@ pub struct ZoneOutline {
 impl ZoneOutline {
     /// The outline of a zone given in frame pixels, or on the floor and projected through `lens`.
     #[must_use]
-    pub fn of(zone: &Zone, lens: &Lens, mount: &Mount) -> Self {
+    pub fn new(zone: &Zone, lens: &Lens, mount: &Mount) -> Self {
         Self::in_pieces(&zone.name, &zone.outline(lens, mount, POINTS_PER_EDGE))
     }
 
@@ -97,7 +97,7 @@ pub fn sketch_areas(
             Stroke::new(from.into(), to.into(), width).draw(frame, MASK, 1.0);
         }
     }
-    let zones = zones.iter().map(|zone| ZoneOutline::of(zone, lens, mount));
+    let zones = zones.iter().map(|zone| ZoneOutline::new(zone, lens, mount));
     let zones: Vec<_> = zones.collect();
     sketch_outlines(frame, &zones, ZONE);
 }

@@ -40,13 +40,13 @@ pub fn conceal(
     concealment: Concealment,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<(), Cancelled> {
-    let mut areas: Vec<_> = marks.iter().map(|mark| Area::of(mark, frame)).collect();
+    let mut areas: Vec<_> = marks.iter().map(|mark| Area::new(mark, frame)).collect();
     areas.sort_unstable_by_key(|area| area.rows.start);
     let Some(block) = areas.iter().map(|area| area.side).reduce(u32::max) else {
         return Ok(());
     };
     let means = match concealment {
-        Concealment::Blur => Some(BlockMeans::of(frame, block)),
+        Concealment::Blur => Some(BlockMeans::new(frame, block)),
         Concealment::Silhouette => None,
     };
     let (width, height) = (frame.width(), frame.height());
@@ -84,7 +84,7 @@ struct Area {
 }
 
 impl Area {
-    fn of(mark: &Mark, frame: &Frame) -> Self {
+    fn new(mark: &Mark, frame: &Frame) -> Self {
         let corners = mark.oriented.map(|oriented| oriented.corners());
         let corners = corners.unwrap_or_else(|| mark.aligned_corners());
         let sum = |axis: usize| corners.iter().map(|corner| corner[axis]).sum::<f64>();
@@ -163,7 +163,7 @@ struct BlockMeans {
 }
 
 impl BlockMeans {
-    fn of(frame: &Frame, side: u32) -> Self {
+    fn new(frame: &Frame, side: u32) -> Self {
         let (columns, rows) = (frame.width().div_ceil(side), frame.height().div_ceil(side));
         let mut means = Vec::with_capacity((columns * rows) as usize);
         let row_bytes = 3 * frame.width() as usize;

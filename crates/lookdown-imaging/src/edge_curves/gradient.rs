@@ -25,7 +25,7 @@ pub(super) struct Gradient {
 }
 
 impl Gradient {
-    pub(super) fn of(luminance: &Plane) -> Self {
+    pub(super) fn new(luminance: &Plane) -> Self {
         let smooth = luminance.blurred(&KERNEL);
         let (width, height) = (smooth.width, smooth.height);
         let count = width * height;

@@ -36,7 +36,7 @@ impl Surround {
     ///
     /// `min_contrast` (0 to 1) is the least contrast between lens image and surround, relative to
     /// the brightness of the frame's center.
-    pub(super) fn of(frame: &Frame, min_contrast: f64) -> Option<Self> {
+    pub(super) fn new(frame: &Frame, min_contrast: f64) -> Option<Self> {
         let (width, height) = (frame.width(), frame.height());
         let margin = margin(frame);
         let side = (width.min(height) / 32).max(4);

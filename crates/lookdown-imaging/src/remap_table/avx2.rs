@@ -44,7 +44,7 @@ pub(super) fn render(_proof: Supported, source: &Source, band: &Band, planes: Pl
 
 #[target_feature(enable = "avx2")]
 fn render_with_avx2(source: &Source, band: &Band, planes: Planes) {
-    let frame_lines = FrameLines::of(source);
+    let frame_lines = FrameLines::new(source);
     let locate = |block: &Block, seen| match seen {
         Seen::Whole => whole_samples(source, block),
         Seen::Lanes(lanes) => samples(source, block, lanes),
@@ -98,7 +98,7 @@ fn sample_block(source: &Source, frame_lines: &FrameLines, samples: &Samples) ->
 fn whole_samples(source: &Source, block: &Block) -> Samples {
     let [left, top] = [0, 1].map(|axis| {
         let position = positions(block.start[axis], block.step[axis]);
-        Neighbors::of(position, _mm256_cvttps_epi32(position))
+        Neighbors::new(position, _mm256_cvttps_epi32(position))
     });
     let all = _mm256_castsi256_ps(_mm256_set1_epi32(-1));
     Samples::new(source, &left, &top, all)
@@ -143,7 +143,7 @@ struct Neighbors {
 
 impl Neighbors {
     #[target_feature(enable = "avx2")]
-    fn of(position: __m256, lower: __m256i) -> Self {
+    fn new(position: __m256, lower: __m256i) -> Self {
         Self {
             lower,
             upper_weight: _mm256_sub_ps(position, _mm256_cvtepi32_ps(lower)),
@@ -196,7 +196,7 @@ fn split(start: f32, step: f32, count: usize) -> (Neighbors, __m256) {
     let beyond = _mm256_andnot_ps(_mm256_set1_ps(-0.0), _mm256_sub_ps(position, within));
     let is_within = _mm256_cmp_ps::<_CMP_LE_OQ>(beyond, _mm256_set1_ps(0.5));
     let lower = _mm256_min_epi32(_mm256_cvttps_epi32(within), whole(count - 2));
-    (Neighbors::of(within, lower), is_within)
+    (Neighbors::new(within, lower), is_within)
 }
 
 /// Eight bytes from each of the given ones: of pixels 0, 1, 4 and 5, and of 2, 3, 6 and 7.

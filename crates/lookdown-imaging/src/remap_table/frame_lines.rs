@@ -14,7 +14,7 @@ pub(super) struct FrameLines<'a> {
 }
 
 impl<'a> FrameLines<'a> {
-    pub(super) fn of(source: &Source<'a>) -> Self {
+    pub(super) fn new(source: &Source<'a>) -> Self {
         let line = 3 * source.width;
         let lower = &source.pixels[line - 2..];
         Self {

@@ -139,7 +139,7 @@ struct Neighbors {
 
 impl Neighbors {
     #[target_feature(enable = "neon")]
-    fn of(position: float32x4_t, lower: int32x4_t) -> Self {
+    fn new(position: float32x4_t, lower: int32x4_t) -> Self {
         Self {
             lower,
             upper_weight: vsubq_f32(position, vcvtq_f32_s32(lower)),

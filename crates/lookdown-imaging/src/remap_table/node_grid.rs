@@ -29,7 +29,7 @@ pub(super) struct Nodes<'a> {
 impl NodeGrid {
     pub(super) fn new(view: &VirtualView, lens: &Lens) -> Self {
         let size = [view.width(), view.height()];
-        Self::of_positions(size, Visibility::new(view, lens), |pixel| {
+        Self::from_positions(size, Visibility::new(view, lens), |pixel| {
             let place = lens.continued_beyond_rim(&view.ray_in_camera(pixel));
             // A node without a place hides the four patches around it.
             place.unwrap_or(Pixel::new(f64::NAN, f64::NAN))
@@ -37,16 +37,16 @@ impl NodeGrid {
     }
 
     /// The nodes of a crop, in pixels of the frame (pixel centers).
-    pub(super) fn of_crop(crop: &FrameCrop) -> Self {
+    pub(super) fn for_crop(crop: &FrameCrop) -> Self {
         let size = [crop.width, crop.height];
-        Self::of_positions(size, Visibility::everywhere(size), |pixel| {
+        Self::from_positions(size, Visibility::everywhere(size), |pixel| {
             let position = cross_half_pixel(*pixel, PixelConvention::CornerOrigin);
             let position = crop.frame_from_crop(&position);
             cross_half_pixel(position, PixelConvention::PixelCenter)
         })
     }
 
-    fn of_positions(
+    fn from_positions(
         [width, height]: [u32; 2],
         visibility: Visibility,
         position: impl Fn(&Pixel) -> Pixel,

@@ -54,7 +54,7 @@ impl Footprint {
     /// Outline points beyond the lens image are pulled to its rim. `None` when most of the
     /// outline lies beyond it.
     #[must_use]
-    pub fn of_view_box(
+    pub fn from_view_box(
         view_box: [f64; 4],
         back_projection: BackProjection,
         view: &VirtualView,
@@ -64,17 +64,17 @@ impl Footprint {
         match back_projection {
             BackProjection::CornerHull => {
                 let rays = corners(view_box).map(|corner| ray_through(corner, view));
-                Self::of_outline(rays, None, lens)
+                Self::from_outline(rays, None, lens)
             }
             BackProjection::TiltedEllipse => {
                 let ellipse = Ellipse::inscribed(view_box, view, mount);
-                Self::of_outline(ellipse.outline(), Some(ellipse.extremities()), lens)
+                Self::from_outline(ellipse.outline(), Some(ellipse.extremities()), lens)
             }
         }
     }
 
     /// Maps an outline (camera frame) to the frame.
-    fn of_outline<const POINTS: usize>(
+    fn from_outline<const POINTS: usize>(
         outline_in_camera: [Ray; POINTS],
         extremities: Option<Extremities>,
         lens: &Lens,
@@ -110,7 +110,7 @@ impl Footprint {
     /// the outline is the inscribed ellipse, which touches all four sides. `None` when the middle
     /// of the box lies beyond the lens image.
     #[must_use]
-    pub fn of_crop_box(crop_box: [f64; 4], crop: &FrameCrop, lens: &Lens) -> Option<Self> {
+    pub fn from_crop_box(crop_box: [f64; 4], crop: &FrameCrop, lens: &Lens) -> Option<Self> {
         let [x_min, y_min, x_max, y_max] = crop.frame_box(crop_box);
         let center = Pixel::new(f64::midpoint(x_min, x_max), f64::midpoint(y_min, y_max));
         let half = Vector2::new(x_max - x_min, y_max - y_min) / 2.0;
@@ -132,7 +132,7 @@ impl Footprint {
 
     /// The footprint of a box found in the frame itself: its corners.
     #[must_use]
-    pub fn of_frame_box(frame_box: [f64; 4]) -> Self {
+    pub fn from_frame_box(frame_box: [f64; 4]) -> Self {
         Self {
             outline: corners(frame_box).to_vec(),
             rays: Vec::new(),

@@ -32,7 +32,7 @@ impl PersonHeight {
     /// Returns the height of a person who stands on the floor with this box. `None` without the
     /// height of the camera, below the camera, and where the angles say too little.
     #[must_use]
-    pub fn of(person: &OrientedBox, lens: &Lens, mount: &Mount) -> Option<Self> {
+    pub fn new(person: &OrientedBox, lens: &Lens, mount: &Mount) -> Option<Self> {
         let camera_m = mount.height_m()?;
         let nadir = mount.nadir();
         let ray = |end: Pixel| lens.unproject(&cross_half_pixel(end, PixelConvention::PixelCenter));
@@ -69,16 +69,16 @@ mod tests {
         let mount = Mount::new(up, Some(3.0));
         for (out_m, height_m) in [(1.5, 1.7), (3.0, 1.2), (4.0, 1.9)] {
             let person = standing(&lens, 3.0, [out_m, 0.0], height_m);
-            let found = PersonHeight::of(&person, &lens, &mount).unwrap();
+            let found = PersonHeight::new(&person, &lens, &mount).unwrap();
             assert!((found.height_m - height_m).abs() < 1e-6, "{found:?}");
             assert!((0.05..0.6).contains(&found.sd_m), "{found:?}");
         }
         let person = standing(&lens, 3.0, [2.0, 0.0], 1.7);
         assert_eq!(
-            PersonHeight::of(&person, &lens, &Mount::new(up, None)),
+            PersonHeight::new(&person, &lens, &Mount::new(up, None)),
             None
         );
         let far = standing(&lens, 3.0, [40.0, 0.0], 1.7);
-        assert_eq!(PersonHeight::of(&far, &lens, &mount), None);
+        assert_eq!(PersonHeight::new(&far, &lens, &mount), None);
     }
 }

@@ -77,7 +77,7 @@ impl Polygon {
 
     /// A frame of `width` × `height` pixels, corner-origin.
     #[must_use]
-    pub fn of_frame(width: u32, height: u32) -> Self {
+    pub fn for_frame(width: u32, height: u32) -> Self {
         let (width, height) = (f64::from(width), f64::from(height));
         let corners = [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)];
         Self {
@@ -137,7 +137,7 @@ impl Polygon {
     #[must_use]
     pub fn share_of_frame(&self, width: u32, height: u32) -> f64 {
         let mut corners = self.corners.clone();
-        for [from, to] in Self::of_frame(width, height).edges() {
+        for [from, to] in Self::for_frame(width, height).edges() {
             let inside = |point: Point2<f64>| (to - from).perp(&(point - from));
             let following: Vec<_> = corners
                 .iter()

@@ -48,7 +48,7 @@ pub struct Ring {
 }
 
 impl Ring {
-    fn of_degrees(elevation: f64, count: u32, field_of_view_deg: f64) -> Self {
+    fn from_degrees(elevation: f64, count: u32, field_of_view_deg: f64) -> Self {
         Self {
             elevation,
             count,
@@ -117,15 +117,15 @@ impl ViewPlan {
     /// rim.
     #[must_use]
     pub fn fast() -> Self {
-        Self::rings(&[Ring::of_degrees(0.9, 5, 90.0)])
+        Self::rings(&[Ring::from_degrees(0.9, 5, 90.0)])
     }
 
     /// Eight wide views from the nadir to the rim, and eight narrow detail views at the rim, where
     /// people are small.
     #[must_use]
     pub fn balanced() -> Self {
-        let wide = Self::rings(&[Ring::of_degrees(0.8, 8, 90.0)]);
-        wide.with_details(&[Ring::of_degrees(1.25, 8, 45.0)])
+        let wide = Self::rings(&[Ring::from_degrees(0.8, 8, 90.0)]);
+        wide.with_details(&[Ring::from_degrees(1.25, 8, 45.0)])
     }
 
     /// The same plan with each azimuth larger by `angle`, radians.

@@ -87,7 +87,7 @@ impl RoomCamera {
 
     /// The angle at a radius in pixels, or `None` where the curve turns back before.
     pub(super) fn theta(&self, radius: f64) -> Option<f64> {
-        Angles::of(self, radius).map(|angles| angles.theta(radius / self.focal))
+        Angles::from_camera(self, radius).map(|angles| angles.theta(radius / self.focal))
     }
 
     /// A camera that sees nearly the same edges straight in a room whose height, along the axis, is
@@ -144,7 +144,7 @@ pub(super) struct Angles {
 
 impl Angles {
     /// The table up to a radius in pixels, or `None` if the curve does not rise up to there.
-    pub(super) fn of(camera: &RoomCamera, radius: f64) -> Option<Self> {
+    pub(super) fn from_camera(camera: &RoomCamera, radius: f64) -> Option<Self> {
         let shape = camera.shape();
         let end = radius / camera.focal;
         let mut thetas = Vec::with_capacity(ENTRIES + 2);

@@ -119,7 +119,7 @@ impl CameraHeight {
         let mount = Mount::new(Unit::new_normalize(mount.world_up()), Some(NOMINAL_M));
         let heights = people
             .iter()
-            .filter_map(|person| PersonHeight::of(person, lens, &mount));
+            .filter_map(|person| PersonHeight::new(person, lens, &mount));
         let (mut heights, near): (Vec<_>, Vec<_>) = heights.partition(has_visible_feet);
         let mut bias = STATURE_BIAS;
         if heights.len() < ENOUGH_PEOPLE && !near.is_empty() {
@@ -146,7 +146,7 @@ impl CameraHeight {
             height_m,
             sd_m,
             people: people_count,
-            level: LevelFromPeople::of(people, lens, &mount),
+            level: LevelFromPeople::new(people, lens, &mount),
         })
     }
 }

@@ -47,7 +47,7 @@ pub(super) fn evaluate(
     blur: f64,
     with_steps: bool,
 ) -> Option<Evaluation> {
-    let angles = Angles::of(camera, prior.radius)?;
+    let angles = Angles::from_camera(camera, prior.radius)?;
     let directions = camera.directions();
     let mut result = Evaluation {
         evidence: 0.0,
@@ -236,7 +236,7 @@ fn add_curve(
     scale: f64,
 ) {
     let turned = directions[fit.direction].cross(&fit.normal);
-    let lens = LensSlopes::of(camera);
+    let lens = LensSlopes::new(camera);
     let mut normal = [[0.0; PARAMETERS]; PARAMETERS];
     let mut right = [0.0; PARAMETERS];
     // Sums for the elimination of the plane's own angle.
@@ -248,7 +248,7 @@ fn add_curve(
             pixels: residual,
             row,
             own_slope,
-        } = Residual::of(seen, &fit.normal, &turned, &lens);
+        } = Residual::new(seen, &fit.normal, &turned, &lens);
         own += own_slope * own_slope;
         own_residual += own_slope * residual;
         for index in 0..PARAMETERS {

@@ -123,7 +123,7 @@ impl RoomFit {
     ///
     /// # Errors
     /// [`FitRefusal`] when the edges do not determine the camera.
-    pub fn of(
+    pub fn new(
         frames: &[Vec<EdgeCurve>],
         circles: &[CircleGuess],
         known: KnownCamera,

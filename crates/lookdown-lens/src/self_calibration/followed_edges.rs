@@ -17,7 +17,7 @@ impl RoomFit {
         let mut along: [Vec<&EdgeCurve>; 3] = Default::default();
         let camera = RoomCamera::from(self);
         let (radius, _) = camera.curve(self.max_theta);
-        if let Some(angles) = Angles::of(&camera, self.focal * radius) {
+        if let Some(angles) = Angles::from_camera(&camera, self.focal * radius) {
             for edge in edges {
                 if let Some(direction) = followed_direction(edge, &camera, &angles) {
                     along[direction].push(edge);

@@ -82,7 +82,7 @@ impl FieldOfView {
     ///
     /// # Errors
     /// [`FieldOfViewError`] below [`Self::MIN_DEGREES`] and above [`Self::MAX_DEGREES`].
-    pub fn of_degrees(degrees: f64) -> Result<Self, FieldOfViewError> {
+    pub fn from_degrees(degrees: f64) -> Result<Self, FieldOfViewError> {
         let is_plausible = (Self::MIN_DEGREES..=Self::MAX_DEGREES).contains(&degrees);
         is_plausible
             .then_some(Self { degrees })
@@ -107,6 +107,6 @@ impl FromStr for FieldOfView {
 
     /// Parses degrees.
     fn from_str(text: &str) -> Result<Self, FieldOfViewError> {
-        Self::of_degrees(text.parse().map_err(|_| FieldOfViewError)?)
+        Self::from_degrees(text.parse().map_err(|_| FieldOfViewError)?)
     }
 }

@@ -36,7 +36,7 @@ pub struct LevelFromPeople {
 impl LevelFromPeople {
     /// Returns the level by boxes of people, or `None` if they do not determine it to some degrees.
     /// The height of the mount must be known, and does not matter.
-    pub(super) fn of(people: &[OrientedBox], lens: &Lens, mount: &Mount) -> Option<Self> {
+    pub(super) fn new(people: &[OrientedBox], lens: &Lens, mount: &Mount) -> Option<Self> {
         let rows: Vec<(f64, f64, f64)> = people
             .iter()
             .filter_map(|person| row(person, lens, mount))
@@ -94,13 +94,13 @@ fn row(person: &OrientedBox, lens: &Lens, mount: &Mount) -> Option<(f64, f64, f6
     let at = |axis: &Unit<Vector3<f64>>, degrees: f64| {
         let turn = Rotation3::from_axis_angle(axis, degrees.to_radians());
         let up = Unit::new_normalize(turn * mount.world_up());
-        let height = PersonHeight::of(person, lens, &Mount::new(up, mount.height_m()))?;
+        let height = PersonHeight::new(person, lens, &Mount::new(up, mount.height_m()))?;
         (height.height_m > 0.0).then(|| height.height_m.ln())
     };
     let along = |axis: Unit<Vector3<f64>>| {
         Some((at(&axis, STEP_DEG)? - at(&axis, -STEP_DEG)?) / (2.0 * STEP_DEG))
     };
-    PersonHeight::of(person, lens, mount).filter(has_visible_feet)?;
+    PersonHeight::new(person, lens, mount).filter(has_visible_feet)?;
     Some((
         at(&Vector3::x_axis(), 0.0)?,
         along(Vector3::x_axis())?,
@@ -137,7 +137,7 @@ mod tests {
             let boxes: Vec<_> = people.iter().chain(&seated)
                 .map(|(out_m, azimuth, height_m)| standing(&lens(), 3.0, [*out_m, *azimuth], *height_m))
                 .collect();
-            let level = LevelFromPeople::of(&boxes, &lens(), &mount(degrees, azimuth)).unwrap();
+            let level = LevelFromPeople::new(&boxes, &lens(), &mount(degrees, azimuth)).unwrap();
             let off = (level.difference_deg - degrees).abs();
             prop_assert!(off < 3.5 * level.sd_deg + 0.15 * degrees, "{level:?}, true {degrees}");
             prop_assert!(degrees < 8.0 || level.contradicts(0.2), "{level:?}");
@@ -149,6 +149,9 @@ mod tests {
         let boxes: Vec<_> = (0..11)
             .map(|index| standing(&lens(), 3.0, [3.0, f64::from(index)], 1.7))
             .collect();
-        assert_eq!(LevelFromPeople::of(&boxes, &lens(), &mount(0.0, 0.0)), None);
+        assert_eq!(
+            LevelFromPeople::new(&boxes, &lens(), &mount(0.0, 0.0)),
+            None
+        );
     }
 }

@@ -38,7 +38,7 @@ pub(super) struct Maximum {
 }
 
 impl Maximum {
-    fn of(camera: RoomCamera, evaluation: Evaluation) -> Self {
+    fn new(camera: RoomCamera, evaluation: Evaluation) -> Self {
         Self {
             camera,
             evaluation,
@@ -72,7 +72,7 @@ pub(super) fn maxima(
             let Some((next, _)) = &found else { break };
             camera = next.clone();
         }
-        coarse.extend(found.map(|(camera, evaluation)| Maximum::of(camera, evaluation)));
+        coarse.extend(found.map(|(camera, evaluation)| Maximum::new(camera, evaluation)));
         if coarse.len() == COARSE_STARTS {
             break;
         }
@@ -108,7 +108,7 @@ pub(super) fn fine_maxima(
         let sides = [-ASIDE, ASIDE].map(|deviations| aside(best, deviations));
         for start in sides.into_iter().flatten() {
             let found = climb(start, curves, &weights, prior, 1.0, FINE_STEPS);
-            fine.extend(found.map(|(camera, evaluation)| Maximum::of(camera, evaluation)));
+            fine.extend(found.map(|(camera, evaluation)| Maximum::new(camera, evaluation)));
         }
         best_first(&mut fine);
     }
@@ -129,7 +129,7 @@ fn followed(
 ) -> Option<Maximum> {
     let (camera, _) = climb(camera, curves, weights, prior, 1.5, 4)?;
     let (camera, evaluation) = climb(camera, curves, weights, prior, 1.0, FINE_STEPS)?;
-    Some(Maximum::of(camera, evaluation))
+    Some(Maximum::new(camera, evaluation))
 }
 
 /// The camera that the edges like best among those with another radius.

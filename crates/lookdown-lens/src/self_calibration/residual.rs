@@ -29,7 +29,7 @@ pub(super) struct LensSlopes {
 }
 
 impl LensSlopes {
-    pub(super) fn of(camera: &RoomCamera) -> Self {
+    pub(super) fn new(camera: &RoomCamera) -> Self {
         Self {
             focal: camera.focal,
             shape: camera.shape(),
@@ -67,7 +67,7 @@ pub(super) fn own_slope(seen: &SeenRay, normal: &Ray, turned: &Ray) -> (f64, f64
 }
 
 impl Residual {
-    pub(super) fn of(seen: &SeenRay, normal: &Ray, turned: &Ray, lens: &LensSlopes) -> Self {
+    pub(super) fn new(seen: &SeenRay, normal: &Ray, turned: &Ray, lens: &LensSlopes) -> Self {
         let (residual, own_slope) = own_slope(seen, normal, turned);
         let square = squared_pixels_per_unit(seen, normal);
         let factor = square.sqrt();

@@ -55,7 +55,7 @@ fn lenses(prior: &Prior, known: KnownCamera) -> impl Iterator<Item = (RoomCamera
             center,
             room: Rotation3::identity(),
         };
-        let angles = Angles::of(&camera, radius)?;
+        let angles = Angles::from_camera(&camera, radius)?;
         Some((camera, angles))
     };
     shapes.into_iter().flat_map(move |k1| {

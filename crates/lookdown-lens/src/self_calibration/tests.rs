@@ -97,7 +97,7 @@ fn assert_level(fit: &RoomFit, camera_from_room: &Rotation3<f64>, degrees: f64) 
 #[test]
 fn tilted_equisolid_camera_is_found() {
     let room = Rotation3::from_euler_angles(0.14, -0.09, 0.4);
-    let fit = RoomFit::of(&[edges(&room)], &[circle()], KnownCamera::default()).unwrap();
+    let fit = RoomFit::new(&[edges(&room)], &[circle()], KnownCamera::default()).unwrap();
     assert_level(&fit, &room, 0.2);
     let off = (fit.center[0] - CENTER[0]).hypot(fit.center[1] - CENTER[1]);
     assert!(off < 2.0, "{off} pixels off center");
@@ -114,10 +114,10 @@ fn tilted_equisolid_camera_is_found() {
 fn given_field_of_view_is_kept() {
     let room = Rotation3::from_euler_angles(0.1, 0.05, 0.2);
     let known = KnownCamera {
-        field_of_view: Some(FieldOfView::of_degrees(177.6).unwrap()),
+        field_of_view: Some(FieldOfView::from_degrees(177.6).unwrap()),
         ..equisolid()
     };
-    let fit = RoomFit::of(&[edges(&room)], &[circle()], known).unwrap();
+    let fit = RoomFit::new(&[edges(&room)], &[circle()], known).unwrap();
     assert!(
         (2.0 * fit.max_theta.to_degrees() - 177.6).abs() < 0.6,
         "{}",
@@ -129,7 +129,7 @@ fn given_field_of_view_is_kept() {
 fn few_edges_are_refused() {
     let room = Rotation3::identity();
     let few = edges(&room).split_off(70);
-    let refusal = RoomFit::of(
+    let refusal = RoomFit::new(
         std::slice::from_ref(&few),
         &[circle()],
         KnownCamera::default(),
@@ -166,7 +166,7 @@ fn clutter(count: usize) -> Vec<EdgeCurve> {
 #[test]
 fn edges_without_order_are_refused() {
     for count in [200, 1500] {
-        let fit = RoomFit::of(&[clutter(count)], &[circle()], KnownCamera::default());
+        let fit = RoomFit::new(&[clutter(count)], &[circle()], KnownCamera::default());
         assert!(
             matches!(fit, Err(FitRefusal::NoDirections { .. })),
             "{count} edges: {fit:?}"
@@ -178,7 +178,7 @@ fn edges_without_order_are_refused() {
 fn room_with_more_clutter_than_walls_is_fitted() {
     let room = Rotation3::from_euler_angles(0.14, -0.09, 0.4);
     let all = [edges(&room), clutter(700)].concat();
-    let fit = RoomFit::of(&[all], &[circle()], KnownCamera::default()).unwrap();
+    let fit = RoomFit::new(&[all], &[circle()], KnownCamera::default()).unwrap();
     assert!(fit.explained < 0.45, "{}", fit.explained);
     assert_level(&fit, &room, 0.2);
 }
@@ -187,7 +187,7 @@ fn room_with_more_clutter_than_walls_is_fitted() {
 fn clutter_makes_the_lens_less_certain() {
     let room = Rotation3::from_euler_angles(0.14, -0.09, 0.4);
     let uncertainty = |edges: Vec<EdgeCurve>| {
-        let fit = RoomFit::of(&[edges], &[circle()], KnownCamera::default()).unwrap();
+        let fit = RoomFit::new(&[edges], &[circle()], KnownCamera::default()).unwrap();
         fit.uncertainty.radius
     };
     let clear = uncertainty(edges(&room));
@@ -203,7 +203,7 @@ fn edges_of_a_coarser_raster_are_less_certain() {
         for edge in &mut edges {
             edge.scale = scale;
         }
-        RoomFit::of(&[edges], &[circle()], KnownCamera::default()).unwrap()
+        RoomFit::new(&[edges], &[circle()], KnownCamera::default()).unwrap()
     };
     let [fine, coarse] = [1.0, 4.0].map(|scale| fit(scale).uncertainty.level_deg);
     assert!(coarse > 1.5 * fine, "{coarse}°, in the finest {fine}°");
@@ -213,7 +213,7 @@ fn edges_of_a_coarser_raster_are_less_certain() {
 fn many_exact_edges_leave_the_uncertainty_of_the_lens() {
     let room = Rotation3::from_euler_angles(0.14, -0.09, 0.4);
     let many = vec![edges(&room); 15].concat();
-    let fit = RoomFit::of(&[many], &[circle()], KnownCamera::default()).unwrap();
+    let fit = RoomFit::new(&[many], &[circle()], KnownCamera::default()).unwrap();
     assert!(
         (0.003..0.004).contains(&fit.uncertainty.radius),
         "{}",
@@ -231,7 +231,7 @@ fn stretched_lens_keeps_edges_of_a_level_room_straight() {
         room: Rotation3::identity(),
     };
     let other = camera.stretched(1.1).unwrap();
-    let angles = Angles::of(&other, 540.0).unwrap();
+    let angles = Angles::from_camera(&other, 540.0).unwrap();
     assert!(other.focal > 1.03 * FOCAL, "{}", other.focal);
     for y in [-2.0, -0.5, 1.0, 3.0] {
         let line = [-3.0, -1.0, 2.0].map(|x| pixel(&Ray::new(x, y, 1.0)));
@@ -251,7 +251,7 @@ fn few_verticals_among_many_other_edges_are_enough() {
     let vertical: Vec<EdgeCurve> = vertical.into_iter().map(|(_, curve)| curve).collect();
     let other: Vec<EdgeCurve> = other.into_iter().map(|(_, curve)| curve).collect();
     let all = [vertical, vec![other; 60].concat()].concat();
-    let fit = RoomFit::of(&[all], &[circle()], KnownCamera::default()).unwrap();
+    let fit = RoomFit::new(&[all], &[circle()], KnownCamera::default()).unwrap();
     assert_level(&fit, &room, 0.3);
 }
 
@@ -273,7 +273,7 @@ fn rivals() -> (Vec<EdgeCurve>, [CircleGuess; 2]) {
 fn camera_of_another_circle_is_a_rival() {
     let (all, circles) = rivals();
     let [alone, both] = [&circles[..1], &circles[..]]
-        .map(|circles| RoomFit::of(std::slice::from_ref(&all), circles, KnownCamera::default()));
+        .map(|circles| RoomFit::new(std::slice::from_ref(&all), circles, KnownCamera::default()));
     assert!(alone.is_ok(), "{alone:?}");
     assert!(
         matches!(both, Err(FitRefusal::Ambiguous { .. })),
@@ -324,7 +324,7 @@ fn halves_of_the_image_with_two_lenses_are_refused() {
             *y = CENTER[1] + factor * (*y - CENTER[1]);
         }
     }
-    let fit = RoomFit::of(&[both], &[circle()], KnownCamera::default());
+    let fit = RoomFit::new(&[both], &[circle()], KnownCamera::default());
     let is_refused = matches!(
         fit,
         Err(FitRefusal::HalvesDisagree { .. } | FitRefusal::Uncertain { .. })

@@ -41,7 +41,7 @@ pub(super) fn upright(
     let (candidates, beside): (Vec<Ray>, Vec<Ray>) = signed
         .filter(|direction| direction.z > -MAX_TILT.to_radians().cos())
         .partition(|direction| direction.angle(&Ray::z()) < MAX_TILT.to_radians());
-    let Some(angles) = Angles::of(camera, prior.radius) else {
+    let Some(angles) = Angles::from_camera(camera, prior.radius) else {
         return (camera.clone(), true);
     };
     let above = |direction: &Ray| share_above(direction, camera, &angles, curves, evaluation);

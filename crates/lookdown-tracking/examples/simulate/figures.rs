@@ -192,7 +192,7 @@ pub const PHOTOGRAPHS_FAST: Figures = Figures {
 
 impl Figures {
     /// Returns the figures of a name on the command line.
-    pub fn of_name(name: &str) -> Option<Self> {
+    pub fn from_name(name: &str) -> Option<Self> {
         match name {
             "rendered" => Some(RENDERED),
             "photographs" => Some(PHOTOGRAPHS),

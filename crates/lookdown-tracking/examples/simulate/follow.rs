@@ -105,7 +105,7 @@ impl Follow {
         self.state = Some(State {
             searched_s: at_s,
             shown: shown.to_vec(),
-            people: FollowedPeople::of_search(&seen, at_s, before),
+            people: FollowedPeople::from_search(&seen, at_s, before),
         });
         found
     }

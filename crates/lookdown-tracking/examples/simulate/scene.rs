@@ -62,7 +62,7 @@ impl Options {
             seed: number(given.get("--seed"), 1),
             seconds: number(given.get("--seconds"), 300.0),
             persons: number(given.get("--persons"), 8),
-            figures: Figures::of_name(detector).expect("--detector is a name of figures"),
+            figures: Figures::from_name(detector).expect("--detector is a name of figures"),
             is_site: given.contains_key("--site"),
             follows: given.contains_key("--follow"),
             settings: given
@@ -115,7 +115,7 @@ impl Follower {
 
     /// The walks on the floor of the camera at this pose.
     fn walks_of(&self, pose: &CameraPose) -> Vec<Walk> {
-        let own = |&(at_s, place): &(f64, [f64; 2])| (at_s, pose.of_site(place));
+        let own = |&(at_s, place): &(f64, [f64; 2])| (at_s, pose.from_site(place));
         let walks = self.walks.values();
         walks.map(|walk| walk.iter().map(own).collect()).collect()
     }
@@ -333,7 +333,7 @@ impl Scene {
         let Ok(found) = found else {
             return Some(json!({"refused": found.err().map(|reason| reason.to_string())}));
         };
-        let [x, y] = one.of_site(other.position_m);
+        let [x, y] = one.from_site(other.position_m);
         let turn = found.yaw_deg - (other.yaw_deg - one.yaw_deg);
         Some(json!({
             "position_error_m": (found.position_m[0] - x).hypot(found.position_m[1] - y),

@@ -39,7 +39,7 @@ fn placed(found: &Found, score: f64, _: OrientedBox) -> Found {
 /// One person, found by a search at 0 s and by a crop 10 pixels further at 0.2 s.
 fn walker() -> FollowedPeople<Found> {
     let found = |x, score| Found { x, score };
-    let mut people = FollowedPeople::of_search(&[found(0.0, 0.8)], 0.0, None);
+    let mut people = FollowedPeople::from_search(&[found(0.0, 0.8)], 0.0, None);
     people.confirm(&[true], vec![found(10.0, 0.6)], 0.2, 0.3, placed);
     people
 }
@@ -72,7 +72,7 @@ fn a_crop_keeps_the_odds_of_the_search() {
 #[test]
 fn a_walker_whom_a_search_misses_is_expected_for_a_second() {
     let walker = walker();
-    let after = |at_s| FollowedPeople::of_search(&[], at_s, Some(&walker));
+    let after = |at_s| FollowedPeople::from_search(&[], at_s, Some(&walker));
     assert_eq!(after(0.9).expected(&[true], 0.9).count(), 1);
     assert_eq!(after(0.9).seen().count(), 0);
     assert_eq!(after(1.3).expected(&[true], 1.3).count(), 0);
@@ -91,7 +91,7 @@ fn motion_needs_a_search_unless_it_is_joined_to_a_person() {
 
 #[test]
 fn people_without_motion_stay_as_they_were() {
-    let mut people = FollowedPeople::of_search(&[Found { x: 0.0, score: 0.8 }], 0.0, None);
+    let mut people = FollowedPeople::from_search(&[Found { x: 0.0, score: 0.8 }], 0.0, None);
     let still = people.moving(&[[300.0, 0.0, 310.0, 10.0]], 0.2);
     assert_eq!(still, [false]);
     people.confirm(&still, vec![Found { x: 9.0, score: 0.5 }], 0.2, 0.3, placed);
@@ -101,8 +101,8 @@ fn people_without_motion_stay_as_they_were() {
 
 #[test]
 fn a_single_lucky_score_of_a_search_counts_half() {
-    let no_one = FollowedPeople::<Found>::of_search(&[], 0.0, None);
-    let people = FollowedPeople::of_search(&[Found { x: 0.0, score: 0.8 }], 1.0, Some(&no_one));
+    let no_one = FollowedPeople::<Found>::from_search(&[], 0.0, None);
+    let people = FollowedPeople::from_search(&[Found { x: 0.0, score: 0.8 }], 1.0, Some(&no_one));
     let score = people.seen().next().unwrap().score;
     assert_close(logit(score), f64::midpoint(logit(0.05), logit(0.8)));
 }

@@ -33,9 +33,9 @@ fn a_standing_person_heats_one_cell() {
 
 #[test]
 fn far_and_invalid_places_have_no_cell() {
-    assert_eq!(Cell::of([-0.1, 0.3]), Some(Cell { column: -1, row: 1 }));
+    assert_eq!(Cell::at([-0.1, 0.3]), Some(Cell { column: -1, row: 1 }));
     assert_eq!(Cell { column: -1, row: 1 }.corner_m(), [-0.25, 0.25]);
     for x in [f64::NAN, f64::INFINITY, 1e9] {
-        assert_eq!(Cell::of([x, 0.0]), None);
+        assert_eq!(Cell::at([x, 0.0]), None);
     }
 }

@@ -41,7 +41,7 @@ fn walks(people: u32, chance: &mut Chance) -> Vec<Walk> {
 fn seen(walks: &[Walk], pose: &CameraPose, error_m: f64, chance: &mut Chance) -> Vec<Walk> {
     let see = |walk: &Walk| {
         let point = |&(at_s, place): &(f64, [f64; 2])| {
-            let place = pose.of_site(place);
+            let place = pose.from_site(place);
             (at_s, place.map(|value| value + error_m * chance.next()))
         };
         walk.iter().map(point).collect()

@@ -34,7 +34,7 @@ pub(crate) struct Usage {
 
 impl Usage {
     /// Starts to observe a child.
-    pub(crate) fn of(pid: u32) -> Self {
+    pub(crate) fn for_process(pid: u32) -> Self {
         Self {
             pid,
             since: Instant::now(),

@@ -70,7 +70,8 @@ parameter_table! {
 const GEOJSON: AnswerFormat =
     AnswerFormat::Annotations(AnnotationFormat::GeoJson, BoxKind::Oriented);
 
-const IMAGES: [(AnswerFormat, &str); 2] = [of_image(ImageFormat::Jpeg), of_image(ImageFormat::Png)];
+const IMAGES: [(AnswerFormat, &str); 2] =
+    [for_image(ImageFormat::Jpeg), for_image(ImageFormat::Png)];
 /// The formats that `Accept` can select. The media types of the other formats are not specific to
 /// them.
 const NEGOTIABLE: [(AnswerFormat, &str); 4] = [
@@ -80,7 +81,7 @@ const NEGOTIABLE: [(AnswerFormat, &str); 4] = [
     (GEOJSON, GEOJSON.media_type()),
 ];
 
-const fn of_image(format: ImageFormat) -> (AnswerFormat, &'static str) {
+const fn for_image(format: ImageFormat) -> (AnswerFormat, &'static str) {
     let format = AnswerFormat::Image(format);
     (format, format.media_type())
 }
@@ -92,7 +93,7 @@ impl AnswerFormat {
         given: impl IntoIterator<Item = (&'a str, &'a str)>,
         headers: &HeaderMap,
     ) -> Result<Self, Problem> {
-        let accepted = Accepted::of(headers);
+        let accepted = Accepted::from_headers(headers);
         let given = GivenParameters::read(TABLE, given)?;
         let boxes = if given.value(&ORIENTED)? {
             BoxKind::Oriented

@@ -112,13 +112,13 @@ fn value_of(name: &str, bytes: &[u8]) -> Result<String, Problem> {
 }
 
 fn invalid(name: &str, fault: &str) -> Problem {
-    Problem::of_parameter(ProblemKind::InvalidParameter, name, fault)
+    Problem::for_parameter(ProblemKind::InvalidParameter, name, fault)
 }
 
 fn missing_image() -> Problem {
     let fault = "the form has no frame: send one in the field `img` or `image`, as in curl -F \
                  img=@frame.jpg";
-    Problem::of_parameter(ProblemKind::MissingImage, "img", fault)
+    Problem::for_parameter(ProblemKind::MissingImage, "img", fault)
 }
 
 /// Returns true for the name of an image file, which curl sends for `-F img=frame.jpg`.
@@ -131,12 +131,12 @@ fn is_file_name(content: &[u8]) -> bool {
 fn name_instead_of_file(name: &str) -> Problem {
     let fault = "the value is the name of a file, not its content: put @ before the name, as in \
                  curl -F img=@frame.jpg";
-    Problem::of_parameter(ProblemKind::MissingImage, name, fault)
+    Problem::for_parameter(ProblemKind::MissingImage, name, fault)
 }
 
 fn second_image(name: &str) -> Problem {
     let fault = "the form has two frames: send one frame per request";
-    Problem::of_parameter(ProblemKind::RepeatedParameter, name, fault)
+    Problem::for_parameter(ProblemKind::RepeatedParameter, name, fault)
 }
 
 /// Returns the last segment of a path of any operating system, if it is a name.

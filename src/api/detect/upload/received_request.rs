@@ -37,7 +37,7 @@ impl FromRequest<ApiState> for ReceivedRequest {
     type Rejection = Problem;
 
     async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
-        let context = RequestContext::of(request.extensions())?;
+        let context = RequestContext::from_extensions(request.extensions())?;
         let access = &state.options.access;
         access.check(request.headers(), &context.identity, Scope::Detect)?;
         Self::receive(request, state, &state.uploads).await
@@ -56,14 +56,14 @@ impl ReceivedRequest {
         if state.readiness.phase() == Phase::WarmingUp {
             return Err(Problem::warming_up());
         }
-        let context = RequestContext::of(&parts.extensions)?;
+        let context = RequestContext::from_extensions(&parts.extensions)?;
         let client = &context.caller.client;
         // A frame that finds no place in the queue is refused before its body is read.
         state.workers.admits(client)?;
         let max_bytes = state.options.max_body_bytes;
         let remedy = "send a smaller image or raise server.max_body_bytes";
         let reader = BodyReader {
-            budget: budget.of(client),
+            budget: budget.for_client(client),
             ..state.body_reader(&context, max_bytes, remedy)
         };
         let body = reader.read(&parts.headers, body).await?;

@@ -28,7 +28,7 @@ impl UploadBudget {
     }
 
     /// Returns the same budget as a client may use it.
-    pub(in crate::api) fn of(&self, client: &Client) -> Self {
+    pub(in crate::api) fn for_client(&self, client: &Client) -> Self {
         Self {
             client: client.clone(),
             ..self.clone()

@@ -28,7 +28,7 @@ pub(in crate::api) fn with_failures(routes: Router<ApiState>) -> Router<ApiState
     let not_found = any(async || StatusCode::NOT_FOUND);
     routes
         .route(OTHER_PATHS, not_found)
-        .layer(CatchPanicLayer::custom(envelope::of_panic))
+        .layer(CatchPanicLayer::custom(envelope::panic_response))
         .layer(map_response(as_deepstack))
 }
 

@@ -65,7 +65,7 @@ impl FromRequest<ApiState> for DeepStackUpload {
         // up the memory of the others.
         let mut budget = &state.uploads;
         if !is_form || access::shows_key(headers) {
-            let context = RequestContext::of(request.extensions())?;
+            let context = RequestContext::from_extensions(request.extensions())?;
             known.check(headers, &context.identity, Scope::Detect)?;
         } else if known.needs_keys() {
             budget = &state.unauthenticated_uploads;
@@ -112,7 +112,7 @@ fn use_of(name: &str) -> Result<FieldUse, Problem> {
 fn no_form() -> Problem {
     let fault = "send the frame in a form (multipart/form-data), as in curl -F \
                  image=@frame.jpg";
-    Problem::of_parameter(ProblemKind::MissingImage, "image", fault)
+    Problem::for_parameter(ProblemKind::MissingImage, "image", fault)
 }
 
 impl DeepStackUpload {

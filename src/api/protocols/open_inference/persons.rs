@@ -95,7 +95,7 @@ pub(super) async fn infer(
         let done = detect(state, context, job, tokens).await;
         let answered = done.map_err(|problem| {
             if is_batch {
-                problem.of_element(INPUT, index)
+                problem.for_element(INPUT, index)
             } else {
                 problem
             }
@@ -127,7 +127,7 @@ async fn detect(
         tokens.take()?;
     }
     let write =
-        |found: AnswerInput<'_>| Ok(FrameOutputs::of(&found.report.persons, found.json.clone()));
+        |found: AnswerInput<'_>| Ok(FrameOutputs::new(&found.report.persons, found.json.clone()));
     run_detection(state, context, job, write).await
 }
 
@@ -150,7 +150,7 @@ impl FrameOutputs {
         clippy::cast_possible_truncation,
         reason = "FP32 outputs have this precision"
     )]
-    fn of(persons: &[ReportPerson], report: Bytes) -> Self {
+    fn new(persons: &[ReportPerson], report: Bytes) -> Self {
         let floats = |of: fn(&ReportPerson) -> Vec<f64>| {
             let values = persons.iter().flat_map(of);
             values.map(|value| value as f32).collect()

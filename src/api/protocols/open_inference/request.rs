@@ -62,7 +62,7 @@ impl InferRequest {
             && id.chars().count() > MAX_ID_CHARS
         {
             let fault = format!("it has more than {MAX_ID_CHARS} characters");
-            let problem = Problem::of_parameter(ProblemKind::InvalidParameter, "id", &fault);
+            let problem = Problem::for_parameter(ProblemKind::InvalidParameter, "id", &fault);
             return Err(problem);
         }
         let outputs = head.outputs.map_or_else(Vec::new, |outputs| outputs.0);

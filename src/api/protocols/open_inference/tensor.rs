@@ -66,7 +66,7 @@ fn frame_count(datatype: &str, shape: &[u32]) -> Result<usize, String> {
 
 /// Returns the problem of an unusable tensor.
 pub(super) fn misfit(name: &str, wrong: &str) -> Problem {
-    Problem::of_parameter(ProblemKind::InvalidTensor, shortened(name), wrong)
+    Problem::for_parameter(ProblemKind::InvalidTensor, shortened(name), wrong)
 }
 
 /// Refuses the parameters of a tensor that are left when the `known` one is taken.

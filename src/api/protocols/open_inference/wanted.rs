@@ -28,7 +28,7 @@ impl Wanted {
         outputs: impl Iterator<Item = RequestedOutput>,
     ) -> Result<Self, Problem> {
         let all_binary = flag(parameters, ALL_BINARY).map_err(|wrong| {
-            Problem::of_parameter(ProblemKind::InvalidParameter, ALL_BINARY, &wrong)
+            Problem::for_parameter(ProblemKind::InvalidParameter, ALL_BINARY, &wrong)
         })?;
         let mut named: Vec<(String, Option<bool>)> = Vec::new();
         for RequestedOutput {

@@ -139,7 +139,7 @@ fn fitted(
     let mut frames: Vec<RoomFrame> = Vec::with_capacity(images.len());
     for image in images {
         let decoded = decode(image, limits).map_err(|error| refused(&error.to_string()))?;
-        let frame = RoomFrame::of(&decoded.frame);
+        let frame = RoomFrame::new(&decoded.frame);
         if let Some(first) = frames.first()
             && first.size() != frame.size()
         {
@@ -160,5 +160,5 @@ fn fitted(
 }
 
 fn refused(fault: &str) -> Problem {
-    Problem::of_parameter(ProblemKind::InvalidParameter, "image", fault)
+    Problem::for_parameter(ProblemKind::InvalidParameter, "image", fault)
 }

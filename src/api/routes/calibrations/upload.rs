@@ -66,7 +66,7 @@ impl CalibrationUpload {
     fn new(content: Bytes, camera: Option<String>, size: Option<String>) -> Result<Self, Problem> {
         let size = size.map(|text| text.parse()).transpose();
         let size = size.map_err(|error: NotAFrameSize| {
-            Problem::of_parameter(ProblemKind::InvalidParameter, "size", &error.to_string())
+            Problem::for_parameter(ProblemKind::InvalidParameter, "size", &error.to_string())
         })?;
         Ok(Self {
             content,
@@ -77,7 +77,7 @@ impl CalibrationUpload {
 
 async fn content(request: Request, state: &ApiState) -> Result<(Bytes, Uri), Problem> {
     let (parts, body) = request.into_parts();
-    let context = RequestContext::of(&parts.extensions)?;
+    let context = RequestContext::from_extensions(&parts.extensions)?;
     let remedy = "send a calibration file";
     let max_bytes = CalibrationFile::MAX_BYTES;
     let reader = state.body_reader(&context, max_bytes, remedy);

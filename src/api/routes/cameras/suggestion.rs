@@ -35,7 +35,7 @@ pub(super) enum SuggestionState {
 }
 
 impl SuggestionState {
-    fn of(found: &Suggestion) -> Self {
+    fn new(found: &Suggestion) -> Self {
         let is_refused = match &found.fit {
             Some(fit) => fit.is_err(),
             None => matches!(found.height, Some(Err(_))),
@@ -50,8 +50,8 @@ impl SuggestionState {
 
 /// The state of the suggestion of a camera, if the server looks for one.
 pub(super) fn state_of(state: &ApiState, camera: &str) -> Option<SuggestionState> {
-    let found = state.suggestions.of(camera)?;
-    Some(SuggestionState::of(&found))
+    let found = state.suggestions.for_camera(camera)?;
+    Some(SuggestionState::new(&found))
 }
 
 /// A reason for not having a value.
@@ -126,7 +126,7 @@ pub(in crate::api) async fn get(
     _reader: RequireRead,
     Path(camera): Path<String>,
 ) -> Result<impl IntoResponse, Problem> {
-    let found = state.suggestions.of(&camera).ok_or_else(|| {
+    let found = state.suggestions.for_camera(&camera).ok_or_else(|| {
         let detail = "no named frame of this camera has arrived since the start, or its calibration \
                       has all values: GET /calibrations lists them";
         Problem::new(ProblemKind::NotFound, detail)
@@ -137,7 +137,7 @@ pub(in crate::api) async fn get(
 
 impl From<Suggestion> for SuggestedCalibration {
     fn from(found: Suggestion) -> Self {
-        let state = SuggestionState::of(&found);
+        let state = SuggestionState::new(&found);
         let (lens, lens_refusal) = split(found.fit, |fit| FoundLens::from(&fit), Refusal::from);
         let (height, height_refusal) = split(found.height, FoundHeight::from, Refusal::from);
         Self {

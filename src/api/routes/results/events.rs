@@ -50,7 +50,7 @@ const ACCEL_BUFFERING: HeaderName = HeaderName::from_static("x-accel-buffering")
          body = String, content_type = "text/event-stream"),
     )
 )]
-pub(in crate::api) async fn of_camera(
+pub(in crate::api) async fn camera_events(
     State(state): State<ApiState>,
     _reader: RequireRead,
     caller: Caller,
@@ -75,7 +75,7 @@ pub(in crate::api) async fn of_camera(
          body = String, content_type = "text/event-stream"),
     )
 )]
-pub(in crate::api) async fn of_all(
+pub(in crate::api) async fn all_events(
     State(state): State<ApiState>,
     _reader: RequireRead,
     caller: Caller,

@@ -40,7 +40,7 @@ impl FromRequest<ApiState> for FollowedPersons {
 
     async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
         let (parts, body) = request.into_parts();
-        let context = RequestContext::of(&parts.extensions)?;
+        let context = RequestContext::from_extensions(&parts.extensions)?;
         let remedy = "send an object such as {\"persons\": 5}";
         let reader = state.body_reader(&context, MAX_BYTES, remedy);
         let bytes = reader.read(&parts.headers, body).await?.into_bytes();

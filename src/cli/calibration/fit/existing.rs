@@ -26,7 +26,7 @@ pub(super) fn existing(arguments: &Arguments) -> anyhow::Result<Option<NativeCal
         return Ok(None);
     };
     let path = out.display();
-    let source = Source::of(out.clone());
+    let source = Source::new(out.clone());
     let native = source.read_one().and_then(|(format, _)| {
         let (native, _) = source.read_native(None)?;
         if format != Format::Native {

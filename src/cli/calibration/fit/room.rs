@@ -20,7 +20,7 @@ pub(super) fn fit(
     frames: &[Frame],
 ) -> anyhow::Result<NativeCalibration> {
     let known = arguments.known();
-    let edges: Vec<_> = frames.iter().map(RoomFrame::of).collect();
+    let edges: Vec<_> = frames.iter().map(RoomFrame::new).collect();
     let fit = fit_room(&edges, known).context(
         "the camera cannot be fitted; --lens, --field-of-view and --ceiling take what is known of it, and --circle-only \
          detects the lens circle and assumes the rest",

@@ -78,7 +78,7 @@ impl EndToEndHead {
                 ));
             }
         };
-        let indices = Indices::of(columns)?;
+        let indices = Indices::new(columns)?;
         let mut axes = match indices.view {
             None => vec![Axis::Views],
             Some(_) => vec![Axis::Any; dimensions.len().saturating_sub(2)],

@@ -26,7 +26,7 @@ impl Grid {
     }
 
     /// The cells of a map whose last two axes are [`Grid::axes`].
-    pub(super) fn of_map(map: &TensorView<'_>, batch: &Batch) -> Self {
+    pub(super) fn from_map(map: &TensorView<'_>, batch: &Batch) -> Self {
         let side = |from_last: usize| {
             let index = map.shape.len().checked_sub(from_last);
             let cells = index.and_then(|index| map.shape.get(index));
@@ -45,7 +45,7 @@ impl Grid {
     }
 
     /// Square cells of `stride` pixels. The last ones may reach beyond the input.
-    pub(super) fn of_stride(stride: NonZeroU32, batch: &Batch) -> Self {
+    pub(super) fn from_stride(stride: NonZeroU32, batch: &Batch) -> Self {
         let side = f64::from(stride.get());
         Self {
             columns: batch.width.div_ceil(stride.get()),
@@ -84,7 +84,7 @@ pub(super) fn default_strides() -> Vec<NonZeroU32> {
 pub(super) fn pyramid_len(strides: &[NonZeroU32], batch: &Batch) -> usize {
     strides
         .iter()
-        .map(|&stride| Grid::of_stride(stride, batch).len())
+        .map(|&stride| Grid::from_stride(stride, batch).len())
         .fold(0, usize::saturating_add)
 }
 
@@ -94,7 +94,7 @@ pub(super) fn pyramid(
     batch: &Batch,
 ) -> impl Iterator<Item = (Grid, [f64; 2])> {
     strides.iter().flat_map(|&stride| {
-        let grid = Grid::of_stride(stride, batch);
+        let grid = Grid::from_stride(stride, batch);
         grid.cells().map(move |cell| (grid, cell))
     })
 }

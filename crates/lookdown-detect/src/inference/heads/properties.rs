@@ -28,7 +28,7 @@ struct Outputs {
 }
 
 impl Outputs {
-    fn of((manifest, a, b): Case, views: usize, spoil: Option<(bool, usize, usize)>) -> Self {
+    fn new((manifest, a, b): Case, views: usize, spoil: Option<(bool, usize, usize)>) -> Self {
         let mut shapes = [a, b].map(|shape| {
             let in_batch = |&dimension| if dimension == N { views } else { dimension };
             shape.iter().map(in_batch).collect::<Vec<_>>()
@@ -70,7 +70,7 @@ impl Outputs {
 fn outputs() -> impl Strategy<Value = Outputs> {
     let spoil = prop::option::of((any::<bool>(), 0..5_usize, 0..10_usize));
     (prop::sample::select(CASES.to_vec()), 0..3_usize, spoil)
-        .prop_map(|(case, views, spoil)| Outputs::of(case, views, spoil))
+        .prop_map(|(case, views, spoil)| Outputs::new(case, views, spoil))
 }
 
 fn outputs_and_values() -> impl Strategy<Value = (Outputs, [Vec<f32>; 2])> {

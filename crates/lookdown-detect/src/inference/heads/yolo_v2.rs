@@ -66,7 +66,7 @@ impl Decoder for YoloV2Head {
         collector: &mut CandidateCollector,
     ) -> Result<(), String> {
         let map = self.select(outputs, batch)?;
-        let grid = Grid::of_map(map, batch);
+        let grid = Grid::from_map(map, batch);
         let channels = map.shape[1] / self.anchors.len();
         let person = usize::from(self.person_class);
         let floor = collector.floor;

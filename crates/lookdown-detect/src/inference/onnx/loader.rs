@@ -10,6 +10,6 @@ use crate::inference::{Model, ModelLoader};
 pub fn onnx_loader(library: PathBuf, options: OnnxOptions, sessions: NonZeroUsize) -> ModelLoader {
     Box::new(move |path| {
         let (first, others) = OnnxDetector::load_sessions(&library, path, &options, sessions)?;
-        Ok(Model::of_sessions(first, others))
+        Ok(Model::from_sessions(first, others))
     })
 }

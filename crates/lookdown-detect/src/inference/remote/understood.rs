@@ -59,7 +59,7 @@ impl RemoteModel {
             check_tensor(tensor).map_err(unusable)?;
         }
         let (inputs, outputs) = (tensors(&model.inputs), tensors(&model.outputs));
-        let signature = Signature::of(&inputs, &manifest.input, &Metadata::default());
+        let signature = Signature::new(&inputs, &manifest.input, &Metadata::default());
         let signature = signature.map_err(unusable)?;
         let shapes: Vec<_> = float_shapes(&outputs).collect();
         let size = (signature.width, signature.height);

@@ -27,7 +27,7 @@ impl Engine {
         };
         let rig = Arc::new(rig);
         let camera = job.parameters.motion_camera();
-        let cached = camera.and_then(|camera| self.motion_cache.of_crops(camera, &rig, &model));
+        let cached = camera.and_then(|camera| self.motion_cache.crop_views(camera, &rig, &model));
         Some(self.queue_later(job, observation, rig, model, cached))
     }
 

@@ -18,7 +18,7 @@ impl Engine {
         let rig = Arc::new(observation.camera.rig.with_details_of(targets)?);
         let model = Arc::clone(&observation.model);
         let camera = job.parameters.motion_camera();
-        let cached = camera.and_then(|camera| self.motion_cache.of_details(camera, &rig, &model));
+        let cached = camera.and_then(|camera| self.motion_cache.detail_views(camera, &rig, &model));
         Some(self.queue_later(job, observation, rig, model, cached))
     }
 }

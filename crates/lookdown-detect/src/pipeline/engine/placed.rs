@@ -17,7 +17,7 @@ pub(super) struct Placed {
 
 impl Placed {
     /// Sorts persons by the places of their feet, in their order.
-    pub(super) fn of(persons: Vec<Person>, filter: &FootFilter) -> Self {
+    pub(super) fn new(persons: Vec<Person>, filter: &FootFilter) -> Self {
         let mut placed = Self {
             margin: (!filter.areas.is_empty()).then(Vec::new),
             ..Self::default()

@@ -41,7 +41,7 @@ impl BatchSlot<'_> {
         let (task, view) = (self.task, self.view);
         task.rig.render_view(view, &task.frame, input, planes);
         if let Some(seen_before) = &task.seen_before {
-            let signature = ViewSignature::of(planes, input);
+            let signature = ViewSignature::new(planes, input);
             self.still = seen_before.lookup(view, &signature);
             self.signature = Some(signature);
         }

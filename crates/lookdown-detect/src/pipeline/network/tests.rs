@@ -90,7 +90,7 @@ fn bench(sessions: usize, max_views: usize, max_delay: Duration) -> Bench {
     Bench {
         inference: InferenceThreads::start(sessions, options, &Arc::new(remappers.unwrap()))
             .unwrap(),
-        model: Arc::new(Model::of_boxed(first, gated)),
+        model: Arc::new(Model::from_boxed(first, gated)),
         rig: Arc::new(rig),
         begins,
         go,
@@ -144,7 +144,7 @@ fn an_urgent_frame_overtakes_one_that_has_not_begun() {
     let before = bench.submit(1, Ticket::default());
     bench.next_run();
     let usual = bench.submit(10, Ticket::default());
-    let urgent = bench.submit(20, Ticket::of(Priority::High));
+    let urgent = bench.submit(20, Ticket::new(Priority::High));
     bench.let_go(3);
     assert_eq!(bench.next_run(), (4, 20.0));
     assert_eq!(bench.next_run(), (4, 10.0));

@@ -24,9 +24,9 @@ impl Distances {
     }
 
     /// At every third pixel of one view of each ring.
-    fn of(lens: &Lens, plan: &ViewPlan, side: u32) -> Self {
+    fn new(lens: &Lens, plan: &ViewPlan, side: u32) -> Self {
         let views = plan.views(&Mount::default(), side, side);
-        let tables = RemapTable::of_views(&views, lens, FRAME_SIDE, FRAME_SIDE);
+        let tables = RemapTable::for_views(&views, lens, FRAME_SIDE, FRAME_SIDE);
         let mut distances = Self::default();
         let mut grids = HashSet::new();
         for (view, table) in views.iter().zip(&tables) {
@@ -69,9 +69,9 @@ impl Distances {
 #[test]
 fn tables_are_as_exact_as_they_say_for_every_lens_model() {
     for lens in every_lens() {
-        let in_three_rings = Distances::of(&lens, &three_rings(), 416);
+        let in_three_rings = Distances::new(&lens, &three_rings(), 416);
         let wide = ViewPlan::paper(FieldOfViewReading::Literal);
-        let in_widest_plan = Distances::of(&lens, &wide, 300);
+        let in_widest_plan = Distances::new(&lens, &wide, 300);
         let (of_rings, of_widest) = match lens.model() {
             // Stretches what is far from its axis …
             "rectilinear" => ([1.2, 0.14], [2.6, 0.22]),

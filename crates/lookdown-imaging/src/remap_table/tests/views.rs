@@ -30,7 +30,7 @@ fn a_view_shows_what_lies_at_its_positions() {
     let (width, height) = (45, 37);
     let input = NetworkInput::plain(width, height);
     let views = three_rings().views(&Mount::default(), width, height);
-    for table in RemapTable::of_views(&views, &lens, 200, 150) {
+    for table in RemapTable::for_views(&views, &lens, 200, 150) {
         let mut slot = vec![-1.0; input.view_len()];
         table.render(&frame, &input, &mut slot);
         let mut sees_anything = false;
@@ -66,7 +66,7 @@ fn channel_order_scale_and_offset_are_applied_per_plane() {
     let lens = Lens::equidistant_circle(19.5, 19.5, 20.0, 0.3).unwrap();
     let view = VirtualView::looking_along(&Ray::z(), 16.0, &Mount::default(), 16, 16);
     let mut slot = vec![f32::NAN; input.view_len()];
-    RemapTable::of_views(&[view], &lens, 40, 40)[0].render(&frame, &input, &mut slot);
+    RemapTable::for_views(&[view], &lens, 40, 40)[0].render(&frame, &input, &mut slot);
     let at = |x: usize, y: usize| [0, 1, 2].map(|plane| slot[plane * 256 + y * 16 + x]);
     assert_eq!(at(8, 8), [30.5, 40.0, 29.0]);
     assert_eq!(at(0, 0), [0.5, 0.0, -1.0], "beyond the rim is black");
@@ -76,7 +76,7 @@ fn channel_order_scale_and_offset_are_applied_per_plane() {
 fn a_shared_grid_puts_every_view_of_a_ring_where_its_own_would() {
     for lens in every_lens() {
         let views = three_rings().views(&Mount::default(), 104, 104);
-        let tables = RemapTable::of_views(&views, &lens, FRAME_SIDE, FRAME_SIDE);
+        let tables = RemapTable::for_views(&views, &lens, FRAME_SIDE, FRAME_SIDE);
         let expected_grids = if lens.model() == "mei" {
             views.len()
         } else {
@@ -85,7 +85,7 @@ fn a_shared_grid_puts_every_view_of_a_ring_where_its_own_would() {
         assert_eq!(grid_count(&tables), expected_grids, "{}", lens.model());
         for (view, table) in views.iter().zip(&tables) {
             let own =
-                RemapTable::of_views(std::slice::from_ref(view), &lens, FRAME_SIDE, FRAME_SIDE);
+                RemapTable::for_views(std::slice::from_ref(view), &lens, FRAME_SIDE, FRAME_SIDE);
             for (x, y) in (0..104)
                 .step_by(9)
                 .flat_map(|y| (0..104).map(move |x| (x, y)))
@@ -106,7 +106,7 @@ fn a_shared_grid_puts_every_view_of_a_ring_where_its_own_would() {
 fn every_pixel_of_a_whole_patch_shows_the_lens_image() {
     for lens in every_lens() {
         let views = three_rings().views(&Mount::default(), 100, 100);
-        let tables = RemapTable::of_views(&views, &lens, FRAME_SIDE, FRAME_SIDE);
+        let tables = RemapTable::for_views(&views, &lens, FRAME_SIDE, FRAME_SIDE);
         let last = f64::from(FRAME_SIDE - 1);
         let mut whole = 0;
         for (table, band) in tables.iter().flat_map(|table| {
@@ -136,7 +136,7 @@ fn every_pixel_of_a_whole_patch_shows_the_lens_image() {
 fn views_not_rotated_about_the_optical_axis_share_nothing() {
     let lens = Lens::equidistant_circle(99.5, 99.5, 100.0, 1.5).unwrap();
     let views = three_rings().views(&tilted(), 64, 64);
-    let tables = RemapTable::of_views(&views, &lens, 200, 200);
+    let tables = RemapTable::for_views(&views, &lens, 200, 200);
     assert_eq!(grid_count(&tables), views.len());
     let all = RemapTable::bytes(&tables);
     let each: usize = tables.iter().map(|table| RemapTable::bytes([table])).sum();
@@ -147,7 +147,7 @@ fn views_not_rotated_about_the_optical_axis_share_nothing() {
 fn shared_grids_count_once() {
     let lens = Lens::equidistant_circle(99.5, 99.5, 100.0, 1.5).unwrap();
     let views = ViewPlan::fast().views(&Mount::default(), 64, 64);
-    let tables = RemapTable::of_views(&views, &lens, 200, 200);
+    let tables = RemapTable::for_views(&views, &lens, 200, 200);
     let one = RemapTable::bytes(&tables[..1]);
     let own = size_of::<RemapTable>() + tables[1].whole_patches.bytes();
     assert_eq!(RemapTable::bytes(&tables), one + (tables.len() - 1) * own);
@@ -167,7 +167,7 @@ fn a_crop_of_scale_one_is_the_turned_frame() {
             width,
             height,
         };
-        let table = RemapTable::of_crop(&crop, 60, 40);
+        let table = RemapTable::for_crop(&crop, 60, 40);
         let mut slot = vec![-1.0; input.view_len()];
         table.render(&frame, &input, &mut slot);
         for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
@@ -199,11 +199,11 @@ fn a_crop_beyond_the_frame_is_black_there() {
         width: 16,
         height: 16,
     };
-    let table = RemapTable::of_crop(&crop(0.0), 40, 40);
+    let table = RemapTable::for_crop(&crop(0.0), 40, 40);
     let mut slot = vec![-1.0; input.view_len()];
     table.render(&frame, &input, &mut slot);
     let row = &slot[..16];
     assert!(row[..8].iter().all(|&value| value == 0.0), "{row:?}");
     assert!(row[8..].iter().all(|&value| value == 200.0), "{row:?}");
-    assert!(!RemapTable::of_crop(&crop(-100.0), 40, 40).sees_anything());
+    assert!(!RemapTable::for_crop(&crop(-100.0), 40, 40).sees_anything());
 }

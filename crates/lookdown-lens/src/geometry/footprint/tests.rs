@@ -79,7 +79,7 @@ fn mean_overlap(back_projection: BackProjection, distance_m: f64, azimuth: f64) 
             let box_in_view = [seen[0] + 0.5, seen[1] + 0.5, seen[2] + 0.5, seen[3] + 0.5];
             whole.then(|| {
                 let footprint =
-                    Footprint::of_view_box(box_in_view, back_projection, view, &lens, &mount);
+                    Footprint::from_view_box(box_in_view, back_projection, view, &lens, &mount);
                 overlap(footprint.expect("inside the lens image").bounds(), truth)
             })
         })
@@ -116,7 +116,7 @@ fn a_box_beyond_the_lens_image_has_no_footprint() {
     let top = [100.0, 0.0, 200.0, 60.0];
     for back_projection in [BackProjection::CornerHull, BackProjection::TiltedEllipse] {
         assert_eq!(
-            Footprint::of_view_box(top, back_projection, view, &lens, &mount),
+            Footprint::from_view_box(top, back_projection, view, &lens, &mount),
             None
         );
     }
@@ -145,7 +145,7 @@ proptest! {
         let (lens, mount) = (lens(), Mount::default());
         let view = &ViewPlan::balanced().views(&mount, 300, 300)[view];
         let view_box = [x, y, x + width, y + height];
-        let footprint = Footprint::of_view_box(view_box, BackProjection::TiltedEllipse, view, &lens, &mount);
+        let footprint = Footprint::from_view_box(view_box, BackProjection::TiltedEllipse, view, &lens, &mount);
         if let Some(footprint) = footprint {
             let [x_min, y_min, x_max, y_max] = footprint.bounds();
             prop_assert!(x_min >= -1e-6 && y_min >= -1e-6 && x_max <= 600.0 + 1e-6 && y_max <= 600.0 + 1e-6);
@@ -174,7 +174,7 @@ proptest! {
             f64::midpoint(expected[0], expected[2]) - 0.5,
             f64::midpoint(expected[1], expected[3]) - 0.5,
         );
-        let footprint = Footprint::of_crop_box(found, &crop, &lens());
+        let footprint = Footprint::from_crop_box(found, &crop, &lens());
         prop_assert_eq!(footprint.is_some(), lens().unproject(&center).is_some());
         if let Some(footprint) = footprint {
             for (side, expected) in footprint.bounds().into_iter().zip(expected) {

@@ -82,7 +82,7 @@ fn an_outline_that_only_touches_itself_is_refused_too() {
 
 #[test]
 fn areas_meet_where_they_overlap_contain_each_other_or_touch() {
-    let frame = Polygon::of_frame(10, 10);
+    let frame = Polygon::for_frame(10, 10);
     let square = |left: f64, top: f64, side: f64| {
         let (right, bottom) = (left + side, top + side);
         Polygon::new(&[[left, top], [right, top], [right, bottom], [left, bottom]]).unwrap()

@@ -17,7 +17,7 @@ pub struct Coverage {
 impl Coverage {
     /// Measures `views` on a frame of `width` × `height` pixels, at points of a regular grid.
     #[must_use]
-    pub fn of(lens: &Lens, views: &[VirtualView], width: u32, height: u32) -> Self {
+    pub fn new(lens: &Lens, views: &[VirtualView], width: u32, height: u32) -> Self {
         let position = |index: u32, side: u32| {
             (f64::from(index) + 0.5) / f64::from(SAMPLES) * f64::from(side) - 0.5
         };
@@ -52,13 +52,13 @@ mod tests {
         let views = ViewPlan::balanced().views(&Mount::default(), 416, 416);
         let coverage = |max_theta: f64| {
             let lens = Lens::equidistant_circle(499.5, 499.5, 500.0, max_theta);
-            Coverage::of(&lens.expect("a plausible lens"), &views, 1000, 1000)
+            Coverage::new(&lens.expect("a plausible lens"), &views, 1000, 1000)
         };
         let (narrow, wide) = (coverage(1.2), coverage(3.0));
         assert!(narrow.seen_share > 0.999, "{narrow:?}");
         assert!(wide.seen_share < 0.6, "{wide:?}");
         assert!(narrow.mean_views > wide.mean_views);
-        let none = Coverage::of(
+        let none = Coverage::new(
             &Lens::equidistant_circle(499.5, 499.5, 500.0, 1.2).expect("a plausible lens"),
             &[],
             1000,

@@ -13,7 +13,7 @@ fn edges_are_assigned_to_their_directions() {
     let room = Rotation3::from_euler_angles(0.14, -0.09, 0.4);
     let walls = edges(&room);
     let all = [walls.clone(), clutter(100)].concat();
-    let fit = RoomFit::of(
+    let fit = RoomFit::new(
         std::slice::from_ref(&all),
         &[circle()],
         KnownCamera::default(),

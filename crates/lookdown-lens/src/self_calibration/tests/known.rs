@@ -11,7 +11,7 @@ fn tilted() -> Rotation3<f64> {
 
 fn with_field_of_view(degrees: f64, known: KnownCamera) -> KnownCamera {
     KnownCamera {
-        field_of_view: Some(FieldOfView::of_degrees(degrees).unwrap()),
+        field_of_view: Some(FieldOfView::from_degrees(degrees).unwrap()),
         ..known
     }
 }
@@ -23,7 +23,7 @@ fn lens_that_the_edges_contradict_is_refused() {
         lens: Some(IdealLens::Equidistant),
         ..KnownCamera::default()
     };
-    match RoomFit::of(&[edges(&room)], &[circle()], known) {
+    match RoomFit::new(&[edges(&room)], &[circle()], known) {
         Err(FitRefusal::Contradicted {
             field_of_view_deg, ..
         }) => assert!(
@@ -38,7 +38,7 @@ fn lens_that_the_edges_contradict_is_refused() {
 fn contradiction_is_named_before_a_rival() {
     let (all, circles) = rivals();
     // With a wrong circle, the true lens is contradicted, too.
-    let fit = RoomFit::of(&[all], &circles, equisolid());
+    let fit = RoomFit::new(&[all], &circles, equisolid());
     assert!(
         matches!(fit, Err(FitRefusal::Contradicted { .. })),
         "{fit:?}"
@@ -55,7 +55,7 @@ fn field_of_view_that_no_lens_has_is_named() {
         with_field_of_view(180.0, orthographic),
         with_field_of_view(270.0, KnownCamera::default()),
     ] {
-        let fit = RoomFit::of(&[edges(&tilted())], &[circle()], known);
+        let fit = RoomFit::new(&[edges(&tilted())], &[circle()], known);
         assert_eq!(fit, Err(FitRefusal::NoSuchLens));
     }
 }
@@ -64,7 +64,7 @@ fn field_of_view_that_no_lens_has_is_named() {
 fn frame_of_another_camera_is_named() {
     let other = edges(&Rotation3::from_euler_angles(-0.3, 0.2, 1.1));
     let [first, second] = [edges(&tilted()), edges(&tilted())];
-    let fit = RoomFit::of(&[first, second, other], &[circle()], equisolid());
+    let fit = RoomFit::new(&[first, second, other], &[circle()], equisolid());
     assert!(
         matches!(fit, Err(FitRefusal::FrameDisagrees { frame: 3, .. })),
         "{fit:?}"
@@ -73,7 +73,7 @@ fn frame_of_another_camera_is_named() {
 
 #[test]
 fn lens_without_a_circle_sees_up_to_the_corner() {
-    let fit = RoomFit::of(&[edges(&tilted())], &[circle()], equisolid()).unwrap();
+    let fit = RoomFit::new(&[edges(&tilted())], &[circle()], equisolid()).unwrap();
     let at_circle = fit.max_theta;
     let [near, far] = [1.05, 3.0].map(|share| fit.clone().without_circle(share * circle().radius));
     assert!(near.max_theta > 1.04 * at_circle && near.max_theta < 1.1 * at_circle);

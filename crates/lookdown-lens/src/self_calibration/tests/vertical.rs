@@ -12,7 +12,7 @@ use crate::{
 fn camera_tilted_by_53_degrees_is_upright() {
     let room = Rotation3::from_euler_angles(0.92, 0.0, 0.0);
     let all = vec![edges(&room); 2].concat();
-    let fit = RoomFit::of(&[all], &[circle()], KnownCamera::default()).unwrap();
+    let fit = RoomFit::new(&[all], &[circle()], KnownCamera::default()).unwrap();
     assert_level(&fit, &room, 0.5);
 }
 
@@ -30,7 +30,7 @@ fn vertical_of_a_tilted_camera_needs_many_edges() {
     });
     let fit = |copies: usize| {
         let edges = vec![few.clone(); copies].concat();
-        RoomFit::of(&[edges], &[circle()], KnownCamera::default())
+        RoomFit::new(&[edges], &[circle()], KnownCamera::default())
     };
     assert_eq!(fit(3), Err(FitRefusal::VerticalUnclear));
     let many = fit(20).unwrap();
@@ -45,7 +45,7 @@ fn camera_on_a_wall_has_no_clear_vertical() {
     let mut before = edges(&room);
     before.retain(|curve| curve.points.iter().all(is_before));
     let all = vec![before; 4].concat();
-    let fit = RoomFit::of(&[all], &[circle()], KnownCamera::default());
+    let fit = RoomFit::new(&[all], &[circle()], KnownCamera::default());
     assert_eq!(fit, Err(FitRefusal::VerticalUnclear));
 }
 
@@ -55,7 +55,7 @@ fn camera_that_looks_horizontally_is_refused() {
     let room = Rotation3::from_euler_angles(-1.55, 0.0, 0.0);
     let mut below = vec![edges(&room); 3].concat();
     below.retain(|curve| curve.points.iter().all(|[_, y]| *y > CENTER[1] + 20.0));
-    let fit = RoomFit::of(&[below], &[circle()], KnownCamera::default());
+    let fit = RoomFit::new(&[below], &[circle()], KnownCamera::default());
     assert_eq!(fit, Err(FitRefusal::VerticalUnclear));
 }
 
@@ -67,7 +67,7 @@ fn camera_beside_a_plain_wall_is_fitted_if_it_is_on_a_ceiling() {
         let middle = ray(curve.points[curve.points.len() / 2]);
         middle.dot(&(room * Ray::y())) < 0.15
     });
-    let fit = |known| RoomFit::of(std::slice::from_ref(&before), &[circle()], known);
+    let fit = |known| RoomFit::new(std::slice::from_ref(&before), &[circle()], known);
     assert_eq!(fit(equisolid()), Err(FitRefusal::VerticalUnclear));
     let known = KnownCamera {
         is_on_ceiling: true,

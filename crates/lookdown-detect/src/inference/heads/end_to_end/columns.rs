@@ -42,7 +42,7 @@ pub(super) struct Indices {
 }
 
 impl Indices {
-    pub(super) fn of(columns: &[Column]) -> Result<Self, String> {
+    pub(super) fn new(columns: &[Column]) -> Result<Self, String> {
         Ok(Self {
             view: find(columns, Column::View, "view")?,
             sides: [
