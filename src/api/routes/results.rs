@@ -21,9 +21,9 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use jiff::Timestamp;
+use lookdown_calibration::revision::revision_of;
 use lookdown_common::text::Quoted;
 use lookdown_http::entity_tags::{is_unmodified, weak_entity_tag};
-use lookdown_calibration::revision::revision_of;
 
 use self::row::CameraRow;
 use crate::{

@@ -14,12 +14,12 @@ use axum::{
     },
     response::{IntoResponse, Response},
 };
+use lookdown_calibration::revision::revision_of;
 use lookdown_common::text::{one_line, shortened, with_causes};
 use lookdown_http::{
     entity_tags::{entity_tag, is_unmodified},
     problem::Problem,
 };
-use lookdown_calibration::revision::revision_of;
 
 use self::body::{Counts, PersonCounts, StepCounts, csv};
 use super::{
