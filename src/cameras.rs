@@ -131,8 +131,9 @@ impl Cameras {
         let mut own: BTreeMap<_, _> = stored
             .map(|(name, camera)| (name.clone(), camera.paused))
             .collect();
-        let names = configured.keys();
-        own.extend(names.map(|name| (name.clone(), paused.contains(name))));
+        for name in configured.keys() {
+            own.insert(name.clone(), paused.contains(name));
+        }
         self.own.set(own);
         cameras.retain(|camera| !paused.contains(&camera.name));
         let malformed = |name| {

@@ -35,7 +35,7 @@ pub(in crate::api) struct CameraRow {
 
 impl CameraRow {
     /// Returns the values that change with a report or a number, not with time.
-    pub(super) fn state(&self) -> (&str, &str, usize, &'static str) {
+    pub(super) fn state(&self) -> (&str, &str, Option<usize>, &'static str) {
         (&self.camera, &self.id, self.persons, self.persons_source)
     }
 
