@@ -128,8 +128,8 @@ const acting = (card) => (label, work) => shown(async () => {
 
 /** Saves the camera without its rate and profile. Its URL and password stay. */
 const chooseAutomatically = (card) => acting(card)("Saving", () => {
-  const { user, calibration } = card.info;
-  return ask(pathOf(card), { method: "PUT", body: JSON.stringify({ user, calibration }) });
+  const { user, calibration, keep_image } = card.info;
+  return ask(pathOf(card), { method: "PUT", body: JSON.stringify({ user, calibration, keep_image }) });
 });
 
 function managing(card) {
