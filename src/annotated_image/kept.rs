@@ -97,7 +97,7 @@ impl StoredFrame {
     /// keeping it, and stops when `is_cancelled` returns true.
     ///
     /// # Errors
-    /// [`StoredFrameError`] for data that [`StoredFrame::of`] has not made.
+    /// [`StoredFrameError`] for data that [`StoredFrame::new`] has not made.
     pub fn annotated(
         &self,
         options: &AnnotationOptions,

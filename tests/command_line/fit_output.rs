@@ -20,7 +20,7 @@ fn fit_into(file: &str, more: &[&str]) -> std::process::Output {
 }
 
 /// A calibration of the office with a zone, and a lens and a height that were given.
-fn of_the_user(folder: &tempfile::TempDir) -> String {
+fn user_calibration(folder: &tempfile::TempDir) -> String {
     let file = folder.path().join("office.json");
     let mut calibration: Value =
         serde_json::from_slice(&std::fs::read("samples/calibrations/office.json").unwrap())
@@ -38,7 +38,7 @@ fn of_the_user(folder: &tempfile::TempDir) -> String {
 #[test]
 fn values_of_the_user_are_not_replaced_by_found_ones() {
     let folder = tempfile::tempdir().unwrap();
-    let file = of_the_user(&folder);
+    let file = user_calibration(&folder);
     let before = std::fs::read(&file).unwrap();
     assert_fails_with(
         &fit_into(&file, &[]),
@@ -51,7 +51,7 @@ fn values_of_the_user_are_not_replaced_by_found_ones() {
 #[test]
 fn replaced_lens_leaves_zones_and_height() {
     let folder = tempfile::tempdir().unwrap();
-    let file = of_the_user(&folder);
+    let file = user_calibration(&folder);
     let fitted = fit_into(&file, &["--replace"]);
     assert!(fitted.status.success(), "{fitted:?}");
     let found: Value = serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap();

@@ -42,7 +42,7 @@ impl Model {
         Self::from_boxed(Box::new(first), others.collect())
     }
 
-    /// [`Model::of_sessions`] with boxed sessions.
+    /// [`Model::from_sessions`] with boxed sessions.
     pub(crate) fn from_boxed(first: Box<dyn Detector>, others: Vec<Box<dyn Detector>>) -> Self {
         Self {
             name: first.name().to_owned(),

@@ -52,7 +52,7 @@ fn the_second_detection_of_a_person_is_wrong() {
 }
 
 #[test]
-fn of_equal_scores_the_earlier_detection_is_right() {
+fn equal_scores_make_the_earlier_detection_right() {
     let truth = truth(&[row(0.0, 10.0)], &[]);
     let detections = [(row(2.0, 10.0), 0.5), (row(0.0, 10.0), 0.5)];
     for rule in BOTH {

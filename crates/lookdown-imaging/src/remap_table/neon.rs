@@ -48,7 +48,7 @@ pub(super) fn render(_proof: Supported, source: &Source, band: &Band, planes: Pl
 
 #[target_feature(enable = "neon")]
 fn render_with_neon(source: &Source, band: &Band, planes: Planes) {
-    let frame_lines = FrameLines::of(source);
+    let frame_lines = FrameLines::new(source);
     let locate = |block: &Block, seen| match seen {
         Seen::Whole => [0, QUARTET].map(|first| whole_samples(source, block, first)),
         Seen::Lanes(lanes) => [0, QUARTET].map(|first| samples(source, block, first, lanes)),
@@ -97,7 +97,7 @@ fn sample_quartet(
 fn whole_samples(source: &Source, block: &Block, first_lane: usize) -> Samples {
     let [left, top] = [0, 1].map(|axis| {
         let position = positions(block.start[axis], block.step[axis], first_lane);
-        Neighbors::of(position, vcvtq_s32_f32(position))
+        Neighbors::new(position, vcvtq_s32_f32(position))
     });
     Samples::new(source, &left, &top, vdupq_n_u32(u32::MAX))
 }
@@ -164,7 +164,7 @@ fn split(position: float32x4_t, count: usize) -> (Neighbors, uint32x4_t) {
     let beyond = vabsq_f32(vsubq_f32(position, within));
     let is_within = vcleq_f32(beyond, vdupq_n_f32(0.5));
     let lower = vminq_s32(vcvtq_s32_f32(within), whole(count - 2));
-    (Neighbors::of(within, lower), is_within)
+    (Neighbors::new(within, lower), is_within)
 }
 
 /// Eight bytes from each of the given ones.
