@@ -235,7 +235,7 @@ fn what_makes_no_camera_is_refused_with_field_value_and_remedy() {
         (
             "{ \"id\"",
             "{ id",
-            "not a calibration file: key must be a string",
+            "not a calibration file: it is not valid JSON at line 1: correct that line",
         ),
     ] {
         let text = refusal(&LOBBY.replace(from, to));
@@ -254,12 +254,12 @@ fn a_file_too_large_to_be_a_calibration_is_not_read() {
 }
 
 #[test]
-fn what_yaml_and_toml_parsers_say_is_one_line_with_the_place() {
+fn faults_of_yaml_and_toml_are_one_line_with_the_place() {
     for (name, text, expected) in [
         (
             "lobby.yaml",
             "id: lobby\nimage: {width: 16, height: .nan}\n",
-            "rejected by the configured policy at line 2, column 28",
+            "it is not valid YAML at line 2: correct that line",
         ),
         (
             "lobby.toml",
