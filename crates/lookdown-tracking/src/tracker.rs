@@ -230,9 +230,10 @@ impl Tracker {
                     !used[column] && scores.contains(&candidates[column].measured.score)
                 })
                 .collect();
-            let plane = match self.on_floor {
-                true => &self.settings.floor,
-                false => &self.settings.bearing,
+            let plane = if self.on_floor {
+                &self.settings.floor
+            } else {
+                &self.settings.bearing
             };
             let motions = rows.iter().map(|&row| &self.tracks[row].motion);
             let filters: Vec<_> = motions
