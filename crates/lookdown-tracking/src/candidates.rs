@@ -27,12 +27,14 @@ pub(super) struct Separated<'a> {
 /// true if places are on the floor.
 pub(super) fn candidates<'a>(
     persons: &'a [Observation],
-    (pose, on_floor): (&CameraPose, bool),
+    (camera, pose, on_floor): (usize, &CameraPose, bool),
     settings: &TrackerSettings,
 ) -> Vec<Candidate<'a>> {
     let noise = &settings.noise;
     let measure = |person| match pose.height_m {
-        Some(height_m) if on_floor => Measurement::on_floor(person, pose, height_m, noise),
+        Some(height_m) if on_floor => {
+            Measurement::on_floor(person, (camera, pose), height_m, noise)
+        }
         _ => Measurement::from_bearing(person, noise),
     };
     let mut candidates: Vec<_> = persons

@@ -29,7 +29,7 @@ pub struct EvidenceSettings {
     pub confirm: f64,
     /// A confirmed track ends below this sum of the reports that it was seen in.
     pub revoke: f64,
-    /// A track ends below this sum.
+    /// A track that is not confirmed ends below this sum.
     pub end: f64,
     /// The sum is kept below this.
     pub most: f64,
@@ -107,9 +107,10 @@ impl Evidence {
         (self.mean, self.reports) = (0.0, 0.0);
     }
 
-    /// Returns the logarithm of the probability that the track is a person who is still there.
+    /// Returns the logarithm of the probability that the track is a person who is still there. It
+    /// falls no further than the evidence at which a new track ends: a person may come back.
     pub fn log_probability(self, settings: &EvidenceSettings) -> f64 {
-        -(-self.sum(settings)).exp().ln_1p()
+        -(-self.sum(settings).max(settings.end)).exp().ln_1p()
     }
 
     /// Returns true when the track is a person.

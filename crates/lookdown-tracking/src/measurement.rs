@@ -19,6 +19,13 @@ impl Extents {
     fn holds(&self, along: f64, across: f64) -> bool {
         (along / self.along).hypot(across / self.across) < 1.0
     }
+
+    /// Returns the covariance of these deviations in a plane with this radial direction.
+    pub fn covariance(&self, radial: &Unit<Vector2<f64>>) -> Matrix2<f64> {
+        let outer = radial.into_inner() * radial.transpose();
+        let more = self.along.powi(2) - self.across.powi(2);
+        Matrix2::identity() * self.across.powi(2) + outer * more
+    }
 }
 
 /// A measured place, its error and its score.
@@ -29,6 +36,8 @@ pub(super) struct Measurement {
     pub radial: Vector3<f64>,
     /// Standard deviations of the place.
     pub deviation: Extents,
+    /// The camera, and standard deviations of its error that lasts; absent in bearing space.
+    pub bias: Option<(usize, Extents)>,
     /// Half the region in which a box shows the same person once more.
     pub same_person: Extents,
     pub score: f64,
@@ -42,7 +51,7 @@ impl Measurement {
     /// side of the feet, so the body's axis lies farther out.
     pub fn on_floor(
         person: &Observation,
-        camera: &CameraPose,
+        (number, camera): (usize, &CameraPose),
         height_m: f64,
         noise: &MeasurementNoise,
     ) -> Option<Self> {
@@ -54,8 +63,10 @@ impl Measurement {
         let outward = foot.try_normalize(f64::EPSILON).unwrap_or_else(Vector2::x);
         let slant_squared = range.powi(2) + height_m.powi(2);
         let distrust = distrust(person.score, noise);
-        let radial_m = noise.angle_deg.to_radians() * slant_squared / height_m;
-        let across_m = noise.across_deg.to_radians() * slant_squared.sqrt();
+        let deviation = |body_m: f64, angle_deg: f64, across_deg: f64| Extents {
+            along: body_m.hypot(angle_deg.to_radians() * slant_squared / height_m),
+            across: body_m.hypot(across_deg.to_radians() * slant_squared.sqrt()),
+        };
         // Below the camera the box has no lower end: its axis turns with every small error.
         let below_m = noise.below_m * (1.0 - range / noise.below_range_m).max(0.0);
         let body_m = noise.body_m.hypot(below_m);
@@ -64,10 +75,19 @@ impl Measurement {
         Some(Self {
             place: Place::Floor(camera.to_site(axis.into()).into()),
             radial: Vector3::new(x, y, 0.0),
-            deviation: Extents {
-                along: body_m.hypot(radial_m) * distrust,
-                across: body_m.hypot(across_m) * distrust,
-            },
+            deviation: deviation(
+                body_m * distrust,
+                noise.angle_deg * distrust,
+                noise.across_deg * distrust,
+            ),
+            bias: Some((
+                number,
+                deviation(
+                    noise.bias_body_m,
+                    noise.bias_angle_deg,
+                    noise.bias_across_deg,
+                ),
+            )),
             same_person: Extents {
                 along: noise.same_person_m + noise.same_person_share * range,
                 across: noise.same_person_m,
@@ -90,6 +110,7 @@ impl Measurement {
                 along: noise.bearing_along_deg.to_radians() * distrust,
                 across: noise.bearing_across_deg.to_radians() * distrust,
             },
+            bias: None,
             same_person: Extents {
                 along: noise.same_person_along_deg.to_radians(),
                 across: noise.same_person_across_deg.to_radians(),
@@ -102,13 +123,6 @@ impl Measurement {
     pub fn radial_in(&self, to_plane: impl Fn(Vector3<f64>) -> Vector3<f64>) -> Unit<Vector2<f64>> {
         let radial = to_plane(self.radial).xy();
         Unit::try_new(radial, f64::EPSILON).unwrap_or_else(Vector2::x_axis)
-    }
-
-    /// Returns the covariance in a plane with this radial direction.
-    pub fn covariance(&self, radial: &Unit<Vector2<f64>>) -> Matrix2<f64> {
-        let Extents { along, across } = self.deviation;
-        let outer = radial.into_inner() * radial.transpose();
-        Matrix2::identity() * across.powi(2) + outer * (along.powi(2) - across.powi(2))
     }
 
     /// Returns true when this may be a further box of the person that another measurement shows.

@@ -4,11 +4,11 @@
 //! update the tangent plane moves along the great circle to the new direction (parallel transport),
 //! which leaves velocity and covariance as they are.
 
-use nalgebra::{Matrix2, Matrix3, Rotation3, Unit, Vector2, Vector3};
+use nalgebra::{Matrix3, Rotation3, Unit, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    kalman::{Innovation, Kalman},
+    kalman::{Bias, Innovation, Kalman, Measured},
     measurement::Measurement,
     place::Place,
     settings::PlaneSettings,
@@ -34,9 +34,8 @@ impl Motion {
             Place::Floor(_) => None,
             Place::Bearing(direction) => Some(stored(&rotation_to(direction))),
         };
-        let (place, noise) = local(tangent, measured);
         Self {
-            kalman: Kalman::new(place, &noise, settings.velocity_sd),
+            kalman: Kalman::new(&local(tangent, measured), settings.velocity_sd),
             tangent,
             at_s,
         }
@@ -81,41 +80,34 @@ impl Motion {
         })
     }
 
-    /// Returns the innovation of a measurement taken at `at_s`.
-    pub fn innovation(
-        &self,
-        measured: &Measurement,
-        at_s: f64,
-        settings: &PlaneSettings,
-    ) -> Innovation {
-        let (filter, lag) = self.filter_at(at_s, settings);
-        let (place, noise) = local(self.tangent, measured);
-        filter.innovation(place, &noise, lag)
+    /// Returns the innovation of a measurement, by the filter at its time.
+    pub fn innovation(&self, (filter, lag): &(Kalman, f64), measured: &Measurement) -> Innovation {
+        filter.innovation(&local(self.tangent, measured), *lag)
     }
 
     /// Returns true when a measurement may show the person of this track once more.
     pub fn is_same_person(&self, measured: &Measurement, at_s: f64) -> bool {
-        let (place, _) = local(self.tangent, measured);
-        let expected = self.kalman.place() + self.kalman.velocity() * (at_s - self.at_s);
+        let Measured { place, bias, .. } = local(self.tangent, measured);
+        let bias = bias.map_or_else(Vector2::zeros, |bias| self.kalman.bias(bias.camera));
+        let expected = self.kalman.place() + self.kalman.velocity() * (at_s - self.at_s) + bias;
         measured.is_same_person(place - expected, &radial(self.tangent, measured))
     }
 
     /// Updates the state with a measurement taken at `at_s`.
     pub fn update(&mut self, measured: &Measurement, at_s: f64, settings: &PlaneSettings) {
         let (mut filter, lag) = self.filter_at(at_s, settings);
-        let (place, noise) = local(self.tangent, measured);
-        filter.update(place, &noise, lag);
+        filter.update(&local(self.tangent, measured), lag);
         self.at_s = self.at_s.max(at_s);
         self.kalman = filter;
         if let Some(tangent) = self.tangent {
-            let moved = rotation_to(&exponential(filter.place()));
+            let moved = rotation_to(&exponential(self.kalman.place()));
             self.tangent = Some(stored(&(rotation(tangent) * moved)));
             self.kalman.move_origin_to_place();
         }
     }
 
     /// Returns the filter at `at_s`, or at the state's time with the lag of an earlier `at_s`.
-    fn filter_at(&self, at_s: f64, settings: &PlaneSettings) -> (Kalman, f64) {
+    pub fn filter_at(&self, at_s: f64, settings: &PlaneSettings) -> (Kalman, f64) {
         let dt = at_s - self.at_s;
         if dt >= 0.0 {
             (
@@ -123,13 +115,13 @@ impl Motion {
                 0.0,
             )
         } else {
-            (self.kalman, -dt)
+            (self.kalman.clone(), -dt)
         }
     }
 }
 
-/// The place and the covariance of a measurement in the coordinates of a filter.
-fn local(tangent: Option<Tangent>, measured: &Measurement) -> (Vector2<f64>, Matrix2<f64>) {
+/// A measurement in the coordinates of a filter.
+fn local(tangent: Option<Tangent>, measured: &Measurement) -> Measured {
     let place = match (&measured.place, tangent) {
         (Place::Floor(place), _) => *place,
         (Place::Bearing(direction), tangent) => {
@@ -137,7 +129,15 @@ fn local(tangent: Option<Tangent>, measured: &Measurement) -> (Vector2<f64>, Mat
             logarithm(&(to_plane * direction.into_inner()))
         }
     };
-    (place, measured.covariance(&radial(tangent, measured)))
+    let radial = radial(tangent, measured);
+    Measured {
+        place,
+        noise: measured.deviation.covariance(&radial),
+        bias: measured.bias.map(|(camera, deviation)| Bias {
+            camera,
+            covariance: deviation.covariance(&radial).into(),
+        }),
+    }
 }
 
 /// The radial direction of a measurement in the coordinates of a filter.

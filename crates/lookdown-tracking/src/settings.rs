@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::{evidence::EvidenceSettings, place::Place};
 
-/// Settings of a tracker. The defaults are tuned on simulated walks (`docs/lab/count-accuracy.md`).
+/// Settings of a tracker. The defaults are tuned on simulated walks (`docs/lab/count-accuracy.md`),
+/// the errors of places on those of real people (`docs/lab/real-walks.md`).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct TrackerSettings {
@@ -54,6 +55,12 @@ pub struct MeasurementNoise {
     pub angle_deg: f64,
     /// Angle of the foot point around the axis, degrees.
     pub across_deg: f64,
+    /// Error of the place that lasts, per camera and person: of the place of the body, meters.
+    pub bias_body_m: f64,
+    /// Lasting error of the angle of the foot point off the axis, degrees.
+    pub bias_angle_deg: f64,
+    /// Lasting error of the angle of the foot point around the axis, degrees.
+    pub bias_across_deg: f64,
     /// Distance from the lower end of a box out to the body's axis, meters.
     pub foot_offset_m: f64,
     /// Angle of the person's center off the axis in bearing space, degrees.
@@ -130,11 +137,14 @@ impl Default for TrackerSettings {
 impl Default for MeasurementNoise {
     fn default() -> Self {
         Self {
-            body_m: 0.08,
+            body_m: 0.15,
             below_m: 0.22,
             below_range_m: 0.8,
-            angle_deg: 1.1,
-            across_deg: 0.2,
+            angle_deg: 3.0,
+            across_deg: 0.4,
+            bias_body_m: 0.2,
+            bias_angle_deg: 3.0,
+            bias_across_deg: 0.4,
             foot_offset_m: 0.12,
             bearing_along_deg: 1.3,
             bearing_across_deg: 0.8,

@@ -264,6 +264,38 @@ fn a_person_under_two_cameras_is_one_track() {
 }
 
 #[test]
+fn cameras_that_place_a_person_apart_make_one_track() {
+    let (mut tracker, poses) = site();
+    for frame in 0..40 {
+        let camera = frame % 2;
+        let at_s = f64::from(u32::try_from(frame).unwrap()) / 5.0;
+        let place = if camera == 0 { [0.0, 0.0] } else { [-1.0, 0.0] };
+        tracker
+            .update(camera, at_s, &[seen_by(&poses[camera], place)])
+            .unwrap();
+        assert!(ids(&tracker).iter().all(|&id| id == 1), "{frame}");
+    }
+    assert_eq!(ids(&tracker), [1]);
+}
+
+#[test]
+fn a_confirmed_track_ends_after_max_unseen_s() {
+    let settings = TrackerSettings {
+        max_unseen_s: 6.0,
+        ..TrackerSettings::default()
+    };
+    let mut tracker = Tracker::new(&[CameraPose::alone(Some(CAMERA_M))], settings).unwrap();
+    for frame in 0..50 {
+        let at_s = f64::from(frame) / 5.0;
+        let persons = [person(1.0, 1.0)];
+        let shown = if at_s <= 2.0 { &persons[..] } else { &[] };
+        tracker.update(0, at_s, shown).unwrap();
+        let remains = (0.5..=8.0).contains(&at_s);
+        assert!(ids(&tracker).is_empty() != remains || at_s < 0.5, "{at_s}");
+    }
+}
+
+#[test]
 fn reports_of_another_camera_may_be_late() {
     let (mut tracker, poses) = site();
     for frame in 0..20 {

@@ -14,6 +14,7 @@ use crate::{
     duplicates::end_duplicates,
     evidence::log_odds,
     furniture::Furniture,
+    kalman::Innovation,
     measurement::Measurement,
     track::{PersonOfReport, Sighting},
 };
@@ -151,7 +152,7 @@ impl Tracker {
     ) -> Result<Vec<Track>, RefusedReport> {
         self.check(camera, at_s)?;
         let pose = &self.cameras[camera].pose;
-        let candidates = candidates(persons, (pose, self.on_floor), &self.settings);
+        let candidates = candidates(persons, (camera, pose, self.on_floor), &self.settings);
         let report = CurrentReport {
             camera,
             at_s,
@@ -229,9 +230,20 @@ impl Tracker {
                     !used[column] && scores.contains(&candidates[column].measured.score)
                 })
                 .collect();
+            let plane = if self.on_floor {
+                &self.settings.floor
+            } else {
+                &self.settings.bearing
+            };
+            let motions = rows.iter().map(|&row| &self.tracks[row].motion);
+            let filters: Vec<_> = motions
+                .map(|motion| motion.filter_at(report.at_s, plane))
+                .collect();
             let pairs = best_pairs(rows.len(), columns.len(), |row, column| {
+                let measured = &candidates[columns[column]].measured;
                 let track = &self.tracks[rows[row]];
-                self.gain(track, &candidates[columns[column]].measured, report.at_s)
+                let innovation = track.motion.innovation(&filters[row], measured);
+                self.gain(track, &innovation, measured)
             });
             for (row, column) in pairs {
                 let seen = report.sighting(&candidates[columns[column]]);
@@ -245,9 +257,8 @@ impl Tracker {
     /// The logarithm of the likelihood ratio of "this person continues this track" to "this person
     /// is new or false" (Blackman and Popoli, "Design and Analysis of Modern Tracking Systems"
     /// (1999), section 6.2); negative beyond the gate.
-    fn gain(&self, track: &Track, measured: &Measurement, at_s: f64) -> f64 {
+    fn gain(&self, track: &Track, innovation: &Innovation, measured: &Measurement) -> f64 {
         let plane = self.settings.plane_of(&measured.place);
-        let innovation = track.motion.innovation(measured, at_s, plane);
         if innovation.squared_distance() > GATE {
             return -1.0;
         }
@@ -320,7 +331,9 @@ impl Tracker {
         let is_over = |track: &mut Track| {
             let unseen_s = now_s - track.seen_s();
             let is_missed = track.missed >= settings.max_missed && unseen_s > settings.max_unseen_s;
-            let is_refuted = track.evidence.refutes(&settings.evidence) && track.missed > 0;
+            let is_refuted = !track.is_confirmed()
+                && track.missed > 0
+                && track.evidence.refutes(&settings.evidence);
             let is_revoked = track.is_confirmed() && track.evidence.revokes(&settings.evidence);
             is_missed || is_refuted || is_revoked || unseen_s > settings.max_silent_s
         };
