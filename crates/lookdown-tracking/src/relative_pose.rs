@@ -98,7 +98,7 @@ pub fn relative_pose(first: &[Walk], second: &[Walk]) -> Result<RelativePose, No
     let (first, second) = (longest(first), longest(second));
     let pairs: Vec<Pair> = first
         .iter()
-        .flat_map(|one| second.iter().filter_map(|other| Pair::of(one, other)))
+        .flat_map(|one| second.iter().filter_map(|other| Pair::new(one, other)))
         .collect();
     let mut poses: Vec<(Motion, usize)> = pairs
         .iter()
@@ -238,7 +238,7 @@ fn mean<'a>(places: impl Iterator<Item = &'a Vector2<f64>>) -> Vector2<f64> {
 
 impl Pair {
     /// The common steps of two walks, if there are enough.
-    fn of(first: &Walk, second: &Walk) -> Option<Self> {
+    fn new(first: &Walk, second: &Walk) -> Option<Self> {
         let begin = first.first()?.0.max(second.first()?.0);
         let end = first.last()?.0.min(second.last()?.0);
         let end = end.min(begin + MAX_COMMON_S);
@@ -267,7 +267,7 @@ impl Pair {
     /// The sum of the squared distances.
     fn squares(&self, motion: &Motion) -> f64 {
         let both = self.first.iter().zip(&self.second);
-        both.map(|(one, other)| (motion.of(other) - one).norm_squared())
+        both.map(|(one, other)| (motion.moved(other) - one).norm_squared())
             .sum()
     }
 
@@ -299,7 +299,7 @@ impl Motion {
         }
     }
 
-    fn of(&self, place: &Vector2<f64>) -> Vector2<f64> {
+    fn moved(&self, place: &Vector2<f64>) -> Vector2<f64> {
         self.rotation * place + self.shift
     }
 
