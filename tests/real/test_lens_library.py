@@ -1,4 +1,4 @@
-"""A program outside of this repository that depends on the library lookdown-lens, and the packages of the libraries."""
+"""A program outside of this repository that depends on the libraries of lenses and calibrations, and the packages of the libraries."""
 
 import math
 import shutil
@@ -9,7 +9,8 @@ from pathlib import Path
 from commands import run
 from harness.places import ROOT
 
-LIBRARY = ROOT / "crates" / "lookdown-lens"
+CRATES = ROOT / "crates"
+LIBRARIES = ("lookdown-lens", "lookdown-calibration")
 PROGRAM = Path(__file__).resolve().parent / "lens_library" / "main.rs"
 CAMCHAIN = ROOT / "tests" / "fixtures" / "calibrations" / "kalibr_camchain.yaml"
 TARGET = ROOT / "target" / "lens-library"
@@ -28,8 +29,8 @@ class LensLibrary(unittest.TestCase):
         # The versions that were tested, and fetched already.
         shutil.copyfile(ROOT / "Cargo.lock", folder / "Cargo.lock")
         (folder / "Cargo.toml").write_text(
-            '[package]\nname = "program"\nversion = "0.1.0"\nedition = "2024"\n\n'
-            f'[dependencies]\nlookdown-lens = {{ path = "{LIBRARY}" }}\n',
+            '[package]\nname = "program"\nversion = "0.1.0"\nedition = "2024"\n\n[dependencies]\n'
+            + "".join(f'{name} = {{ path = "{CRATES / name}" }}\n' for name in LIBRARIES),
             encoding="utf-8",
         )
         said = cargo("run", "--quiet", "--", CAMCHAIN, "kalibr-cam0", cwd=folder)
@@ -42,7 +43,8 @@ class LensLibrary(unittest.TestCase):
             self.assertAlmostEqual(y, CY, places=9)
 
     def test_the_libraries_can_be_packaged(self):
-        chosen = [f"--package=lookdown-{name}" for name in ("common", "lens", "tracking", "detect", "eval")]
+        names = ("common", "lens", "calibration", "imaging", "tracking", "detect", "eval")
+        chosen = [f"--package=lookdown-{name}" for name in names]
         cargo("package", "--allow-dirty", "--no-verify", "--offline", *chosen, cwd=ROOT)
 
 

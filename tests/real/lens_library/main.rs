@@ -3,7 +3,7 @@
 use std::{env, error::Error, fs};
 
 use lookdown_calibration::CalibrationFile;
-use lookdown_lens::{geometry::Ray};
+use lookdown_lens::geometry::Ray;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = env::args().skip(1);
