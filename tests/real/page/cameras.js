@@ -164,6 +164,7 @@ for (const [device, viewport, colorScheme] of [["wide", WIDE, "dark"], ["phone",
     `the address of a camera and the form are well on a ${device} screen`,
     "#camera/hall",
     async (page) => {
+      await add("hall", "/snapshot.jpg?token=1");
       await page.getByRole("heading", { name: "hall", level: 1 }).waitFor();
       await page.locator(".card .plot").first().waitFor();
       await assertFits(page);

@@ -110,7 +110,7 @@ pageTest(
     await card.locator(".count-furniture").waitFor();
     await untilFollowed(listed, false);
     await card.getByRole("button", { name: `Is a person: thing ${listed.id} of shop` }).click();
-    await card.getByText("not counted", { exact: false }).waitFor({ state: "detached" });
+    await card.getByText(/^\d persons? standing still$/).waitFor();
     await untilFollowed(listed, true);
   },
   { server: COUNTED },
