@@ -46,6 +46,9 @@ struct Component {
     is_decoded: bool,
 }
 
+/// Most Huffman tables of a file, each of which takes 128 KiB to fill: four for each of 16 scans.
+const MAX_TABLES: usize = 64;
+
 /// Symbols by the next 16 bits: the length of the code above the value, 0 for none.
 type Codes = Vec<u16>;
 
@@ -54,6 +57,7 @@ fn length_of_scans(bytes: &[u8]) -> Option<usize> {
     let mut size = (0, 0);
     let mut components: Vec<Component> = Vec::new();
     let mut tables: [Option<Codes>; 32] = [const { None }; 32];
+    let mut table_count = 0;
     let mut restart_interval = 0;
     let mut position = 2;
     loop {
@@ -84,7 +88,7 @@ fn length_of_scans(bytes: &[u8]) -> Option<usize> {
                 };
                 components = rest.chunks_exact(3).map(component).collect();
             }
-            0xc4 => read_codes(payload, &mut tables)?,
+            0xc4 => read_codes(payload, &mut tables, &mut table_count)?,
             0xc2..=0xcf => return None,
             0xdd => restart_interval = usize::from(u16::from_be_bytes(payload.try_into().ok()?)),
             0xda => {
@@ -110,8 +114,16 @@ fn length_of_scans(bytes: &[u8]) -> Option<usize> {
 }
 
 /// Reads the Huffman tables of a segment (T.81, B.2.4.2).
-fn read_codes(mut payload: &[u8], tables: &mut [Option<Codes>; 32]) -> Option<()> {
+fn read_codes(
+    mut payload: &[u8],
+    tables: &mut [Option<Codes>; 32],
+    count: &mut usize,
+) -> Option<()> {
     while let Some((head, rest)) = payload.split_at_checked(17) {
+        *count += 1;
+        if *count > MAX_TABLES {
+            return None;
+        }
         let mut codes = vec![0; 1 << 16];
         let (mut next, mut used) = (0, 0);
         for (shorter, &count) in head[1..].iter().enumerate() {
@@ -128,7 +140,8 @@ fn read_codes(mut payload: &[u8], tables: &mut [Option<Codes>; 32]) -> Option<()
     Some(())
 }
 
-/// Reads all blocks of a scan.
+/// Reads all blocks of a scan. Each component has one scan, and each scan a component: so the work
+/// is bounded by the bytes.
 fn read_scan<'a>(
     bits: &mut Bits<'_>,
     scan: impl Iterator<Item = &'a [u8]>,
@@ -143,11 +156,16 @@ fn read_scan<'a>(
     let mut unit = Vec::new();
     let mut pixels = (8 * most_columns, 8 * most_rows);
     let scan: Vec<_> = scan.collect();
+    if scan.is_empty() {
+        return None;
+    }
     for part in &scan {
         let component = components
             .iter_mut()
             .find(|component| component.id == part[0])?;
-        component.is_decoded = true;
+        if std::mem::replace(&mut component.is_decoded, true) {
+            return None;
+        }
         let table = |index: u8| tables.get(usize::from(index))?.as_ref();
         let codes = (table(part[1] >> 4)?, table(16 | (part[1] & 15))?);
         let mut blocks = component.columns * component.rows;
@@ -243,5 +261,23 @@ impl<'a> Bits<'a> {
     /// The position after the bits that were read.
     fn end(&self) -> usize {
         self.position - (self.count / 8) as usize
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scans_without_components_and_many_tables_end_at_once() {
+        let head = [
+            0xff, 0xd8, 0xff, 0xc0, 0, 11, 8, 0xff, 0xff, 0xff, 0xff, 1, 1, 0x11, 0,
+        ];
+        let empty_scan = [0xff, 0xda, 0, 6, 0, 0, 63, 0];
+        let table = [&[0xff, 0xc4, 0, 19, 0][..], &[0; 16]].concat();
+        for part in [&empty_scan[..], &table] {
+            let file = [&head[..], &part.repeat(100_000)].concat();
+            assert_eq!(jpeg_length(&file), None);
+        }
     }
 }
