@@ -12,6 +12,7 @@ mod systemd;
 use std::{sync::Arc, time::Duration};
 
 use anyhow::Context;
+use jiff::Timestamp;
 use lookdown_detect::{
     inference::ModelRepository,
     parameters::DetectParameters,
@@ -28,6 +29,7 @@ use crate::{
     cameras::Cameras,
     metrics::Metrics,
     mqtt::Publisher,
+    reference_counts::ReferenceCounts,
     results::{MemoryResults, RedisResults, ResultStore},
     settings::{
         AccessSettings, CountSettings, LimitSettings, ResultSettings, Settings, find_calibrations,
@@ -192,6 +194,8 @@ impl App {
         let companions = companions(&settings.counts)?;
         let own = companions.own_cameras();
         let results = open_results(&settings.results, own, Arc::clone(&metrics))?;
+        let references = ReferenceCounts::open(&settings.state.path, Timestamp::now());
+        let references = Arc::new(references);
         let readiness = Readiness::default();
         let tls = match settings.tls.clone() {
             Some(options) => Some(Arc::new(Tls::open(options, Arc::clone(&metrics))?)),
@@ -201,7 +205,13 @@ impl App {
             if options.image_every.is_some() {
                 options.discovery.images = settings.results.images_of.clone();
             }
-            Publisher::new(options, Arc::clone(&results), Arc::clone(&metrics))
+            let references = Arc::clone(&references);
+            Publisher::new(
+                options,
+                Arc::clone(&results),
+                references,
+                Arc::clone(&metrics),
+            )
         });
         let access = match &keys {
             Some(keys) => Access::Keys(Arc::clone(keys)),
@@ -210,7 +220,13 @@ impl App {
             },
         };
         let tracer = Tracer::start(&settings.traces)?;
-        let options = api_options(&settings, access, companions.clone(), tracer.clone());
+        let options = api_options(
+            &settings,
+            access,
+            companions.clone(),
+            references,
+            tracer.clone(),
+        );
         let state = ApiState::new(
             Arc::clone(&workers),
             Arc::clone(&models),

@@ -40,6 +40,11 @@ pub(super) fn client_routes() -> OpenApiRouter<ApiState> {
         .routes(routes!(cameras::test))
         .routes(routes!(cameras::get_frame))
         .routes(routes!(cameras::suggestion::get))
+        .routes(routes!(cameras::reference_counts::list))
+        .routes(routes!(
+            cameras::reference_counts::put,
+            cameras::reference_counts::delete
+        ))
         .routes(routes!(results::list))
         .routes(routes!(results::delete::delete))
         .routes(routes!(results::followed::put))

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use crate::{
     api::{Access, ApiOptions, Companions, RequestRate},
+    reference_counts::ReferenceCounts,
     settings::Settings,
     telemetry::Tracer,
 };
@@ -13,6 +14,7 @@ pub(super) fn api_options(
     settings: &Settings,
     access: Access,
     companions: Companions,
+    references: Arc<ReferenceCounts>,
     tracer: Tracer,
 ) -> ApiOptions {
     ApiOptions {
@@ -42,6 +44,7 @@ pub(super) fn api_options(
         cors_origins: settings.access.cors_origins.clone(),
         hosts: settings.access.hosts.clone(),
         companions,
+        references,
         tracer,
     }
 }

@@ -6,6 +6,7 @@ use std::{num::NonZeroUsize, path::PathBuf, sync::Arc, time::Duration};
 use jiff::Timestamp;
 use lookdown_common::OwnCameras;
 use lookdown_detect::fairness::Client;
+use lookdown_tracking::taught::NumberWithBar;
 use rumqttc::Publish;
 use tokio::{
     sync::{
@@ -28,6 +29,7 @@ use super::{
 };
 use crate::{
     metrics::Metrics,
+    reference_counts::ReferenceCounts,
     results::{self, Headline, ListenError, ResultStore, StoredReport},
     tls::TlsError,
 };
@@ -78,6 +80,7 @@ pub struct Publisher {
 struct Publication {
     options: MqttOptions,
     results: Arc<dyn ResultStore>,
+    references: Arc<ReferenceCounts>,
     metrics: Arc<Metrics>,
     topics: Topics,
     /// The cameras of `lookdown run`, which have a switch for detection.
@@ -94,6 +97,7 @@ impl Publisher {
     pub fn new(
         options: MqttOptions,
         results: Arc<dyn ResultStore>,
+        references: Arc<ReferenceCounts>,
         metrics: Arc<Metrics>,
     ) -> Result<Self, TlsError> {
         let connector = Connector::new(
@@ -105,6 +109,7 @@ impl Publisher {
             topics: Topics::new(&options.topic_prefix, options.discovery_prefix.as_deref()),
             options,
             results,
+            references,
             metrics,
             switched: None,
         };
@@ -164,8 +169,8 @@ impl Publication {
         for report in self.results.latest_of_all().await.unwrap_or_default() {
             let age = Timestamp::now().duration_since(report.report.received_at);
             let age = Duration::try_from(age).unwrap_or_default();
-            let persons = self.headline(&report).await;
-            cameras.update(&report, persons, age, Instant::now());
+            let number = self.headline(&report).await;
+            cameras.update(&report, number, age, Instant::now());
         }
         let will = self.status(OFFLINE);
         let mut switches = self.switched.clone().map(|cameras| {
@@ -196,8 +201,8 @@ impl Publication {
         loop {
             match queue.recv().await {
                 Ok(report) => {
-                    let persons = self.headline(&report).await;
-                    cameras.update(&report, persons, Duration::ZERO, Instant::now());
+                    let number = self.headline(&report).await;
+                    cameras.update(&report, number, Duration::ZERO, Instant::now());
                     self.metrics.mqtt_reports_dropped.inc();
                 }
                 Err(RecvError::Lagged(count)) => self.metrics.mqtt_reports_dropped.inc_by(count),
@@ -280,8 +285,8 @@ impl Publication {
                 }
                 report = queue.recv() => match report {
                     Ok(report) => {
-                        let persons = self.headline(&report).await;
-                        let messages = cameras.update(&report, persons, Duration::ZERO, Instant::now());
+                        let number = self.headline(&report).await;
+                        let messages = cameras.update(&report, number, Duration::ZERO, Instant::now());
                         let is_one_too_many = messages.is_empty();
                         let published = session.publish(messages).await;
                         let counter = if is_one_too_many || published.is_err() {
@@ -300,11 +305,12 @@ impl Publication {
     }
 
     /// Returns the headline number after a report: that of the frame if the store does not answer.
-    async fn headline(&self, report: &StoredReport) -> usize {
+    async fn headline(&self, report: &StoredReport) -> NumberWithBar {
         // A paused camera is unavailable, whatever its number.
-        let headline = Headline::for_latest(&*self.results, report, &OwnCameras::default()).await;
-        let persons = headline.ok().and_then(|headline| headline.persons);
-        persons.unwrap_or(report.report.persons)
+        let own = OwnCameras::default();
+        let headline = Headline::for_latest(&*self.results, report, &own, &self.references).await;
+        let number = headline.ok().and_then(|headline| headline.number);
+        number.unwrap_or_else(|| NumberWithBar::untaught(report.report.persons))
     }
 
     /// Updates what changes without a report: the followed numbers, and cameras that are paused.
@@ -312,9 +318,12 @@ impl Publication {
     async fn followed(&self, cameras: &mut Cameras) -> Vec<Message> {
         let mut messages = cameras.pause(Instant::now());
         for camera in cameras.available() {
-            // Without an answer or a number, the next report decides.
-            if let Ok(Some(number)) = self.results.followed(&camera).await {
-                messages.extend(cameras.set_persons(&camera, number.persons, Instant::now()));
+            // Without an answer or a number, and with a taught one, the next report decides.
+            if self.references.number(&camera).is_none()
+                && let Ok(Some(number)) = self.results.followed(&camera).await
+            {
+                let number = NumberWithBar::untaught(number.persons);
+                messages.extend(cameras.set_number(&camera, number, Instant::now()));
             }
         }
         messages

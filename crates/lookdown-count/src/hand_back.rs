@@ -1,15 +1,18 @@
-//! Hands the followed numbers back to the server, whose number of a camera they become.
+//! Hands the followed numbers back to the server, whose number of a camera they become, and reads
+//! the error bars of the server's numbers.
 
-use std::{collections::BTreeMap, time::Duration};
+use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
-use lookdown_common::{LogOnce, ServerClient};
+use lookdown_common::{LogOnce, ServerClient, read_body};
+use parking_lot::Mutex;
 use reqwest::{StatusCode, header::CONTENT_TYPE};
+use serde::Deserialize;
 use tokio::{
     sync::watch,
     time::{Instant, sleep},
 };
 
-use crate::snapshot::Snapshot;
+use crate::{counter::Counter, snapshot::Snapshot};
 
 /// Longest time for a request.
 const TIMEOUT: Duration = Duration::from_secs(5);
@@ -18,17 +21,37 @@ const REPEAT: Duration = Duration::from_secs(5);
 /// The pause after a failure.
 const PAUSE: Duration = Duration::from_secs(10);
 
+/// Most bytes of the server's list of cameras: some thousand cameras.
+const MAX_LIST_BYTES: usize = 4 << 20;
+
 /// The last number that was sent for each camera, and the time.
 type Sent = BTreeMap<String, (u64, Instant)>;
 
+/// A camera of the server.
+#[derive(Deserialize)]
+struct CameraRow {
+    camera: String,
+    persons_low: Option<u64>,
+    persons_high: Option<u64>,
+}
+
 /// Sends each changed number until the snapshots end.
-pub(crate) async fn hand_back(client: ServerClient, mut snapshots: watch::Receiver<Snapshot>) {
+pub(crate) async fn hand_back(
+    client: ServerClient,
+    mut snapshots: watch::Receiver<Snapshot>,
+    counter: Arc<Mutex<Counter>>,
+) {
     let (mut sent, mut log) = (Sent::new(), LogOnce::default());
     loop {
         let snapshot = snapshots.borrow_and_update().clone();
         let pause = match send(&client, &snapshot, &mut sent).await {
             Ok(()) => {
                 log.clear();
+                if !snapshot.cameras.is_empty()
+                    && let Some(bars) = bars(&client).await
+                {
+                    counter.lock().set_bars(bars);
+                }
                 REPEAT
             }
             Err(problem) => {
@@ -44,6 +67,18 @@ pub(crate) async fn hand_back(client: ServerClient, mut snapshots: watch::Receiv
             () = sleep(pause) => {}
         }
     }
+}
+
+/// Returns the bars of the server's numbers; `None` if it has none.
+async fn bars(client: &ServerClient) -> Option<BTreeMap<String, [u64; 2]>> {
+    let request = client.get(client.route(["results"])).timeout(TIMEOUT);
+    let response = client.send(request).await.ok()?;
+    let body = read_body(response, MAX_LIST_BYTES).await.ok()?;
+    let rows: Vec<CameraRow> = serde_json::from_slice(&body).ok()?;
+    let bars = rows
+        .into_iter()
+        .filter_map(|row| Some((row.camera, [row.persons_low?, row.persons_high?])));
+    Some(bars.collect())
 }
 
 /// Sends the known numbers that are new or old.

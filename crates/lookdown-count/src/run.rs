@@ -134,7 +134,11 @@ pub async fn count(
             shown.text(&shown_counter.lock(), Timestamp::now().as_millisecond())
         }),
     });
-    let handing_back = tokio::spawn(hand_back(client.clone(), snapshots.subscribe()));
+    let handing_back = tokio::spawn(hand_back(
+        client.clone(),
+        snapshots.subscribe(),
+        Arc::clone(&counter),
+    ));
     let _handing_back = AbortOnDropHandle::new(handing_back);
     let (stop_sender, stop_receiver) = watch::channel(false);
     let mut follower = Follower {
