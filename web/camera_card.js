@@ -8,6 +8,7 @@ import { addBoxes } from "./ignore_place.js";
 import { sketch } from "./marks.js";
 import { stepPlot } from "./plot.js";
 import { shown, withProgress } from "./progress.js";
+import { teaching } from "./reference_counts.js";
 import { ask } from "./server.js";
 import { showSuggestion } from "./suggestion.js";
 import { useFrame } from "./use_frame.js";
@@ -28,12 +29,13 @@ export function addCard(camera, { onchange, reread }) {
   const manage = element("span", { class: "manage" });
   const node = element("article", { class: "card", "aria-label": `Camera ${camera}`, "data-camera": camera });
   const card = { camera, node, now, age, state, suggestion, day, strip, manage, onchange, reread, info: null, isSingle: false };
-  Object.assign(card, { id: "0", history: [], reportedAt: 0, report: null, drawn: 0, image: null, suggestedAt: 0, suggested: "", hasImage: true, isAsking: false, isTooLow: false, message: null });
+  Object.assign(card, { id: "0", history: [], reportedAt: 0, report: null, drawn: 0, image: null, bar: null, suggestedAt: 0, suggested: "", hasImage: true, isAsking: false, isTooLow: false, message: null });
+  card.teaching = teaching(card);
   const use = (section) => shown(() => withProgress(strip, "Reading the frame", () => useFrame(card, section)));
   const tools = TOOLS.map((name) => element("button", { type: "button", onclick: use(name.toLowerCase()) }, name));
   const group = element("div", { class: "use-frame", role: "group", "aria-label": `Use this frame of ${camera}` }, element("span", { class: "muted", "aria-hidden": "true" }, "Use this frame:"), ...tools);
   card.remedy = element("button", { type: "button", class: "quiet", hidden: true, onclick: chooseAutomatically(card) }, "Set Rate and Profile to automatic");
-  node.append(element("header", {}, element("h2", {}, link), age), now, state, card.remedy, suggestion, day, element("footer", {}, group, manage, strip));
+  node.append(element("header", {}, element("h2", {}, link), age), now, state, card.remedy, suggestion, card.teaching.node, day, element("footer", {}, group, manage, strip));
   return card;
 }
 
@@ -54,7 +56,7 @@ export function drawCard(card, others) {
   const count = history.at(-1).persons;
   const zones = report.zones?.map(({ name, persons }) => element("li", {}, `${name} `, element("b", {}, String(persons))));
   card.now.replaceChildren(
-    element("div", { class: "sight" }, card.image ?? sketch(report), element("p", { class: "big" }, element("b", {}, count === null ? "–" : String(count)), count === null ? "paused" : count === 1 ? "person" : "persons")),
+    element("div", { class: "sight" }, card.image ?? sketch(report), element("p", { class: "big" }, element("b", {}, count === null ? "–" : String(count)), count === null ? "" : errorBar(card.bar, count), count === null ? "paused" : count === 1 ? "person" : "persons")),
     card.isSingle && !card.hasImage && !card.info ? imagesOff(card.camera) : "",
     zones ? element("ul", { class: "zones" }, zones) : "",
     stepPlot(history, Date.now()),
@@ -62,8 +64,16 @@ export function drawCard(card, others) {
   showImage(card);
   addCounts(card);
   showDay(card);
+  card.teaching.refresh();
   if (card.message) find(".sight", card.node).after(card.message);
   addBoxes(card, others);
+}
+
+/** The error bar of a number: the larger side of it. */
+function errorBar(bar, count) {
+  if (!bar) return "";
+  const [low, high] = bar;
+  return element("span", { class: "error-bar", title: `In 9 of 10 frames, ${low} to ${high} people are there` }, ` ± ${Math.max(high - count, count - low)} `);
 }
 
 const imagesOff = (camera) => element("p", { class: "muted images-off" }, "Images of this camera are not kept. The setting ", element("code", {}, `results.images = ["${camera}"]`), " shows them.");

@@ -76,11 +76,19 @@ async function followNumbers(signal) {
 
 /** Shows the present numbers of cameras: those of the history are the numbers of their times. */
 function showNumbers(rows) {
-  for (const { camera, persons, received_at: receivedAt } of rows) {
+  for (const { camera, persons, persons_low: low, persons_high: high, received_at: receivedAt } of rows) {
     const card = cards.get(camera);
+    if (card) showBar(card, persons === null ? null : [low, high]);
     if (card?.info?.paused) addNumber(card, Date.now(), null);
     else if (card) addNumber(card, Date.parse(receivedAt), persons);
   }
+}
+
+/** Shows the error bar of the number of a card. */
+function showBar(card, bar) {
+  if (String(card.bar) === String(bar)) return;
+  card.bar = bar;
+  redraw(card);
 }
 
 /** Adds a number of persons to a card, null while the camera is paused. Numbers that did not change are one step of its plot. */

@@ -1,7 +1,7 @@
 //! Measures the taught number of persons and its bar on sequences with known numbers.
 //!
-//! Standard input: one JSON array per sequence of `[persons, [score, …]]`, a frame each, in order of
-//! time. Reference frames are drawn from the first quarter, and the second half is scored: the mean
+//! Standard input: one JSON array per sequence of `[persons, [score, …]]`, a frame each, in order
+//! of time. Reference frames are drawn from the first quarter, and the second half is scored: mean
 //! over sequences, with 20 draws each.
 #![expect(clippy::cast_precision_loss, reason = "small numbers")]
 

@@ -21,18 +21,18 @@ pub const COVERAGE: f64 = 0.9;
 /// Number of thresholds, and the factor between two: from 0.02 to 0.5.
 const THRESHOLDS: usize = 24;
 const STEP: f64 = 1.15;
-/// The rate of the exponential weights, per person. Halving or doubling it changes the error by 3 %.
+/// The rate of the exponential weights, per person. Half or twice of it changes the error by 3 %.
 const RATE: f64 = 0.5;
 /// Persons by which the ratio of few frames is drawn to 1. 5 and 20 are as good within 3 %.
 const PRIOR_PERSONS: f64 = 10.0;
-/// One in so many frames before, and as many after a frame, are left out with it, while as many as
-/// are needed remain.
+/// One in so many frames before a frame, and as many after it, are left out with it, while enough
+/// remain.
 const NEIGHBORS: usize = 5;
 
 /// The bar without reference frames: how much lower and higher the true number is than that of the
 /// reports, in units of the square root of the number + 1, as in [`TaughtNumber`]. The largest
-/// error of our four rendered rooms, .71, widened as for four frames (`docs/lab/count-accuracy.md`).
-/// It holds for few real rooms.
+/// error of our four rendered rooms, .71, widened as for four frames. It holds for few real rooms
+/// (`docs/lab/count-accuracy.md`).
 const DEFAULT_BAR: [f64; 2] = [-1.0, 1.0];
 
 /// A frame whose number of persons is given.
@@ -124,7 +124,7 @@ impl TaughtNumber {
     pub fn number(&self, scores: &[f32]) -> NumberWithBar {
         let found = found(scores);
         let count = self.left_out.len();
-        // Fewer frames than a bar of this coverage needs: the tail of errors is taken as exponential.
+        // Fewer frames than a bar of this coverage needs: the tail is taken as exponential.
         let widened = (1.0 - COVERAGE).ln() / (1.0 / to_f64(count + 1)).ln();
         let bars = self.left_out.iter().map(|(weights, error)| {
             let number = estimate(weights, &found);

@@ -61,6 +61,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "icon.svg",
         "furniture.js",
         "ignore_place.js",
+        "reference_counts.js",
         "main.js",
         "dom.js",
         "server.js",

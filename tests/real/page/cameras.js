@@ -85,6 +85,45 @@ pageTest(
 );
 
 pageTest(
+  "five answers within a minute teach the number of a camera",
+  "#camera/desk",
+  async (page) => {
+    const body = { url: `${CAMERA}/snapshot.jpg?token=1`, user: "viewer", password: PASSWORD, keep_image: true };
+    await fetch(`${RUN}/cameras/desk`, { method: "PUT", body: JSON.stringify(body) });
+    const card = page.getByRole("article", { name: "Camera desk" });
+    await card.locator(".error-bar").waitFor({ timeout: 60_000 });
+    const began = Date.now();
+    await card.getByRole("button", { name: "How many are there now?" }).click({ timeout: 30_000 });
+    const number = card.getByLabel("People in this frame");
+    await card.getByAltText("The frame of desk to count people in").waitFor();
+    const found = Number(await number.textContent());
+    await card.getByRole("button", { name: "One fewer" }).click();
+    assert.equal(Number(await number.textContent()), Math.max(0, found - 1));
+    await assertAccessible(page);
+    await screenshot(page, "reference-counts");
+    for (let answers = 1; answers <= 5; answers += 1) {
+      while (Number(await number.textContent()) < 6) await card.getByRole("button", { name: "One more" }).click();
+      await card.getByRole("button", { name: "Right" }).click();
+      await card.getByText(answers < 5 ? `${answers} answer${answers > 1 ? "s" : ""}` : "The number has learned from 5 answers", { exact: answers < 5 }).waitFor();
+      if (answers < 5) await number.waitFor();
+    }
+    assert.ok(Date.now() - began < 60_000, `${Date.now() - began} ms`);
+    for (let attempt = 0; attempt < 100; attempt += 1) {
+      const row = (await (await fetch(`${RUN}/results`)).json()).find(({ camera: name }) => name === "desk");
+      if (row.persons_source === "taught" && row.persons === 6) break;
+      await page.waitForTimeout(100);
+    }
+    await card.locator(".big").filter({ hasText: /^6 ± \d/ }).waitFor();
+    await card.getByText("5 answers", { exact: true }).click();
+    await card.getByRole("button", { name: /^Delete: 6 persons/ }).first().click();
+    await card.getByText(/^1 more answer and the number learns from you/).waitFor();
+    await fetch(`${RUN}/cameras/desk`, { method: "DELETE" });
+    assert.equal((await fetch(`${RUN}/cameras/desk/reference-counts`)).status, 404);
+  },
+  { server: RUN, expected: /status of 404/ },
+);
+
+pageTest(
   "a calibration that was found in a running camera is looked at and applied",
   "",
   async (page) => {

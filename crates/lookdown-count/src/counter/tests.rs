@@ -166,3 +166,12 @@ fn silent_name_makes_room_for_another() {
     assert!(!places.counts("new", 10, &unknown));
     assert!(places.counts("new", 11, &unknown));
 }
+
+#[test]
+fn bar_is_that_of_the_server_widened_to_the_number() {
+    let mut counter = Counter::new(CountingOptions::default(), 0, Totals::default());
+    assert_eq!(counter.bar("hall", 3), [1, 5]);
+    counter.set_bars([("hall".to_owned(), [4, 6])].into());
+    assert_eq!(counter.bar("hall", 5), [4, 6]);
+    assert_eq!(counter.bar("hall", 3), [3, 6]);
+}

@@ -206,3 +206,26 @@ fn an_earlier_or_changed_frame_is_searched() {
     let report = camera.0.detect(&job(white, &parameters)).unwrap().report;
     assert_eq!(report.search, Search::Full);
 }
+
+#[test]
+fn scores_below_the_threshold_stay_between_searches() {
+    let engine = engine(BlobDetector::default(), Some(calibration("")));
+    let scores = |millis: u64, threshold: &str| {
+        let at = (Timestamp::UNIX_EPOCH + Duration::from_millis(millis)).to_string();
+        let parameters = [
+            ("calibration", "lobby"),
+            ("profile", "fast"),
+            ("follow", "true"),
+            ("score_threshold", threshold),
+            ("captured_at", &*at),
+        ];
+        let image = frame_with_disc(600, [420.0, 300.0], 20.0);
+        let report = engine.detect(&job(image, &parameters)).unwrap().report;
+        (report.search, report.persons.len(), report.scores.len())
+    };
+    assert_eq!(scores(0, "0.3"), (Search::Full, 1, 1));
+    assert_eq!(scores(200, "0.3"), (Search::Unchanged, 1, 1));
+    // No person has this score.
+    assert_eq!(scores(2000, "1"), (Search::Full, 0, 1));
+    assert_eq!(scores(2200, "1"), (Search::Unchanged, 0, 1));
+}
