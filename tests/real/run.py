@@ -1,7 +1,7 @@
 """Runs the tests against real software: `run.py [PART...]`, where `PART` is a `test_PART.py` in this folder.
 
-Each test starts the release binary, or the one that `LOOKDOWN_BINARY` names, and the other software, uses them like a
-user, and stops them. Exits with 1 if a test fails. All parts are run by default. Most parts wait most of the time, so
+Each test starts the binary of the profile that the variable `PROFILE` names (default: release) and the other software,
+uses them like a user, and stops them. Exits with 1 if a test fails. All parts are run by default. Most parts wait most of the time, so
 several parts run at the same time, each in its own process; those of `ALONE` measure times and run after them.
 """
 
