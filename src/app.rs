@@ -20,6 +20,8 @@ use lookdown_detect::{
 use lookdown_imaging::decode::DecodeLimits;
 
 use lookdown_common::{InProcess, OwnCameras, ServerClient, ServerOptions};
+use lookdown_count::{PersonsByCamera, read_persons};
+use tokio::sync::watch;
 
 use crate::{
     access::AccessKeys,
@@ -201,7 +203,13 @@ impl App {
             if options.image_every.is_some() {
                 options.discovery.images = settings.results.images_of.clone();
             }
-            Publisher::new(options, Arc::clone(&results), Arc::clone(&metrics))
+            let followed = companions.followed();
+            Publisher::new(
+                options,
+                Arc::clone(&results),
+                followed,
+                Arc::clone(&metrics),
+            )
         });
         let access = match &keys {
             Some(keys) => Access::Keys(Arc::clone(keys)),
@@ -317,7 +325,7 @@ fn open_keys(settings: &AccessSettings) -> anyhow::Result<Option<Arc<AccessKeys>
     Ok(Some(Arc::new(keys)))
 }
 
-/// The counts of another host, if the settings name one.
+/// The counts of another host, if the settings name one. Needs a tokio runtime.
 fn companions(settings: &CountSettings) -> anyhow::Result<Companions> {
     let companions = Companions::default();
     if let Some(url) = &settings.url {
@@ -329,10 +337,12 @@ fn companions(settings: &CountSettings) -> anyhow::Result<Companions> {
             authorities: None,
             in_process: None,
         };
-        companions.forward_counts(
-            ServerClient::new(&options)?,
-            lookdown_count::openapi_document,
-        );
+        let client = ServerClient::new(&options)?;
+        let (sender, numbers) = watch::channel(PersonsByCamera::new());
+        tokio::spawn(read_persons(client.clone(), sender));
+        let followed = companions.followed();
+        followed.set(move |camera| numbers.borrow().get(camera).copied());
+        companions.forward_counts(client, lookdown_count::openapi_document);
     }
     Ok(companions)
 }

@@ -42,7 +42,6 @@ pub(super) fn client_routes() -> OpenApiRouter<ApiState> {
         .routes(routes!(cameras::suggestion::get))
         .routes(routes!(results::list))
         .routes(routes!(results::delete::delete))
-        .routes(routes!(results::followed::put))
         .routes(routes!(results::latest::get_latest))
         .routes(routes!(results::latest_image::get_latest_image))
         .routes(routes!(results::history::get_history))

@@ -3,8 +3,6 @@
 mod arguments;
 mod detect_group;
 mod output;
-mod plot_file;
-mod sweep;
 mod table;
 mod truth;
 mod variants;
@@ -26,10 +24,6 @@ use crate::app::engine_for;
 
 /// Scores every profile with every refinement.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
-    if let Some(folder) = &arguments.sweep {
-        sweep::run(arguments, folder)?;
-        return Ok(ExitCode::SUCCESS);
-    }
     let mut output = Output::new(arguments);
     if arguments.from_detections.is_empty() {
         detect_groups(arguments, &mut output)?;
@@ -39,7 +33,6 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
             output.print(&DetectedRow::load(&path, &data_set)?, &data_set)?;
         }
     }
-    output.plot()?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -28,7 +28,7 @@ use super::{
 };
 use crate::{
     metrics::Metrics,
-    results::{self, Headline, ListenError, ResultStore, StoredReport},
+    results::{self, FollowedPersons, Headline, ListenError, ResultStore, StoredReport},
     tls::TlsError,
 };
 
@@ -78,6 +78,7 @@ pub struct Publisher {
 struct Publication {
     options: MqttOptions,
     results: Arc<dyn ResultStore>,
+    counted: FollowedPersons,
     metrics: Arc<Metrics>,
     topics: Topics,
     /// The cameras of `lookdown run`, which have a switch for detection.
@@ -94,6 +95,7 @@ impl Publisher {
     pub fn new(
         options: MqttOptions,
         results: Arc<dyn ResultStore>,
+        counted: FollowedPersons,
         metrics: Arc<Metrics>,
     ) -> Result<Self, TlsError> {
         let connector = Connector::new(
@@ -105,6 +107,7 @@ impl Publisher {
             topics: Topics::new(&options.topic_prefix, options.discovery_prefix.as_deref()),
             options,
             results,
+            counted,
             metrics,
             switched: None,
         };
@@ -267,7 +270,7 @@ impl Publication {
                     session.publish(self.without_removed(cameras).await).await?;
                 }
                 _ = numbers.tick() => {
-                    session.publish(self.followed(cameras).await).await?;
+                    session.publish(self.followed(cameras)).await?;
                     if let Some(switches) = &mut switches {
                         session.publish(switches.update(Instant::now()).await).await?;
                     }
@@ -302,19 +305,20 @@ impl Publication {
     /// Returns the headline number after a report: that of the frame if the store does not answer.
     async fn headline(&self, report: &StoredReport) -> usize {
         // A paused camera is unavailable, whatever its number.
-        let headline = Headline::for_latest(&*self.results, report, &OwnCameras::default()).await;
+        let own = OwnCameras::default();
+        let headline = Headline::for_latest(&*self.results, report, &own, &self.counted).await;
         let persons = headline.ok().and_then(|headline| headline.persons);
         persons.unwrap_or(report.report.persons)
     }
 
     /// Updates what changes without a report: the followed numbers, and cameras that are paused.
     /// Returns the messages.
-    async fn followed(&self, cameras: &mut Cameras) -> Vec<Message> {
+    fn followed(&self, cameras: &mut Cameras) -> Vec<Message> {
         let mut messages = cameras.pause(Instant::now());
         for camera in cameras.available() {
-            // Without an answer or a number, the next report decides.
-            if let Ok(Some(number)) = self.results.followed(&camera).await {
-                messages.extend(cameras.set_persons(&camera, number.persons, Instant::now()));
+            // Without a number, the next report decides.
+            if let Some(persons) = self.counted.at(&camera) {
+                messages.extend(cameras.set_persons(&camera, persons, Instant::now()));
             }
         }
         messages

@@ -1,13 +1,13 @@
 //! The headline number of a camera: how many people are there now.
 //!
-//! It is the number of followed persons while `lookdown count` hands it back, else the median of
-//! the camera's last reports. All servers with one result store have the same number.
+//! It is the number of persons that the counts follow, while it is known, else the median of the
+//! camera's last reports. All servers with one result store have the same number.
 
 use std::{num::NonZeroUsize, sync::Arc, time::Duration};
 
 use lookdown_common::OwnCameras;
 
-use super::{Cameras, FollowedNumber, ReportId, ResultStore, StoredReport, Unreachable};
+use super::{Cameras, FollowedPersons, ReportId, ResultStore, StoredReport, Unreachable};
 
 /// The reports of this time before the latest one, inclusively, have a part in the median.
 pub const MEDIAN_WINDOW: Duration = Duration::from_secs(5);
@@ -36,7 +36,7 @@ pub struct Headline {
 
 impl Headline {
     /// Returns the headline number of the camera with this latest report. `own` are the cameras of
-    /// this process, which may be paused.
+    /// this process, which may be paused, and `followed` the numbers of the counts.
     ///
     /// # Errors
     /// [`Unreachable`].
@@ -44,6 +44,7 @@ impl Headline {
         store: &dyn ResultStore,
         latest: &StoredReport,
         own: &OwnCameras,
+        followed: &FollowedPersons,
     ) -> Result<Self, Unreachable> {
         if own.is_paused(&latest.report.camera) {
             return Ok(Self {
@@ -51,8 +52,11 @@ impl Headline {
                 source: HeadlineSource::Paused,
             });
         }
-        if let Some(followed) = store.followed(&latest.report.camera).await? {
-            return Ok(followed.into());
+        if let Some(persons) = followed.at(&latest.report.camera) {
+            return Ok(Self {
+                persons: Some(persons),
+                source: HeadlineSource::Tracks,
+            });
         }
         let camera = Cameras::One(latest.report.camera.clone());
         let most = NonZeroUsize::new(MOST_REPORTS).unwrap_or(NonZeroUsize::MIN);
@@ -65,15 +69,6 @@ impl Headline {
             persons: persons.or(Some(latest.report.persons)),
             source: HeadlineSource::Median,
         })
-    }
-}
-
-impl From<FollowedNumber> for Headline {
-    fn from(followed: FollowedNumber) -> Self {
-        Self {
-            persons: Some(followed.persons),
-            source: HeadlineSource::Tracks,
-        }
     }
 }
 
@@ -140,6 +135,19 @@ mod tests {
         (store, latest)
     }
 
+    async fn headline(
+        store: &MemoryResults,
+        latest: &StoredReport,
+        own: &OwnCameras,
+        counted: Option<u64>,
+    ) -> Headline {
+        let followed = FollowedPersons::default();
+        followed.set(move |camera| counted.filter(|_| camera == "hall"));
+        Headline::for_latest(store, latest, own, &followed)
+            .await
+            .unwrap()
+    }
+
     #[tokio::test]
     async fn headline_is_the_median_of_the_last_reports() {
         for (numbers, expected) in [
@@ -150,9 +158,7 @@ mod tests {
             (&[5, 5, 8, 5, 14, 5, 3], 5),
         ] {
             let (store, latest) = store_of(numbers);
-            let headline = Headline::for_latest(&store, &latest, &OwnCameras::default())
-                .await
-                .unwrap();
+            let headline = headline(&store, &latest, &OwnCameras::default(), None).await;
             assert_eq!(headline.persons, Some(expected), "{numbers:?}");
             assert_eq!(headline.source, HeadlineSource::Median);
             let reports = store.since(&Cameras::All, ReportId::default(), NonZeroUsize::MAX);
@@ -161,40 +167,12 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn followed_number_replaces_the_median_while_it_is_valid() {
-        let (store, latest) = store_of(&[9, 9, 9]);
-        let follow = async |persons, age: i64| {
-            let at = Timestamp::now() - jiff::SignedDuration::from_secs(age);
-            let number = FollowedNumber { persons, at };
-            assert!(store.follow("hall", number).await.unwrap());
-            Headline::for_latest(&store, &latest, &OwnCameras::default())
-                .await
-                .unwrap()
-        };
-        let headline = follow(5, 0).await;
-        assert_eq!(
-            (headline.persons, headline.source.name()),
-            (Some(5), "tracks")
-        );
-        assert_eq!(follow(6, 10).await.persons, Some(6));
-        assert_eq!(follow(6, 20).await.persons, Some(9));
-        let number = FollowedNumber {
-            persons: 1,
-            at: Timestamp::now(),
-        };
-        assert!(!store.follow("other", number).await.unwrap());
-        follow(5, 0).await;
-        assert!(store.delete("hall").await.unwrap());
-        assert_eq!(store.followed("hall").await.unwrap(), None);
-    }
-
-    #[tokio::test]
-    async fn paused_camera_has_no_number() {
+    async fn paused_camera_has_no_number_and_others_the_followed_one() {
         let (store, latest) = store_of(&[7, 7, 7]);
         let own = OwnCameras::default();
-        for (is_paused, persons, source) in [(true, None, "paused"), (false, Some(7), "median")] {
+        for (is_paused, persons, source) in [(true, None, "paused"), (false, Some(5), "tracks")] {
             own.set([("hall".to_owned(), is_paused)].into());
-            let headline = Headline::for_latest(&store, &latest, &own).await.unwrap();
+            let headline = headline(&store, &latest, &own, Some(5)).await;
             assert_eq!(
                 (headline.persons, headline.source.name()),
                 (persons, source)

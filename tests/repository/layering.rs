@@ -45,6 +45,7 @@ const MAY_USE_CRATE: [(&str, &[&str]); 26] = [
             "mqtt",
             "open_inference",
             "recording",
+            "remote_persons",
             "report",
             "server",
             "simulate",

@@ -60,7 +60,7 @@ const LASTING: [&str; 2] = [
 const CLOCKS: [&str; 3] = ["SystemTime::now()", "Timestamp::now()", "Zoned::now()"];
 /// The files that may make them: they date reports, and compare with the dates of others.
 /// docs/lab/reliability.md states what holds when the clock jumps.
-const CLOCK_READERS: [&str; 18] = [
+const CLOCK_READERS: [&str; 17] = [
     "crates/lookdown-count/src/follower.rs",
     "crates/lookdown-count/src/http/shared.rs",
     "crates/lookdown-count/src/now.rs",
@@ -71,7 +71,6 @@ const CLOCK_READERS: [&str; 18] = [
     "crates/lookdown-watch/src/source/sink.rs",
     "src/api/protocols/open_inference/persons.rs",
     "src/api/routes/results.rs",
-    "src/api/routes/results/followed.rs",
     "src/api/detect/upload/received_request.rs",
     "src/calibration_store/store/folder.rs",
     "src/mqtt/publisher.rs",

@@ -1,9 +1,9 @@
-//! The output of rows: to standard output as they are finished, and finally into the plot.
+//! The output of rows: to standard output as they are finished.
 
 use std::io::{self, Write};
 
 use anyhow::Context;
-use lookdown_eval::{DataSet, DetectedRow, EvaluatedRow, NoPersons, precision_recall_plot};
+use lookdown_eval::{DataSet, DetectedRow};
 
 use super::{
     Arguments,
@@ -14,8 +14,6 @@ use crate::cli::output::UNWRITABLE;
 /// The rows of one run.
 pub(super) struct Output<'a> {
     arguments: &'a Arguments,
-    /// Kept only for the plot.
-    plotted: Vec<(String, EvaluatedRow)>,
     head_is_due: bool,
 }
 
@@ -23,7 +21,6 @@ impl<'a> Output<'a> {
     pub(super) fn new(arguments: &'a Arguments) -> Self {
         Self {
             arguments,
-            plotted: Vec::new(),
             head_is_due: !arguments.json,
         }
     }
@@ -50,30 +47,6 @@ impl<'a> Output<'a> {
         } else {
             writeln!(out, "{line}")
         };
-        written.context(UNWRITABLE)?;
-        if self.arguments.plot.is_some() {
-            self.plotted
-                .push((detected.name.to_string(), evaluated.ok_or(NoPersons)?));
-        }
-        Ok(())
-    }
-
-    pub(super) fn plot(&self) -> anyhow::Result<()> {
-        let (Some(file), Some((_, first))) = (&self.arguments.plot, self.plotted.first()) else {
-            return Ok(());
-        };
-        let summary = &first.summary;
-        let (images, persons) = (summary.images, summary.persons);
-        let rows = self.plotted.iter().map(|(name, row)| (name.clone(), row));
-        let data_set = self
-            .arguments
-            .truth
-            .data_set
-            .file_name()
-            .unwrap_or_default();
-        let data_set = data_set.to_string_lossy();
-        let title = format!("{data_set}: {images} images, {persons} persons");
-        file.write(&precision_recall_plot(title, rows))
-            .context("--plot")
+        written.context(UNWRITABLE)
     }
 }

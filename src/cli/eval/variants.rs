@@ -1,6 +1,5 @@
 //! The variants to evaluate: groups of parameters that share an inference per image.
 
-use anyhow::{Context, bail};
 use lookdown_detect::{
     detection::Refinement,
     parameters::{DetectParameters, ParameterError, Profile},
@@ -41,17 +40,6 @@ pub(super) fn groups(arguments: &Arguments) -> Result<Vec<Vec<DetectParameters>>
     let groups = profiles.iter();
     let groups = groups.map(|profile| group(arguments, *profile, refinements));
     groups.collect()
-}
-
-/// The profile of a sweep with NMS, whose parameters the sweep varies.
-pub(super) fn base_of_sweep(arguments: &Arguments) -> anyhow::Result<DetectParameters> {
-    let profile = match arguments.profile[..] {
-        [] => Profile::Paper,
-        [one] => one,
-        _ => bail!("--sweep: takes one --profile"),
-    };
-    let mut group = group(arguments, profile, &[Refinement::Nms])?;
-    group.pop().context("--sweep: no refinement")
 }
 
 fn group(

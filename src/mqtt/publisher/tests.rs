@@ -51,7 +51,13 @@ async fn setup_with(image_every: Option<Duration>) -> Setup {
     Setup {
         listener,
         results,
-        publisher: Publisher::new(options, store, Arc::clone(&metrics)).unwrap(),
+        publisher: Publisher::new(
+            options,
+            store,
+            FollowedPersons::default(),
+            Arc::clone(&metrics),
+        )
+        .unwrap(),
         metrics,
     }
 }
