@@ -9,7 +9,7 @@ use std::{collections::BTreeSet, fs};
 use source_scan::{CRATES, all_sources, code, names_crate, sources, without_test_files};
 
 /// Crates for external systems, and the only crates and modules that may use them.
-const MAY_USE_CRATE: [(&str, &[&str]); 26] = [
+const MAY_USE_CRATE: [(&str, &[&str]); 25] = [
     ("ort", &["inference"]),
     ("image", &["lookdown-imaging"]),
     (
@@ -57,7 +57,6 @@ const MAY_USE_CRATE: [(&str, &[&str]); 26] = [
     ("clap", &["cli", "lookdown-load"]),
     ("clap_complete", &["cli"]),
     ("clap_mangen", &["cli"]),
-    ("indicatif", &["cli"]),
     ("moka", &["pipeline"]),
     ("rumqttc", &["mqtt"]),
     (
