@@ -36,6 +36,7 @@ use crate::{
     },
     telemetry::Tracer,
     tls::Tls,
+    views::Views,
 };
 
 pub use reload::Reloader;
@@ -153,6 +154,7 @@ pub struct App {
     publisher: Option<Publisher>,
     tracer: Tracer,
     companions: Companions,
+    views: Arc<Views>,
     state: ApiState,
     settings: Box<Settings>,
 }
@@ -218,7 +220,20 @@ impl App {
             },
         };
         let tracer = Tracer::start(&settings.traces)?;
-        let options = api_options(&settings, access, companions.clone(), tracer.clone());
+        let views = Views::new(
+            settings.state.path.clone(),
+            decode_limits(&settings.limits),
+            settings.results.conceal_images,
+        );
+        views.load()?;
+        let views = Arc::new(views);
+        let options = api_options(
+            &settings,
+            Arc::clone(&views),
+            access,
+            companions.clone(),
+            tracer.clone(),
+        );
         let state = ApiState::new(
             Arc::clone(&workers),
             Arc::clone(&models),
@@ -241,6 +256,7 @@ impl App {
             publisher: publisher.transpose()?,
             tracer,
             companions,
+            views,
             state,
             settings: Box::new(settings),
         })
@@ -254,6 +270,7 @@ impl App {
 
     /// Answers requests to `/cameras` with these cameras, and publishes a switch for each to MQTT.
     pub fn set_cameras(&mut self, cameras: &Arc<Cameras>) {
+        self.views.show_frames(cameras.viewers());
         self.companions.set_cameras(Arc::clone(cameras));
         if let Some(publisher) = &mut self.publisher {
             publisher.add_switches(Arc::clone(cameras));

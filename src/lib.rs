@@ -25,3 +25,4 @@ pub mod settings;
 mod suggestions;
 pub mod telemetry;
 pub mod tls;
+pub mod views;

@@ -6,11 +6,13 @@ use crate::{
     api::{Access, ApiOptions, Companions, RequestRate},
     settings::Settings,
     telemetry::Tracer,
+    views::Views,
 };
 
 /// Returns the options of the API.
 pub(super) fn api_options(
     settings: &Settings,
+    views: Arc<Views>,
     access: Access,
     companions: Companions,
     tracer: Tracer,
@@ -38,6 +40,7 @@ pub(super) fn api_options(
                 per_second,
                 burst: settings.limits.request_burst,
             }),
+        views,
         access,
         cors_origins: settings.access.cors_origins.clone(),
         hosts: settings.access.hosts.clone(),

@@ -1,15 +1,16 @@
-//! The state of `lookdown run`.
+//! The state that is changed over HTTP.
 
 use std::path::PathBuf;
 
 use super::{declare::settings, form::path};
 
 settings! {
-    /// The state of `lookdown run`.
+    /// The state that is changed over HTTP.
     #[derive(Debug, Clone, PartialEq)]
     pub struct StateSettings in "state" {
-        /// The folder in which `lookdown run` stores the cameras that are added over HTTP, with
-        /// each password in a file that only its user can read. It is created when it is needed.
+        /// The folder of the views, and of the cameras of `lookdown run` that are added over HTTP,
+        /// with each password in a file that only its user can read. It is created when it is
+        /// needed.
         path: PathBuf = "state".into() => path();
     }
 }

@@ -2,6 +2,7 @@
 
 mod rows;
 pub(in crate::api) mod suggestion;
+pub(in crate::api) mod views;
 
 use std::{sync::Arc, time::Duration};
 
@@ -279,6 +280,9 @@ pub(in crate::api) async fn delete(
     let _ = timeout(END_TIMEOUT, ended).await;
     state.results.delete(&name).await?;
     counts::remove(&state, &name).await;
+    let (views, of) = (Arc::clone(&state.options.views), name.clone());
+    let removed = deadline.using(&CAMERAS, move || views.remove(&of).map_err(refused));
+    removed.await?;
     tracing::info!(camera = name, "the camera was deleted");
     Ok(StatusCode::NO_CONTENT)
 }
