@@ -12,6 +12,7 @@ mod systemd;
 use std::{sync::Arc, time::Duration};
 
 use anyhow::Context;
+use jiff::Timestamp;
 use lookdown_detect::{
     inference::ModelRepository,
     parameters::DetectParameters,
@@ -30,6 +31,7 @@ use crate::{
     cameras::Cameras,
     metrics::Metrics,
     mqtt::Publisher,
+    reference_counts::ReferenceCounts,
     results::{MemoryResults, RedisResults, ResultStore},
     settings::{
         AccessSettings, CountSettings, LimitSettings, ResultSettings, Settings, find_calibrations,
@@ -196,6 +198,8 @@ impl App {
         let companions = companions(&settings.counts)?;
         let own = companions.own_cameras();
         let results = open_results(&settings.results, own, Arc::clone(&metrics))?;
+        let references = ReferenceCounts::open(&settings.state.path, Timestamp::now());
+        let references = Arc::new(references);
         let readiness = Readiness::default();
         let tls = match settings.tls.clone() {
             Some(options) => Some(Arc::new(Tls::open(options, Arc::clone(&metrics))?)),
@@ -206,10 +210,12 @@ impl App {
                 options.discovery.images = settings.results.images_of.clone();
             }
             let followed = companions.followed();
+            let references = Arc::clone(&references);
             Publisher::new(
                 options,
                 Arc::clone(&results),
                 followed,
+                references,
                 Arc::clone(&metrics),
             )
         });
@@ -232,6 +238,7 @@ impl App {
             Arc::clone(&views),
             access,
             companions.clone(),
+            references,
             tracer.clone(),
         );
         let state = ApiState::new(

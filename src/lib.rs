@@ -17,6 +17,7 @@ pub mod metrics;
 pub mod mqtt;
 pub mod poller;
 pub mod probe;
+pub mod reference_counts;
 pub mod results;
 pub mod room_calibration;
 mod rounding;

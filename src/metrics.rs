@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use lookdown_common::{metric_set, metrics::text};
 use lookdown_detect::metrics::DetectMetrics;
+use lookdown_tracking::taught::NumberWithBar;
 use prometheus::{
     HistogramVec, IntCounterVec, IntGaugeVec, Registry, process_collector::ProcessCollector,
 };
@@ -54,6 +55,10 @@ metric_set! {
     persons: IntCounter = "persons_total" [];
     /// Persons that a camera sees now, as in `GET /results`; only with `results.camera_metrics`.
     camera_persons: CameraGauges = "camera_persons" ["camera"];
+    /// Lower end of the error bar of `camera_persons`, which holds in 90 % of frames.
+    camera_persons_low: CameraGauges = "camera_persons_low" ["camera"];
+    /// Upper end of the error bar of `camera_persons`.
+    camera_persons_high: CameraGauges = "camera_persons_high" ["camera"];
     /// Time of a camera's latest report, seconds since 1970; only with `results.camera_metrics`.
     camera_last_report: CameraGauges = "camera_last_report_timestamp_seconds" ["camera"];
     /// Persons in a zone in the latest frame of a camera; only with `calibrations.zone_metrics`.
@@ -149,11 +154,16 @@ impl Metrics {
         self.zone_persons.replace(camera, rows);
     }
 
-    /// Sets the number of persons of a camera and the time of its latest report, seconds
-    /// since 1970. At most a thousand cameras are published.
-    pub fn set_camera(&self, camera: &str, persons: usize, reported_at: f64) {
-        self.camera_persons
-            .replace(camera, [(None, count(persons))]);
+    /// Sets the number of persons of a camera with its bar, and the time of its latest report,
+    /// seconds since 1970. At most a thousand cameras are published.
+    pub fn set_camera(&self, camera: &str, number: NumberWithBar, reported_at: f64) {
+        for (gauges, persons) in [
+            (&self.camera_persons, number.persons),
+            (&self.camera_persons_low, number.low),
+            (&self.camera_persons_high, number.high),
+        ] {
+            gauges.replace(camera, [(None, count(persons))]);
+        }
         let row = [(None, reported_at)];
         self.camera_last_report.replace(camera, row);
     }
@@ -162,6 +172,8 @@ impl Metrics {
     pub fn retain_cameras(&self, cameras: &[String]) {
         for gauges in [
             &self.camera_persons,
+            &self.camera_persons_low,
+            &self.camera_persons_high,
             &self.camera_last_report,
             &self.zone_persons,
         ] {

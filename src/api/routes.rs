@@ -50,6 +50,11 @@ pub(super) fn client_routes() -> OpenApiRouter<ApiState> {
         .merge(OpenApiRouter::with_openapi(
             cameras::views::ImageRoutes::openapi(),
         ))
+        .routes(routes!(cameras::reference_counts::list))
+        .routes(routes!(
+            cameras::reference_counts::put,
+            cameras::reference_counts::delete
+        ))
         .routes(routes!(results::list))
         .routes(routes!(results::delete::delete))
         .routes(routes!(results::latest::get_latest))

@@ -33,6 +33,7 @@ use super::{
 use crate::{
     calibration_store::Calibrations,
     metrics::Metrics,
+    reference_counts::ReferenceCounts,
     results::{ImagesOf, ResultStore},
     suggestions::Suggestions,
     telemetry::Tracer,
@@ -88,6 +89,8 @@ pub struct ApiOptions {
     pub hosts: Vec<String>,
     /// The cameras and counts of this process, and the counts of another host.
     pub companions: Companions,
+    /// The reference counts of cameras.
+    pub references: Arc<ReferenceCounts>,
     /// Creates the spans of requests.
     pub tracer: Tracer,
 }
@@ -148,6 +151,7 @@ impl ApiOptions {
             cors_origins: Vec::new(),
             hosts: Vec::new(),
             companions: Companions::default(),
+            references: Arc::default(),
             tracer: Tracer::default(),
         }
     }
@@ -171,6 +175,8 @@ pub struct Shared {
     pub(super) unauthenticated_uploads: UploadBudget,
     /// The memory for large responses that clients have not read yet.
     pub(super) responses: SharedBudget,
+    /// The reference counts of cameras.
+    pub(super) references: Arc<ReferenceCounts>,
     /// The calibrations that are found for cameras without one.
     pub(super) suggestions: Suggestions,
     /// The turns of fits that were asked for.
@@ -219,6 +225,7 @@ impl ApiState {
                 "send the key in a header, X-API-Key: KEY, or retry",
             ),
             responses: SharedBudget::new(options.max_upload_bytes),
+            references: Arc::clone(&options.references),
             suggestions,
             fits: FitTurns::default(),
             options,

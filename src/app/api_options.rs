@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use crate::{
     api::{Access, ApiOptions, Companions, RequestRate},
+    reference_counts::ReferenceCounts,
     settings::Settings,
     telemetry::Tracer,
     views::Views,
@@ -15,6 +16,7 @@ pub(super) fn api_options(
     views: Arc<Views>,
     access: Access,
     companions: Companions,
+    references: Arc<ReferenceCounts>,
     tracer: Tracer,
 ) -> ApiOptions {
     ApiOptions {
@@ -45,6 +47,7 @@ pub(super) fn api_options(
         cors_origins: settings.access.cors_origins.clone(),
         hosts: settings.access.hosts.clone(),
         companions,
+        references,
         tracer,
     }
 }

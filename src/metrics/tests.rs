@@ -57,8 +57,8 @@ fn at_most_a_thousand_zones_are_shown_until_they_are_removed() {
 #[test]
 fn a_camera_shows_its_persons_and_the_time_of_its_report() {
     let metrics = Metrics::default();
-    metrics.set_camera("lobby", 2, 1_763_717_400.5);
-    metrics.set_camera("lobby", 3, 1_763_717_401.5);
+    metrics.set_camera("lobby", NumberWithBar::untaught(2), 1_763_717_400.5);
+    metrics.set_camera("lobby", NumberWithBar::untaught(3), 1_763_717_401.5);
     let text = metrics.render().unwrap();
     for row in [
         "lookdown_camera_persons{camera=\"lobby\"} 3",

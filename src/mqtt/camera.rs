@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use lookdown_tracking::taught::NumberWithBar;
 use serde::Deserialize;
 use serde_json::json;
 use tokio::time::Instant;
@@ -29,7 +30,7 @@ pub(super) struct Delays {
 pub(super) struct Camera {
     name: String,
     /// The headline number.
-    persons: usize,
+    number: NumberWithBar,
     /// The number of its latest frame.
     frame_persons: usize,
     occupancy: Occupancy,
@@ -47,8 +48,9 @@ struct Zone {
     occupancy: Occupancy,
 }
 
-/// The attributes of its entities: what a report was made with. Nothing in them changes with each
-/// frame, because Home Assistant records every change of an attribute.
+/// The attributes of its entities: what a report was made with. They are published with the bar of
+/// the number. Nothing in them changes with each frame, because Home Assistant records every change
+/// of an attribute.
 #[derive(Debug, Default, PartialEq, Eq)]
 struct Attributes {
     calibration: Option<String>,
@@ -97,7 +99,7 @@ impl Camera {
     pub(super) fn new(name: &str) -> Self {
         Self {
             name: name.to_owned(),
-            persons: 0,
+            number: NumberWithBar::untaught(0),
             frame_persons: 0,
             occupancy: Occupancy::default(),
             zones: Vec::new(),
@@ -111,7 +113,7 @@ impl Camera {
     pub(super) fn update(
         &mut self,
         report: &NewReport,
-        persons: usize,
+        number: NumberWithBar,
         age: Duration,
         now: Instant,
         delays: &Delays,
@@ -123,7 +125,7 @@ impl Camera {
             model: parts.model.map(|model| model.name),
             profile: parts.profile,
         };
-        let has_other_attributes = attributes != self.attributes;
+        let mut has_other_attributes = attributes != self.attributes;
         self.attributes = attributes;
         let counts = parts.zones;
         let mut earlier = std::mem::take(&mut self.zones);
@@ -142,7 +144,7 @@ impl Camera {
             self.zones.push(zone);
         }
         self.frame_persons = report.persons;
-        self.set_persons(persons, now, delays);
+        has_other_attributes |= self.set_number(number, now, delays);
         let rest = delays.expire.map(|expire| expire.saturating_sub(age));
         self.expires_at = rest.map(|rest| now + rest);
         self.is_available = rest != Some(Duration::ZERO);
@@ -154,10 +156,15 @@ impl Camera {
     }
 
     /// Sets the headline number. Returns false if it is the same as before.
-    pub(super) fn set_persons(&mut self, persons: usize, now: Instant, delays: &Delays) -> bool {
-        let is_changed = self.persons != persons;
-        self.persons = persons;
-        self.occupancy.update(persons, now, delays.hold);
+    pub(super) fn set_number(
+        &mut self,
+        number: NumberWithBar,
+        now: Instant,
+        delays: &Delays,
+    ) -> bool {
+        let is_changed = self.number != number;
+        self.number = number;
+        self.occupancy.update(number.persons, now, delays.hold);
         is_changed
     }
 
@@ -224,7 +231,7 @@ impl Camera {
         let camera = self.name.as_str();
         let count = |topic, persons: usize| Message::retained(topic, persons.to_string());
         let mut messages = vec![
-            count(topics.persons(camera), self.persons),
+            count(topics.persons(camera), self.number.persons),
             count(topics.frame_persons(camera), self.frame_persons),
             self.occupancy_message(topics),
         ];
@@ -244,7 +251,11 @@ impl Camera {
             model,
             profile,
         } = &self.attributes;
-        let attributes = json!({"calibration": calibration, "model": model, "profile": profile});
+        let NumberWithBar { low, high, .. } = self.number;
+        let attributes = json!({
+            "calibration": calibration, "model": model, "profile": profile,
+            "persons_low": low, "persons_high": high,
+        });
         Message::retained(topics.attributes(&self.name), attributes.to_string())
     }
 

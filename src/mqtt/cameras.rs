@@ -8,6 +8,7 @@ use std::{
 
 use bytes::Bytes;
 use lookdown_common::{Claim, OwnCameras, Place, makes_room};
+use lookdown_tracking::taught::NumberWithBar;
 use tokio::time::Instant;
 
 use super::{
@@ -68,12 +69,11 @@ impl Cameras {
     }
 
     /// Updates the camera of a report whose frame arrived `age` ago, and whose headline number is
-    /// `persons`. Returns the messages to
-    /// publish: none for a camera beyond the limit.
+    /// `number`. Returns the messages to publish: none for a camera beyond the limit.
     pub(super) fn update(
         &mut self,
         report: &StoredReport,
-        persons: usize,
+        number: NumberWithBar,
         age: Duration,
         now: Instant,
     ) -> Vec<Message> {
@@ -98,7 +98,7 @@ impl Cameras {
             }
         }
         let camera = self.known.entry(key).or_insert_with(|| Camera::new(name));
-        let changes = camera.update(report, persons, age, now, &self.delays);
+        let changes = camera.update(report, number, age, now, &self.delays);
         let topics = &self.topics;
         for zone in changes.removed_zones {
             messages.extend(zone_withdrawal(topics, name, &zone));
@@ -149,10 +149,10 @@ impl Cameras {
     }
 
     /// Sets the headline number of a camera. Returns the messages: none without a change.
-    pub(super) fn set_persons(
+    pub(super) fn set_number(
         &mut self,
         camera: &str,
-        persons: usize,
+        number: NumberWithBar,
         now: Instant,
     ) -> Vec<Message> {
         let (topics, delays) = (&self.topics, &self.delays);
@@ -160,8 +160,8 @@ impl Cameras {
         camera
             .filter(|camera| camera.is_available())
             .and_then(|camera| {
-                let is_changed = camera.set_persons(persons, now, delays);
-                is_changed.then(|| camera.state(topics))
+                let is_changed = camera.set_number(number, now, delays);
+                is_changed.then(|| [camera.state(topics), vec![camera.attributes(topics)]].concat())
             })
             .unwrap_or_default()
     }

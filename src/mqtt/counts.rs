@@ -279,7 +279,10 @@ impl CountsPublisher {
             let mut device = Device::new(self, owner, &camera.name, camera.persons, &mut retained);
             let since = camera.too_low_since_ms.map(Timestamp::from_millisecond);
             let since = since.and_then(Result::ok).map(|time| time.to_string());
-            device.attributes(&json!({ "too_low_since": since }));
+            let [low, high] = [0, 1].map(|end| camera.bar.map(|bar| bar[end]));
+            device.attributes(
+                &json!({ "persons_high": high, "persons_low": low, "too_low_since": since }),
+            );
             for line in &camera.lines {
                 let (of, direction) = (level(&line.line), level(&line.direction));
                 let number = Number::Crossings {

@@ -6,6 +6,7 @@ use std::{num::NonZeroUsize, path::PathBuf, sync::Arc, time::Duration};
 use jiff::Timestamp;
 use lookdown_common::OwnCameras;
 use lookdown_detect::fairness::Client;
+use lookdown_tracking::taught::NumberWithBar;
 use rumqttc::Publish;
 use tokio::{
     sync::{
@@ -28,6 +29,7 @@ use super::{
 };
 use crate::{
     metrics::Metrics,
+    reference_counts::ReferenceCounts,
     results::{self, FollowedPersons, Headline, ListenError, ResultStore, StoredReport},
     tls::TlsError,
 };
@@ -79,6 +81,7 @@ struct Publication {
     options: MqttOptions,
     results: Arc<dyn ResultStore>,
     counted: FollowedPersons,
+    references: Arc<ReferenceCounts>,
     metrics: Arc<Metrics>,
     topics: Topics,
     /// The cameras of `lookdown run`, which have a switch for detection.
@@ -96,6 +99,7 @@ impl Publisher {
         options: MqttOptions,
         results: Arc<dyn ResultStore>,
         counted: FollowedPersons,
+        references: Arc<ReferenceCounts>,
         metrics: Arc<Metrics>,
     ) -> Result<Self, TlsError> {
         let connector = Connector::new(
@@ -108,6 +112,7 @@ impl Publisher {
             options,
             results,
             counted,
+            references,
             metrics,
             switched: None,
         };
@@ -167,8 +172,8 @@ impl Publication {
         for report in self.results.latest_of_all().await.unwrap_or_default() {
             let age = Timestamp::now().duration_since(report.report.received_at);
             let age = Duration::try_from(age).unwrap_or_default();
-            let persons = self.headline(&report).await;
-            cameras.update(&report, persons, age, Instant::now());
+            let number = self.headline(&report).await;
+            cameras.update(&report, number, age, Instant::now());
         }
         let will = self.status(OFFLINE);
         let mut switches = self.switched.clone().map(|cameras| {
@@ -199,8 +204,8 @@ impl Publication {
         loop {
             match queue.recv().await {
                 Ok(report) => {
-                    let persons = self.headline(&report).await;
-                    cameras.update(&report, persons, Duration::ZERO, Instant::now());
+                    let number = self.headline(&report).await;
+                    cameras.update(&report, number, Duration::ZERO, Instant::now());
                     self.metrics.mqtt_reports_dropped.inc();
                 }
                 Err(RecvError::Lagged(count)) => self.metrics.mqtt_reports_dropped.inc_by(count),
@@ -283,8 +288,8 @@ impl Publication {
                 }
                 report = queue.recv() => match report {
                     Ok(report) => {
-                        let persons = self.headline(&report).await;
-                        let messages = cameras.update(&report, persons, Duration::ZERO, Instant::now());
+                        let number = self.headline(&report).await;
+                        let messages = cameras.update(&report, number, Duration::ZERO, Instant::now());
                         let is_one_too_many = messages.is_empty();
                         let published = session.publish(messages).await;
                         let counter = if is_one_too_many || published.is_err() {
@@ -303,12 +308,14 @@ impl Publication {
     }
 
     /// Returns the headline number after a report: that of the frame if the store does not answer.
-    async fn headline(&self, report: &StoredReport) -> usize {
+    async fn headline(&self, report: &StoredReport) -> NumberWithBar {
         // A paused camera is unavailable, whatever its number.
         let own = OwnCameras::default();
-        let headline = Headline::for_latest(&*self.results, report, &own, &self.counted).await;
-        let persons = headline.ok().and_then(|headline| headline.persons);
-        persons.unwrap_or(report.report.persons)
+        let (counted, references) = (&self.counted, &self.references);
+        let headline =
+            Headline::for_latest(&*self.results, report, &own, counted, references).await;
+        let number = headline.ok().and_then(|headline| headline.number);
+        number.unwrap_or_else(|| NumberWithBar::untaught(report.report.persons))
     }
 
     /// Updates what changes without a report: the followed numbers, and cameras that are paused.
@@ -316,9 +323,12 @@ impl Publication {
     fn followed(&self, cameras: &mut Cameras) -> Vec<Message> {
         let mut messages = cameras.pause(Instant::now());
         for camera in cameras.available() {
-            // Without a number, the next report decides.
-            if let Some(persons) = self.counted.at(&camera) {
-                messages.extend(cameras.set_persons(&camera, persons, Instant::now()));
+            // Without a number, and with a taught one, the next report decides.
+            if self.references.number(&camera).is_none()
+                && let Some(persons) = self.counted.at(&camera)
+            {
+                let number = NumberWithBar::untaught(persons);
+                messages.extend(cameras.set_number(&camera, number, Instant::now()));
             }
         }
         messages

@@ -61,6 +61,9 @@ pub struct NewReport {
     pub received_at: Timestamp,
     /// The number of persons in it.
     pub persons: usize,
+    /// The scores of its persons and of boxes below the threshold, from
+    /// [`lookdown_tracking::taught::LEAST_SCORE`] on. `None` if they are unknown: Redis has none.
+    pub scores: Option<Vec<f32>>,
     /// The report as it was answered: one line of JSON.
     pub json: Bytes,
 }
@@ -69,7 +72,11 @@ impl NewReport {
     /// The approximate memory that it takes when it is stored, bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        size_of::<StoredReport>() + self.json.len() + self.camera.len()
+        let scores = self
+            .scores
+            .as_ref()
+            .map_or(0, |scores| size_of_val(scores.as_slice()));
+        size_of::<StoredReport>() + self.json.len() + self.camera.len() + scores
     }
 }
 

@@ -144,9 +144,9 @@ async fn the_field_at_fault_of_a_camera_is_named() {
         ),
         (
             r#"{ "paused": 1, "keep_image": 2 }"#,
-            "body: line 1: not a camera",
+            "body: line 1: not the JSON of this route",
         ),
-        ("[", "body: line 1: not a camera"),
+        ("[", "body: line 1: not the JSON of this route"),
     ] {
         let refused = service.patch("/cameras/hall", body).await;
         let said = refused.problem()["detail"].to_string();

@@ -28,6 +28,7 @@ mod peers;
 mod problems;
 mod rate_limit;
 mod readiness;
+mod reference_counts;
 mod refusals;
 mod remote;
 mod report;

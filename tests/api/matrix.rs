@@ -14,10 +14,11 @@ use crate::{
 
 const METHODS: [&str; 5] = ["GET", "POST", "PUT", "DELETE", "PATCH"];
 /// The values of the parameters in paths.
-const PARAMETERS: [(&str, &str); 8] = [
+const PARAMETERS: [(&str, &str); 9] = [
     ("{calibration}", "lobby"),
     ("{camera}", "lobby"),
     ("{id}", "lobby"),
+    ("{report}", "1"),
     ("{site}", "ground"),
     ("{thing}", "1"),
     ("{version}", "1"),

@@ -87,6 +87,7 @@ fn report() -> DetectionReport {
         },
         defaults: Vec::new(),
         persons: vec![person(), unknown_place],
+        scores: vec![0.8731],
         margin: None,
         zones: vec![ZoneCount {
             name: "entrance".to_owned(),

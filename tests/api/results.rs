@@ -16,6 +16,7 @@ pub(crate) fn report(camera: &str, number: usize) -> NewReport {
         camera: camera.to_owned(),
         received_at: "2026-11-21T09:30:00Z".parse().unwrap(),
         persons: number,
+        scores: Some(vec![0.9; number]),
         json: Bytes::from(number.to_string()),
     }
 }
@@ -208,6 +209,7 @@ async fn a_page_of_large_reports_ends_early() {
             camera: "lobby".to_owned(),
             received_at: Timestamp::UNIX_EPOCH,
             persons: 0,
+            scores: None,
             json: Bytes::from(format!("\"{}\"", "x".repeat(3 << 20))),
         };
         service.results.store(report, None);

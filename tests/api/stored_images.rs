@@ -208,6 +208,7 @@ async fn stored_data_that_is_no_image_is_refused_with_404() {
             camera: "hall".to_owned(),
             received_at: "2026-11-22T09:30:00Z".parse().unwrap(),
             persons: 0,
+            scores: None,
             json: Bytes::from_static(b"{}"),
         };
         let image = StoredFrame { jpeg, sketch };

@@ -60,7 +60,7 @@ const LASTING: [&str; 2] = [
 const CLOCKS: [&str; 3] = ["SystemTime::now()", "Timestamp::now()", "Zoned::now()"];
 /// The files that may make them: they date reports, and compare with the dates of others.
 /// docs/lab/reliability.md states what holds when the clock jumps.
-const CLOCK_READERS: [&str; 17] = [
+const CLOCK_READERS: [&str; 20] = [
     "crates/lookdown-count/src/follower.rs",
     "crates/lookdown-count/src/http/shared.rs",
     "crates/lookdown-count/src/now.rs",
@@ -70,8 +70,11 @@ const CLOCK_READERS: [&str; 17] = [
     "crates/lookdown-watch/src/source/folder.rs",
     "crates/lookdown-watch/src/source/sink.rs",
     "src/api/protocols/open_inference/persons.rs",
+    "src/api/routes/cameras.rs",
+    "src/api/routes/cameras/reference_counts.rs",
     "src/api/routes/results.rs",
     "src/api/detect/upload/received_request.rs",
+    "src/app.rs",
     "src/calibration_store/store/folder.rs",
     "src/mqtt/publisher.rs",
     "src/results/memory.rs",

@@ -10,7 +10,7 @@ use std::{
 };
 
 use lookdown_common::{Claim, OwnCameras, text::one_line};
-use lookdown_tracking::MAX_CAMERAS;
+use lookdown_tracking::{MAX_CAMERAS, taught::NumberWithBar};
 
 use crate::{
     batch::Batch,
@@ -65,6 +65,8 @@ pub(crate) struct Counter {
     position_log: LogPause,
     tracks_log: LogPause,
     ahead_log: LogPause,
+    /// The bars of the server's numbers.
+    bars: BTreeMap<String, [u64; 2]>,
     /// Scenes that changed since the last commit, and those that are gone.
     changed: BTreeSet<Owner>,
     /// True if reports arrived since the last commit.
@@ -98,9 +100,27 @@ impl Counter {
             position_log: LogPause::default(),
             tracks_log: LogPause::default(),
             ahead_log: LogPause::default(),
+            bars: BTreeMap::new(),
             changed: BTreeSet::new(),
             has_news: false,
         }
+    }
+
+    /// Sets the bars of the server's numbers by camera: the true number is in 90 % of them.
+    pub(crate) fn set_bars(&mut self, bars: BTreeMap<String, [u64; 2]>) {
+        self.bars = bars;
+    }
+
+    /// Returns the bar of a number of persons of a camera, widened to the number: the one of the
+    /// server, else the default one.
+    pub(crate) fn bar(&self, camera: &str, persons: u64) -> [u64; 2] {
+        let known = self.bars.get(camera).copied();
+        let [low, high] = known.unwrap_or_else(|| {
+            let untaught = usize::try_from(persons).unwrap_or(usize::MAX);
+            let NumberWithBar { low, high, .. } = NumberWithBar::untaught(untaught);
+            [low as u64, high as u64]
+        });
+        [low.min(persons), high.max(persons)]
     }
 
     /// Adds a scene of the store.

@@ -90,6 +90,10 @@ struct CountedCamera {
     last_report: Option<Timestamp>,
     /// Persons now; null while unknown.
     persons: Option<u64>,
+    /// In 90 % of frames, the true number is at least this one; null while unknown.
+    persons_low: Option<u64>,
+    /// In 90 % of frames, the true number is at most this one; null while unknown.
+    persons_high: Option<u64>,
     /// Since when its lines have too few frames, so that crossings may be missed; null if they have
     /// enough.
     too_low_since: Option<Timestamp>,
@@ -123,6 +127,8 @@ impl CountedCamera {
             name: name.to_owned(),
             last_report: None,
             persons: None,
+            persons_low: None,
+            persons_high: None,
             too_low_since: None,
             site: None,
             dropped_reports: drops.map_or(0, |drops| drops.reports),
@@ -145,6 +151,8 @@ async fn cameras(State(api): State<Shared>) -> Json<Vec<CountedCamera>> {
         let row = CountedCamera {
             last_report: Some(time_of(camera.last_report_ms)),
             persons: camera.persons,
+            persons_low: camera.bar.map(|[low, _]| low),
+            persons_high: camera.bar.map(|[_, high]| high),
             too_low_since: camera.too_low_since_ms.map(time_of),
             site: match counter.scene_of(&camera.name).map(|scene| &scene.owner) {
                 Some(Owner::Site(site)) => Some(site.clone()),

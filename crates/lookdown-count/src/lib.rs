@@ -8,6 +8,7 @@
 //! Around it: the follower reads `/events` and feeds the counter, the store keeps sums per minute
 //! with the state and the ID of the last report, and the HTTP API answers from both.
 
+mod bars;
 mod batch;
 mod calibrations;
 #[cfg(test)]

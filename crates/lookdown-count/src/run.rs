@@ -20,6 +20,7 @@ use tokio::{
 use tokio_util::task::AbortOnDropHandle;
 
 use crate::{
+    bars::read_bars,
     calibrations::Calibrations,
     counter::{Counter, CountingOptions},
     follower::Follower,
@@ -139,6 +140,8 @@ pub async fn count(
             shown.text(&shown_counter.lock(), Timestamp::now().as_millisecond())
         }),
     });
+    let reading_bars = tokio::spawn(read_bars(client.clone(), Arc::clone(&counter)));
+    let _reading_bars = AbortOnDropHandle::new(reading_bars);
     let (stop_sender, stop_receiver) = watch::channel(false);
     let mut follower = Follower {
         deliveries: Deliveries::start(

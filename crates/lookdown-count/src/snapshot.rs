@@ -25,6 +25,8 @@ pub struct CameraSnapshot {
     pub is_paused: bool,
     /// Persons now; `None` while unknown.
     pub persons: Option<u64>,
+    /// In 90 % of frames, the true number is from the first of these to the second.
+    pub bar: Option<[u64; 2]>,
     /// Time since which its lines have too few frames, milliseconds since the Unix epoch.
     pub too_low_since_ms: Option<i64>,
     /// The directions of its lines.
@@ -147,6 +149,7 @@ impl Counter {
                     last_report_ms,
                     is_paused,
                     persons: is_known.then_some(presence.persons),
+                    bar: is_known.then(|| self.bar(&camera.name, presence.persons)),
                     too_low_since_ms: camera
                         .rate()
                         .filter(|_| is_known)

@@ -190,12 +190,12 @@ async fn steps_add_up_and_a_gap_is_unknown() {
         let mut lines = csv.lines();
         assert_eq!(
             lines.next().unwrap(),
-            "from,to,known_seconds,slow_seconds,persons_mean,persons_max,line.door.in,line.door.out,\
-             zone.middle.entries,zone.middle.mean,zone.middle.max,zone.middle.visits,\
+            "from,to,known_seconds,slow_seconds,persons_mean,persons_mean_low,\
+             persons_mean_high,persons_max,line.door.in,line.door.out,zone.middle.entries,zone.middle.mean,zone.middle.max,zone.middle.visits,\
              zone.middle.dwell_seconds"
         );
         let third = lines.nth(2).unwrap();
-        assert!(third.ends_with(",0,,,,,,,,,"), "{third}");
+        assert!(third.ends_with(",0,,,,,,,,,,,"), "{third}");
         assert_eq!(lines.count(), 2);
 
         let map = companion

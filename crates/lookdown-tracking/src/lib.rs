@@ -2,7 +2,8 @@
 //!
 //! [`Tracker`] turns [`Observation`]s into tracks, [`lines`] counts crossings, [`zones`] occupancy
 //! and dwell times, [`heat_map`] seconds of presence. [`furniture`] is what never moves. [`follow`]
-//! tells where to look for people between searches of a frame.
+//! tells where to look for people between searches of a frame. [`taught`] is the number of a
+//! camera with its error bar.
 
 mod assignment;
 mod camera;
@@ -22,6 +23,7 @@ mod plane;
 mod relative_pose;
 mod settings;
 mod site;
+pub mod taught;
 #[cfg(test)]
 mod test_walks;
 mod track;

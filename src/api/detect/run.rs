@@ -100,6 +100,7 @@ pub(in crate::api) async fn run_detection<T: Send + 'static>(
             camera: report.camera.clone(),
             received_at: report.received_at,
             persons: report.persons.len(),
+            scores: Some(report.scores.clone()),
             json,
         };
         state.results.publish(kept, finished.image);

@@ -1,5 +1,6 @@
 //! The cameras of `lookdown run`: the scope `read` reads them, the scope `admin` changes them.
 
+pub(in crate::api) mod reference_counts;
 mod rows;
 pub(in crate::api) mod suggestion;
 pub(in crate::api) mod views;
@@ -15,6 +16,7 @@ use axum::{
     },
     response::{IntoResponse, Response},
 };
+use jiff::Timestamp;
 use lookdown_common::{Secret, text::one_line};
 use serde::{Deserialize, de::DeserializeOwned};
 use serde_json::{Map, Value};
@@ -96,7 +98,7 @@ impl<T: DeserializeOwned> FromRequest<ApiState> for CameraBody<T> {
     async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
         let (parts, body) = request.into_parts();
         let context = RequestContext::from_extensions(&parts.extensions)?;
-        let reader = state.body_reader(&context, MAX_BYTES, "send a camera");
+        let reader = state.body_reader(&context, MAX_BYTES, "send what /docs shows for this route");
         let bytes = reader.read(&parts.headers, body).await?.into_bytes();
         serde_json::from_slice(&bytes).map(Self).map_err(|error| {
             let (field, fault) = fault::<T>(&bytes, &error);
@@ -110,7 +112,11 @@ fn fault<T: DeserializeOwned>(body: &[u8], error: &serde_json::Error) -> (String
     let is_without_fault = |fields: &Map<String, Value>, name: &str| {
         let mut others = fields.clone();
         others.remove(name);
-        serde_json::from_value::<T>(others.into()).is_ok()
+        // A required field at fault is missing without it.
+        serde_json::from_value::<T>(others.into()).map_or_else(
+            |error| error.to_string().starts_with("missing field"),
+            |_| true,
+        )
     };
     let fields = serde_json::from_slice::<Map<String, Value>>(body).unwrap_or_default();
     let field = fields.keys().find(|name| is_without_fault(&fields, name));
@@ -126,7 +132,10 @@ fn fault<T: DeserializeOwned>(body: &[u8], error: &serde_json::Error) -> (String
             (field.clone(), fault.to_owned())
         }
         None => {
-            let fault = format!("line {}: not a camera: compare it with /docs", error.line());
+            let fault = format!(
+                "line {}: not the JSON of this route: compare it with /docs",
+                error.line()
+            );
             ("body".to_owned(), fault)
         }
     }
@@ -283,6 +292,9 @@ pub(in crate::api) async fn delete(
     let (views, of) = (Arc::clone(&state.options.views), name.clone());
     let removed = deadline.using(&CAMERAS, move || views.remove(&of).map_err(refused));
     removed.await?;
+    let (forgotten, references) = (name.clone(), state.clone());
+    let forget = move || references.references.forget(&forgotten, Timestamp::now());
+    deadline.using(&CAMERAS, forget).await?;
     tracing::info!(camera = name, "the camera was deleted");
     Ok(StatusCode::NO_CONTENT)
 }

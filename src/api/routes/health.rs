@@ -209,15 +209,16 @@ async fn read_cameras(state: &ApiState) {
     let cameras = latest.iter().map(|report| report.report.camera.clone());
     state.metrics.retain_cameras(&cameras.collect::<Vec<_>>());
     for report in latest.iter().filter(|_| state.options.camera_metrics) {
-        let Ok(headline) = Headline::for_latest(&*state.results, report, &own, &followed).await
+        let Ok(headline) =
+            Headline::for_latest(&*state.results, report, &own, &followed, &state.references).await
         else {
             return;
         };
-        let Some(persons) = headline.persons else {
+        let Some(number) = headline.number else {
             continue;
         };
         let at = report.id.time().as_duration().as_secs_f64();
         let camera = &report.report.camera;
-        state.metrics.set_camera(camera, persons, at);
+        state.metrics.set_camera(camera, number, at);
     }
 }

@@ -63,7 +63,9 @@ pub(in crate::api) async fn list(
     let latest = state.results.latest_of_all().await?;
     let mut rows = Vec::with_capacity(latest.len());
     for report in &latest {
-        let headline = Headline::for_latest(&*state.results, report, &own, &followed).await?;
+        let headline =
+            Headline::for_latest(&*state.results, report, &own, &followed, &state.references)
+                .await?;
         rows.push(CameraRow::at(report, headline, now));
     }
     rows.sort_unstable_by(|one, other| one.camera.cmp(&other.camera));

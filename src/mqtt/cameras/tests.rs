@@ -7,7 +7,8 @@ use crate::results::{ImagesOf, NewReport, ReportId};
 
 const HOLD: Duration = Duration::from_secs(5);
 const EXPIRY: Duration = Duration::from_mins(10);
-const NO_ATTRIBUTES: &str = r#"{"calibration":null,"model":null,"profile":null}"#;
+const NO_ATTRIBUTES: &str =
+    r#"{"calibration":null,"model":null,"persons_high":4,"persons_low":0,"profile":null}"#;
 
 fn topics() -> Topics {
     Topics::new("lookdown", Some("homeassistant"))
@@ -35,6 +36,7 @@ fn report(camera: &str, persons: usize, zones: &str) -> StoredReport {
             camera: camera.to_owned(),
             received_at: Timestamp::UNIX_EPOCH,
             persons,
+            scores: None,
             json: format!("{{\"camera\":\"{camera}\"{zones}}}").into(),
         },
     }
@@ -43,7 +45,7 @@ fn report(camera: &str, persons: usize, zones: &str) -> StoredReport {
 fn update(cameras: &mut Cameras, report: &StoredReport) -> Vec<Message> {
     cameras.update(
         report,
-        report.report.persons,
+        NumberWithBar::untaught(report.report.persons),
         Duration::ZERO,
         Instant::now(),
     )
@@ -100,7 +102,9 @@ fn the_first_report_announces_a_camera_and_each_updates_it() {
     );
 
     let (published, announcements) = published(&update(&mut cameras, &report("lobby", 0, "")));
-    assert_eq!((published[0].1.as_str(), announcements), ("0", 0));
+    let (bar, persons) = (&published[0].1, &published[1].1);
+    assert!(bar.contains("\"persons_high\":1"), "{bar}");
+    assert_eq!((persons.as_str(), announcements), ("0", 0));
 }
 
 #[test]
@@ -159,7 +163,7 @@ fn attributes_are_published_when_they_change() {
         let found = found.find(|(topic, _)| topic.ends_with("/attributes"));
         (found.map(|(_, payload)| payload), announcements)
     };
-    let fast = r#"{"calibration":"hall","model":"yolox","profile":"fast"}"#;
+    let fast = r#"{"calibration":"hall","model":"yolox","persons_high":2,"persons_low":0,"profile":"fast"}"#;
     assert_eq!(attributes("fast"), (Some(fast.to_owned()), 3));
     assert_eq!(attributes("fast"), (None, 0));
     let careful = fast.replace("fast", "careful");
@@ -180,10 +184,20 @@ fn only_the_first_cameras_up_to_the_limit_are_published() {
 #[test]
 fn occupancy_ends_after_the_hold_availability_at_expiry() {
     let (mut cameras, begin) = (cameras(10), Instant::now());
-    cameras.update(&report("lobby", 1, ""), 1, Duration::ZERO, begin);
+    cameras.update(
+        &report("lobby", 1, ""),
+        NumberWithBar::untaught(1),
+        Duration::ZERO,
+        begin,
+    );
     assert_eq!(cameras.next_change(), Some(begin + EXPIRY));
-    let messages = cameras.update(&report("lobby", 0, ""), 0, Duration::ZERO, begin);
-    assert_eq!(published(&messages).0[2].1, "ON");
+    let messages = cameras.update(
+        &report("lobby", 0, ""),
+        NumberWithBar::untaught(0),
+        Duration::ZERO,
+        begin,
+    );
+    assert_eq!(published(&messages).0[3].1, "ON");
     assert_eq!(cameras.next_change(), Some(begin + HOLD));
     assert!(cameras.expire(begin).is_empty());
     let messages = published(&cameras.expire(begin + HOLD)).0;
@@ -193,7 +207,12 @@ fn occupancy_ends_after_the_hold_availability_at_expiry() {
     assert_eq!(cameras.next_change(), None);
     let messages = update(&mut cameras, &report("lobby", 0, ""));
     assert_eq!(published(&messages).0[3].1, "online");
-    let messages = cameras.update(&report("gate", 0, ""), 0, EXPIRY, begin);
+    let messages = cameras.update(
+        &report("gate", 0, ""),
+        NumberWithBar::untaught(0),
+        EXPIRY,
+        begin,
+    );
     assert_eq!(published(&messages).0[4].1, "offline");
 }
 
@@ -274,16 +293,29 @@ fn unknown_retained_cameras_are_withdrawn_after_a_time() {
 #[test]
 fn headline_number_is_published_beside_that_of_the_frame() {
     let (mut cameras, now) = (cameras(10), Instant::now());
-    let messages = cameras.update(&report("lobby", 9, ""), 5, Duration::ZERO, now);
+    let messages = cameras.update(
+        &report("lobby", 9, ""),
+        NumberWithBar::untaught(5),
+        Duration::ZERO,
+        now,
+    );
     let published_now = published(&messages).0;
     for expected in expected(&[("lobby/persons", "5"), ("lobby/frame_persons", "9")]) {
         assert!(published_now.contains(&expected), "{published_now:?}");
     }
     assert_eq!(cameras.available(), ["lobby"]);
-    assert!(cameras.set_persons("lobby", 5, now).is_empty());
-    let followed = published(&cameras.set_persons("lobby", 6, now)).0;
+    assert!(
+        cameras
+            .set_number("lobby", NumberWithBar::untaught(5), now)
+            .is_empty()
+    );
+    let followed = published(&cameras.set_number("lobby", NumberWithBar::untaught(6), now)).0;
     assert_eq!(followed[0], expected(&[("lobby/persons", "6")])[0]);
-    assert!(cameras.set_persons("unknown", 6, now).is_empty());
+    assert!(
+        cameras
+            .set_number("unknown", NumberWithBar::untaught(6), now)
+            .is_empty()
+    );
 }
 
 #[test]

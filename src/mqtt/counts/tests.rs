@@ -30,6 +30,7 @@ fn snapshot(persons: Option<u64>) -> Snapshot {
             last_report_ms: 0,
             is_paused: false,
             persons,
+            bar: persons.map(|persons| [persons, persons + 1]),
             too_low_since_ms: Some(60_000),
             lines: vec![LineSnapshot {
                 line: "door".to_owned(),
@@ -59,7 +60,7 @@ fn totals_and_occupancy_are_published() {
         (format!("{base}/persons"), "3"),
         (
             format!("{base}/attributes"),
-            "{\"too_low_since\":\"1970-01-01T00:01:00Z\"}",
+            "{\"persons_high\":4,\"persons_low\":3,\"too_low_since\":\"1970-01-01T00:01:00Z\"}",
         ),
         (format!("{base}/lines/door/in"), "12"),
         (format!("{base}/zones/till/persons"), "3"),

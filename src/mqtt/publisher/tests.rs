@@ -55,6 +55,7 @@ async fn setup_with(image_every: Option<Duration>) -> Setup {
             options,
             store,
             FollowedPersons::default(),
+            Arc::default(),
             Arc::clone(&metrics),
         )
         .unwrap(),
@@ -67,6 +68,7 @@ fn report(persons: usize) -> NewReport {
         camera: "lobby".to_owned(),
         received_at: Timestamp::UNIX_EPOCH,
         persons,
+        scores: None,
         json: Bytes::from_static(b"{}"),
     }
 }
@@ -141,7 +143,8 @@ async fn a_connection_begins_with_a_will_and_ends_with_a_farewell() {
             .all(|(topic, ..)| topic.starts_with("homeassistant/"))
     );
     let camera = "lookdown/cameras/lobby";
-    let none = r#"{"calibration":null,"model":null,"profile":null}"#;
+    let none =
+        r#"{"calibration":null,"model":null,"persons_high":4,"persons_low":0,"profile":null}"#;
     let attributes = said(&format!("{camera}/attributes"), none, true);
     let count = said(&format!("{camera}/persons"), "2", true);
     let frame = said(&format!("{camera}/frame_persons"), "2", true);

@@ -9,6 +9,7 @@ fn report_of(camera: &str) -> Arc<StoredReport> {
         camera: camera.to_owned(),
         received_at: Timestamp::UNIX_EPOCH,
         persons: 0,
+        scores: None,
         json: Bytes::from_static(b"{}"),
     };
     Arc::new(StoredReport {

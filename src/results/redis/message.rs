@@ -22,6 +22,7 @@ pub(super) fn parse(message: Vec<u8>) -> Option<StoredReport> {
             camera,
             received_at,
             persons,
+            scores: None,
             json: message.slice_ref(json),
         },
     })

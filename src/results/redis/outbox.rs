@@ -156,6 +156,7 @@ mod tests {
             camera: "lobby".to_owned(),
             received_at: Timestamp::UNIX_EPOCH,
             persons,
+            scores: None,
             json: Bytes::from(vec![b' '; length]),
         }
     }

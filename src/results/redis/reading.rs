@@ -239,6 +239,7 @@ fn report(camera: &str, mut entry: StreamId) -> Option<Arc<StoredReport>> {
             camera: camera.to_owned(),
             received_at: text(&entry, "received_at")?.parse().ok()?,
             persons: text(&entry, "persons")?.parse().ok()?,
+            scores: None,
             json: Bytes::from(json),
         },
     }))

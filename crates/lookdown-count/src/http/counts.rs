@@ -20,6 +20,7 @@ use lookdown_http::{
     entity_tags::{entity_tag, is_unmodified},
     problem::Problem,
 };
+use lookdown_tracking::taught::default_bar;
 
 use self::body::{Counts, PersonCounts, StepCounts, csv};
 use super::{
@@ -234,6 +235,8 @@ fn step_counts(
 ) -> StepCounts {
     let known_ms = step.presence.known_ms;
     let is_known = known_ms > 0;
+    let mean = ratio(step.presence.person_ms, known_ms);
+    let [mean_low, mean_high] = default_bar(mean);
     let is_camera = matches!(owner, Owner::Camera(_));
     let mut line_counts = BTreeMap::<String, BTreeMap<String, Option<u64>>>::new();
     for of in lines {
@@ -261,7 +264,9 @@ fn step_counts(
         known_seconds: ratio(known_ms, 1000),
         slow_seconds: is_camera.then(|| ratio(step.slow_ms, 1000)),
         persons: is_known.then(|| PersonCounts {
-            mean: thousandths(ratio(step.presence.person_ms, known_ms)),
+            mean: thousandths(mean),
+            mean_low: thousandths(mean_low),
+            mean_high: thousandths(mean_high),
             max: step.presence.most,
         }),
         zones: is_camera.then(|| zone_counts.collect()),

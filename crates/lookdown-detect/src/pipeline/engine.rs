@@ -25,7 +25,7 @@ use self::{first_pass::FirstPass, placed::Placed};
 use super::{
     BatchOptions, CalibrationLookup, DefaultModels, DetectJob, DetectedFrame, DetectionReport,
     JobImage, Person, PipelineError, Search, Stage, StageTimings,
-    follow::FollowCache,
+    follow::{FollowCache, with_candidates},
     merge,
     motion_cache::{CameraViews, MotionCache},
     network::InferenceThreads,
@@ -158,15 +158,18 @@ impl Engine {
         let found = |refinement: &RefinementParameters| self.persons(&observation, refinement);
         let persons = match follow {
             Some(follow) => follow.persons(&observation.camera.rig, found),
-            None => found(&parameters.refinement),
+            None => found(&with_candidates(&parameters.refinement)),
         };
         timeline.leave(Instant::now());
         let foot_filter = &observation.camera.rig.geometry().areas.foot_filter;
+        let mut placed = Placed::new(persons, foot_filter);
+        let scores = scores(&placed.persons);
+        placed.retain(parameters.refinement.score_threshold);
         let Placed {
             persons,
             margin,
             outside,
-        } = Placed::new(persons, foot_filter);
+        } = placed;
         let views = observation.view_counts();
         let search = observation.search();
         let searches = &self.metrics.frame_searches;
@@ -188,6 +191,7 @@ impl Engine {
             refinement: parameters.refinement,
             defaults: parameters.defaults.clone(),
             persons,
+            scores,
             margin,
             zones,
             search,
@@ -347,6 +351,12 @@ impl Engine {
             }
         })
     }
+}
+
+/// Returns the scores of boxes, highest first.
+#[expect(clippy::cast_possible_truncation, reason = "scores need few digits")]
+fn scores(persons: &[Person]) -> Vec<f32> {
+    persons.iter().map(|person| person.score as f32).collect()
 }
 
 fn check_size(frame: &Frame) -> Result<(), PipelineError> {

@@ -13,7 +13,10 @@ use jiff::Timestamp;
 use lookdown_lens::geometry::{
     OrientedBox, crop_placement::CropTarget, oriented_box::vertical_in_frame,
 };
-use lookdown_tracking::follow::{FollowedPeople, FoundPerson, JOINED_CELLS, SEARCH_EVERY_S};
+use lookdown_tracking::{
+    follow::{FollowedPeople, FoundPerson, JOINED_CELLS, SEARCH_EVERY_S},
+    taught,
+};
 use nalgebra::Point2;
 use parking_lot::Mutex;
 
@@ -115,6 +118,8 @@ struct Followed {
     /// The cells of a frame that can show a person.
     visible: Arc<[bool]>,
     people: FollowedPeople<Person>,
+    /// The boxes of the search below the threshold.
+    candidates: Vec<Person>,
 }
 
 impl Followed {
@@ -213,18 +218,20 @@ impl FollowedFrame {
         true
     }
 
-    /// Returns the persons of the frame, highest score first, and keeps them for the next frame.
-    /// `found_by` returns the persons in the views of a search.
+    /// Returns the persons of the frame and the boxes below the threshold, highest score first, and
+    /// keeps them for the next frame. `found_by` returns the persons in the views of a search.
     pub(super) fn persons(
         self,
         rig: &CameraRig,
         found_by: impl Fn(&RefinementParameters) -> Vec<Person>,
     ) -> Vec<Person> {
         let refinement = self.origin.refinement;
-        let (persons, state) = match self.before {
+        let (mut persons, state) = match self.before {
             Some(state) if self.is_confirmed => (state.persons(&refinement), state),
             before => {
-                let persons = found_by(&refinement);
+                let mut persons = found_by(&with_candidates(&refinement));
+                let is_person = |person: &Person| person.score >= refinement.score_threshold;
+                let candidates = persons.split_off(persons.partition_point(is_person));
                 let visible = before.as_ref().map(|before| Arc::clone(&before.visible));
                 let visible = visible.unwrap_or_else(|| visible_cells(&self.signature, rig));
                 let before = before.map(|before| before.people);
@@ -240,10 +247,12 @@ impl FollowedFrame {
                         seconds(self.at),
                         before.as_ref(),
                     ),
+                    candidates,
                 };
                 (persons, state)
             }
         };
+        persons.extend_from_slice(&state.candidates);
         *self.kept.lock() = Some(state);
         persons
     }
@@ -288,6 +297,14 @@ impl FoundPerson for Person {
 
     fn with_score(self, score: f64) -> Self {
         Self { score, ..self }
+    }
+}
+
+/// Returns the parameters with which boxes below the threshold are found, too.
+pub(super) fn with_candidates(refinement: &RefinementParameters) -> RefinementParameters {
+    RefinementParameters {
+        score_threshold: refinement.score_threshold.min(taught::LEAST_SCORE),
+        ..*refinement
     }
 }
 

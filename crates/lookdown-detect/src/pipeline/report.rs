@@ -45,6 +45,10 @@ pub struct DetectionReport {
     pub defaults: Vec<DefaultUsed>,
     /// Persons, highest score first.
     pub persons: Vec<Person>,
+    /// The scores of all boxes from [`lookdown_tracking::taught::LEAST_SCORE`] on that would count
+    /// as persons: those of `persons`, and those below the threshold. Frames whose persons are
+    /// followed have the lower ones of the last search.
+    pub scores: Vec<f32>,
     /// Persons in the margin of the areas, who do not count; `None` without areas.
     pub margin: Option<Vec<Person>>,
     /// The number of persons in each zone, in the order of the calibration.

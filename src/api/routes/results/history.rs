@@ -14,6 +14,7 @@ use bytes::{BufMut, Bytes, BytesMut};
 use jiff::Timestamp;
 use lookdown_common::report::Report;
 use lookdown_detect::parameters::{ParameterError, whole_number};
+use lookdown_tracking::taught::NumberWithBar;
 use utoipa::ToSchema;
 
 use super::{NO_CACHE, address::CameraAddress, unknown};
@@ -42,6 +43,12 @@ pub(in crate::api) struct PastReport {
     /// them.
     #[schema(example = 3)]
     persons: usize,
+    /// In 90 % of frames, the true number is at least this one.
+    #[schema(example = 2)]
+    persons_low: usize,
+    /// In 90 % of frames, the true number is at most this one.
+    #[schema(example = 5)]
+    persons_high: usize,
     /// The report.
     report: Report,
 }
@@ -78,26 +85,28 @@ pub(in crate::api) async fn get_history(
     if state.results.latest(&camera).await?.is_none() {
         return Err(unknown(&camera));
     }
+    let taught = state.references.number(&camera);
     let camera = Cameras::One(camera);
     let page = state.results.since(&camera, since, limit).await?;
     let content_type = [(CONTENT_TYPE, "application/json")];
     let cache = [(CACHE_CONTROL, NO_CACHE)];
-    let persons = medians(&page);
+    let persons = medians(&page, taught.as_deref());
     let body = write(page.iter().map(AsRef::as_ref).zip(persons));
     Ok((content_type, cache, body))
 }
 
 /// Writes a JSON array of the reports with their IDs and medians. The stored JSON of each report is
 /// copied unchanged.
-fn write<'a>(page: impl Iterator<Item = (&'a StoredReport, usize)>) -> Bytes {
+fn write<'a>(page: impl Iterator<Item = (&'a StoredReport, NumberWithBar)>) -> Bytes {
     let mut text = BytesMut::new();
-    for (stored, persons) in page {
+    for (stored, NumberWithBar { persons, low, high }) in page {
         if text.len() > PAGE_BYTES {
             break;
         }
         text.put_u8(if text.is_empty() { b'[' } else { b',' });
         let start = format!(
-            "{{\"id\":\"{}\",\"persons\":{persons},\"report\":",
+            "{{\"id\":\"{}\",\"persons\":{persons},\"persons_low\":{low},\"persons_high\":{high},\
+             \"report\":",
             stored.id
         );
         text.put_slice(start.as_bytes());

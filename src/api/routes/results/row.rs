@@ -21,11 +21,18 @@ pub(in crate::api) struct CameraRow {
     /// Age of the report in seconds.
     #[schema(minimum = 0, example = 0.731)]
     age_seconds: f64,
-    /// Number of persons there now: those whom the counts follow while their number is known, else
-    /// the median of the reports of the last 5 s; `null` while the camera is paused.
+    /// Number of persons there now: what reference counts teach, else those whom the counts follow
+    /// while their number is known, else the median of the reports of the last 5 s; `null` while
+    /// the camera is paused.
     #[schema(example = 3)]
     persons: Option<usize>,
-    /// The origin of `persons`: `tracks`, `median` or `paused`.
+    /// In 90 % of frames, the true number is at least this one.
+    #[schema(example = 2)]
+    persons_low: Option<usize>,
+    /// In 90 % of frames, the true number is at most this one.
+    #[schema(example = 5)]
+    persons_high: Option<usize>,
+    /// The origin of `persons`: `taught`, `tracks`, `median` or `paused`.
     #[schema(example = "median")]
     persons_source: &'static str,
     /// Number of persons in the latest report.
@@ -35,8 +42,9 @@ pub(in crate::api) struct CameraRow {
 
 impl CameraRow {
     /// Returns the values that change with a report or a number, not with time.
-    pub(super) fn state(&self) -> (&str, &str, Option<usize>, &'static str) {
-        (&self.camera, &self.id, self.persons, self.persons_source)
+    pub(super) fn state(&self) -> (&str, &str, [Option<usize>; 3], &'static str) {
+        let numbers = [self.persons, self.persons_low, self.persons_high];
+        (&self.camera, &self.id, numbers, self.persons_source)
     }
 
     pub(super) fn at(latest: &StoredReport, headline: Headline, now: Timestamp) -> Self {
@@ -47,7 +55,9 @@ impl CameraRow {
             received_at: format!("{:.3}", latest.report.received_at),
             // The clock may have been set back since.
             age_seconds: (age.max(0.0) * 1000.0).round() / 1000.0,
-            persons: headline.persons,
+            persons: headline.number.map(|number| number.persons),
+            persons_low: headline.number.map(|number| number.low),
+            persons_high: headline.number.map(|number| number.high),
             persons_source: headline.source.name(),
             frame_persons: latest.report.persons,
         }

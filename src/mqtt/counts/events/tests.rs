@@ -10,6 +10,7 @@ fn snapshot(crossings: u64, persons: Option<u64>) -> Snapshot {
             is_paused: false,
             too_low_since_ms: None,
             persons,
+            bar: None,
             lines: vec![LineSnapshot {
                 line: "door".to_owned(),
                 direction: "in".to_owned(),

@@ -27,6 +27,7 @@ fn add_with_image(kept: &mut BoundedReports, camera: &str) -> ReportId {
         camera: camera.to_owned(),
         received_at: Timestamp::UNIX_EPOCH,
         persons: 0,
+        scores: None,
         json: Bytes::new(),
     };
     let image = StoredFrame {
@@ -41,6 +42,7 @@ fn add(kept: &mut BoundedReports, camera: &str, length: usize) -> ReportId {
         camera: camera.to_owned(),
         received_at: Timestamp::UNIX_EPOCH,
         persons: 0,
+        scores: None,
         json: Bytes::from(vec![b' '; length]),
     };
     kept.add(report, None, Timestamp::UNIX_EPOCH).id

@@ -53,6 +53,10 @@ pub(super) struct StepCounts {
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct PersonCounts {
     pub(super) mean: f64,
+    /// In 90 % of rooms, the true mean is at least this one.
+    pub(super) mean_low: f64,
+    /// In 90 % of rooms, the true mean is at most this one.
+    pub(super) mean_high: f64,
     pub(super) max: u64,
 }
 
@@ -80,7 +84,7 @@ fn zones_schema() -> Object {
 
 /// Writes the counts as a table. Unknown counts are empty cells.
 pub(super) fn csv(counts: &Counts) -> String {
-    let mut text = "from,to,known_seconds,slow_seconds,persons_mean,persons_max".to_owned();
+    let mut text = "from,to,known_seconds,slow_seconds,persons_mean,persons_mean_low,persons_mean_high,persons_max".to_owned();
     let first = counts.steps.first();
     let lines = first.and_then(|step| step.lines.as_ref());
     for (line, directions) in lines.into_iter().flatten() {
@@ -100,6 +104,8 @@ pub(super) fn csv(counts: &Counts) -> String {
         cell(&mut text, step.slow_seconds);
         let persons = step.persons.as_ref();
         cell(&mut text, persons.map(|persons| persons.mean));
+        cell(&mut text, persons.map(|persons| persons.mean_low));
+        cell(&mut text, persons.map(|persons| persons.mean_high));
         cell(&mut text, persons.map(|persons| persons.max));
         for directions in step.lines.iter().flat_map(BTreeMap::values) {
             for crossings in directions.values() {

@@ -31,4 +31,12 @@ impl Placed {
         }
         placed
     }
+
+    /// Removes those of lower scores than the threshold.
+    pub(super) fn retain(&mut self, score_threshold: f64) {
+        let margin = self.margin.iter_mut();
+        for persons in margin.chain([&mut self.persons, &mut self.outside]) {
+            persons.retain(|person| person.score >= score_threshold);
+        }
+    }
 }
