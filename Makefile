@@ -13,6 +13,9 @@ SOURCE_URL ?= $(shell git config --get remote.origin.url 2>/dev/null | sed 's|:/
 VERSION = $(shell sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml)
 # The form of the tests of `make reliability`: long or short.
 FORM ?= long
+# The profile of the binaries of `make reliability`, `make real` and `make bench`: release or quick.
+PROFILE ?= release
+export PROFILE
 
 .NOTPARALLEL:
 .PHONY: help setup models serve test test-real reliability real real-parts audit advisories sbom dist deb image wheel arm64 bench bench-full bench-remap check release ci fuzz bless
@@ -105,13 +108,13 @@ wheel: ## build the Python wheel: target/wheels
 arm64: ## cross-build for arm64 on Debian 12 and test it with an emulator: docs/deployment.md
 	$(PYTHON) packaging/scripts/arm64.py
 
-test-real: ## test with real services; as root on Debian it installs missing packages
-	@$(MAKE) --no-print-directory reliability FORM=short
-	@$(MAKE) --no-print-directory real
+test-real: ## test with real services and a quick build; as root on Debian it installs missing packages
+	@$(MAKE) --no-print-directory reliability FORM=short PROFILE=quick
+	@$(MAKE) --no-print-directory real PROFILE=quick
 
 real: ## test with a browser, Redis, brokers, clients ..., or only PARTS: tests/real
 	@$(PYTHON) packaging/scripts/setup.py toolchain runtime wheel
-	cargo build --release --locked --target-dir target
+	cargo build --profile $(PROFILE) --locked --target-dir target
 	@# Downloads while it compiles a wheel, in half the time of `make wheel`.
 	@$(MAKE) --no-print-directory real-parts & trap 'kill $$!; exit 130' INT; \
 		LOOKDOWN_COMMIT=$(LOOKDOWN_COMMIT) $(PYTHON) packaging/scripts/wheel.py quick || { kill $$!; exit 1; }; wait $$!
@@ -126,7 +129,7 @@ real-parts:
 
 reliability: ## kill, flood, starve and soak the server (an hour), or only PARTS: docs/lab/reliability.md
 	@$(PYTHON) packaging/scripts/setup.py toolchain runtime reliability
-	cargo build --release --locked --package lookdown --package lookdown-load --target-dir target
+	cargo build --profile $(PROFILE) --locked --package lookdown --package lookdown-load --target-dir target
 	$(PYTHON) tests/reliability/run.py $(FORM) $(PARTS)
 
 bench: ## run short benchmarks against other servers (a few minutes): lab/benches/RESULTS.md
@@ -136,7 +139,7 @@ bench-full: BENCH = full
 bench bench-full:
 	@packaging/scripts/packages.sh haproxy
 	@$(PYTHON) packaging/scripts/setup.py toolchain runtime benches
-	cargo build --release --locked --package lookdown --package lookdown-load --target-dir target
+	cargo build --profile $(PROFILE) --locked --package lookdown --package lookdown-load --target-dir target
 	.setup/benches/benches/bin/python lab/benches/run.py $(BENCH) $(PARTS)
 
 ci: ## run the continuous integration

@@ -13,7 +13,8 @@ use lookdown_detect::pipeline::DetectedFrame;
 use lookdown_imaging::{
     Frame,
     annotate::{
-        Cancelled, Concealment, EncodeError, annotate_unless, conceal, encode_jpeg, encode_png,
+        Cancelled, Concealment, EncodeError, Mark, annotate_unless, conceal, encode_jpeg,
+        encode_png,
     },
     narrowed,
 };
@@ -53,6 +54,12 @@ pub fn annotated_image(
     let sketch = Sketch::new(&detected, &options.layers);
     let is_cancelled = || detected.withdrawn.is_cancelled();
     drawn(detected.frame, &sketch, format, options, &is_cancelled)
+}
+
+/// Returns the marks of all people to be concealed, in pixels of the frame: also of those that are
+/// in no result.
+pub(crate) fn marks_to_conceal(detected: &DetectedFrame) -> Vec<Mark> {
+    Sketch::new(detected, &[]).concealed(detected.frame.width())
 }
 
 /// Draws into a frame, which may be smaller than the one that the sketch was made of.

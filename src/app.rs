@@ -21,6 +21,8 @@ use lookdown_detect::{
 use lookdown_imaging::decode::DecodeLimits;
 
 use lookdown_common::{InProcess, OwnCameras, ServerClient, ServerOptions};
+use lookdown_count::{PersonsByCamera, read_persons};
+use tokio::sync::watch;
 
 use crate::{
     access::AccessKeys,
@@ -36,6 +38,7 @@ use crate::{
     },
     telemetry::Tracer,
     tls::Tls,
+    views::Views,
 };
 
 pub use reload::Reloader;
@@ -153,6 +156,7 @@ pub struct App {
     publisher: Option<Publisher>,
     tracer: Tracer,
     companions: Companions,
+    views: Arc<Views>,
     state: ApiState,
     settings: Box<Settings>,
 }
@@ -205,10 +209,12 @@ impl App {
             if options.image_every.is_some() {
                 options.discovery.images = settings.results.images_of.clone();
             }
+            let followed = companions.followed();
             let references = Arc::clone(&references);
             Publisher::new(
                 options,
                 Arc::clone(&results),
+                followed,
                 references,
                 Arc::clone(&metrics),
             )
@@ -220,8 +226,16 @@ impl App {
             },
         };
         let tracer = Tracer::start(&settings.traces)?;
+        let views = Views::new(
+            settings.state.path.clone(),
+            decode_limits(&settings.limits),
+            settings.results.conceal_images,
+        );
+        views.load()?;
+        let views = Arc::new(views);
         let options = api_options(
             &settings,
+            Arc::clone(&views),
             access,
             companions.clone(),
             references,
@@ -249,6 +263,7 @@ impl App {
             publisher: publisher.transpose()?,
             tracer,
             companions,
+            views,
             state,
             settings: Box::new(settings),
         })
@@ -262,6 +277,7 @@ impl App {
 
     /// Answers requests to `/cameras` with these cameras, and publishes a switch for each to MQTT.
     pub fn set_cameras(&mut self, cameras: &Arc<Cameras>) {
+        self.views.show_frames(cameras.viewers());
         self.companions.set_cameras(Arc::clone(cameras));
         if let Some(publisher) = &mut self.publisher {
             publisher.add_switches(Arc::clone(cameras));
@@ -333,7 +349,7 @@ fn open_keys(settings: &AccessSettings) -> anyhow::Result<Option<Arc<AccessKeys>
     Ok(Some(Arc::new(keys)))
 }
 
-/// The counts of another host, if the settings name one.
+/// The counts of another host, if the settings name one. Needs a tokio runtime.
 fn companions(settings: &CountSettings) -> anyhow::Result<Companions> {
     let companions = Companions::default();
     if let Some(url) = &settings.url {
@@ -345,10 +361,12 @@ fn companions(settings: &CountSettings) -> anyhow::Result<Companions> {
             authorities: None,
             in_process: None,
         };
-        companions.forward_counts(
-            ServerClient::new(&options)?,
-            lookdown_count::openapi_document,
-        );
+        let client = ServerClient::new(&options)?;
+        let (sender, numbers) = watch::channel(PersonsByCamera::new());
+        tokio::spawn(read_persons(client.clone(), sender));
+        let followed = companions.followed();
+        followed.set(move |camera| numbers.borrow().get(camera).copied());
+        companions.forward_counts(client, lookdown_count::openapi_document);
     }
     Ok(companions)
 }

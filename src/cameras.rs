@@ -15,15 +15,15 @@ use std::{
 
 use lookdown_common::{ConfigError, OwnCameras, Secret};
 use lookdown_watch::{
-    Camera, CameraEntry, CameraState, Frame, Location, MAX_CAMERAS, Metrics, first_frame,
+    Camera, CameraEntry, CameraState, Frame, Location, MAX_CAMERAS, Metrics, Viewers, first_frame,
 };
 use parking_lot::{Mutex, RwLock};
 use secrecy::ExposeSecret;
-use state_folder::StateFolder;
 use stored::{CameraFile, FILE, TEST, check_name, entry};
 use tokio::sync::Semaphore;
 
 pub use error::CameraError;
+pub(crate) use state_folder::StateFolder;
 pub use stored::{Stored, StoredCamera};
 
 /// Longest wait for the frame of a test.
@@ -78,6 +78,12 @@ impl Cameras {
     /// Returns the names of all cameras.
     pub(crate) fn own(&self) -> &OwnCameras {
         &self.own
+    }
+
+    /// Returns the viewers of the cameras.
+    #[must_use]
+    pub fn viewers(&self) -> &Arc<Viewers> {
+        self.metrics.viewers()
     }
 
     /// Returns the states of the cameras that are watched: those of the settings and these stored

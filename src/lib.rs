@@ -26,3 +26,4 @@ pub mod settings;
 mod suggestions;
 pub mod telemetry;
 pub mod tls;
+pub mod views;

@@ -2,7 +2,7 @@
 //! for live streams. A report is stored as the exact bytes that answered its frame.
 
 mod cameras;
-mod followed_number;
+mod followed_persons;
 mod headline;
 mod listeners;
 mod memory;
@@ -13,7 +13,7 @@ mod stored_image;
 mod unreachable;
 
 pub use cameras::Cameras;
-pub use followed_number::{FOLLOWED_FOR, FollowedNumber};
+pub use followed_persons::FollowedPersons;
 pub use headline::{Headline, HeadlineSource, MEDIAN_WINDOW, medians};
 pub use listeners::{ListenError, Listeners, Listening};
 pub use memory::MemoryResults;

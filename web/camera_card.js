@@ -5,6 +5,7 @@ import { options, retention } from "./camera_states.js";
 import { addCounts, layersBelow } from "./counts.js";
 import { element, find } from "./dom.js";
 import { addBoxes } from "./ignore_place.js";
+import { addViews } from "./live_view.js";
 import { sketch } from "./marks.js";
 import { stepPlot } from "./plot.js";
 import { shown, withProgress } from "./progress.js";
@@ -35,7 +36,7 @@ export function addCard(camera, { onchange, reread }) {
   const tools = TOOLS.map((name) => element("button", { type: "button", onclick: use(name.toLowerCase()) }, name));
   const group = element("div", { class: "use-frame", role: "group", "aria-label": `Use this frame of ${camera}` }, element("span", { class: "muted", "aria-hidden": "true" }, "Use this frame:"), ...tools);
   card.remedy = element("button", { type: "button", class: "quiet", hidden: true, onclick: chooseAutomatically(card) }, "Set Rate and Profile to automatic");
-  node.append(element("header", {}, element("h2", {}, link), age), now, state, card.remedy, suggestion, card.teaching.node, day, element("footer", {}, group, manage, strip));
+  node.append(element("header", {}, element("h2", {}, link), age), now, addViews(card), state, card.remedy, suggestion, card.teaching.node, day, element("footer", {}, group, manage, strip));
   return card;
 }
 
@@ -56,11 +57,12 @@ export function drawCard(card, others) {
   const count = history.at(-1).persons;
   const zones = report.zones?.map(({ name, persons }) => element("li", {}, `${name} `, element("b", {}, String(persons))));
   card.now.replaceChildren(
-    element("div", { class: "sight" }, card.image ?? sketch(report), element("p", { class: "big" }, element("b", {}, count === null ? "–" : String(count)), count === null ? "" : errorBar(card.bar, count), count === null ? "paused" : count === 1 ? "person" : "persons")),
+    element("div", { class: "sight" }, card.live.view ? card.live.image : (card.image ?? sketch(report)), element("p", { class: "big" }, element("b", {}, count === null ? "–" : String(count)), count === null ? "" : errorBar(card.bar, count), count === null ? "paused" : count === 1 ? "person" : "persons")),
     card.isSingle && !card.hasImage && !card.info ? imagesOff(card.camera) : "",
     zones ? element("ul", { class: "zones" }, zones) : "",
     stepPlot(history, Date.now()),
   );
+  options().then(({ can_change: may }) => (card.live.group.hidden = !may));
   showImage(card);
   addCounts(card);
   showDay(card);
@@ -92,7 +94,7 @@ async function showImage(card) {
       URL.revokeObjectURL(image.src);
       return;
     }
-    find(".sight", card.node).firstChild.replaceWith(image);
+    if (!card.live.view) find(".sight", card.node).firstChild.replaceWith(image);
     if (card.image) URL.revokeObjectURL(card.image.src);
     card.image = image;
   } catch (problem) {

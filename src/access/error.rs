@@ -47,7 +47,7 @@ pub enum KeyError {
         position: usize,
     },
     /// A scope is unknown, or there is none.
-    #[error("key {position}: give one or more of the scopes detect, read and admin")]
+    #[error("key {position}: give one or more of the scopes detect, read, view and admin")]
     Scopes {
         /// The position of the key, from 1.
         position: usize,

@@ -21,6 +21,8 @@ pub enum Scope {
     Detect,
     /// Read calibrations, view plans, results and counts.
     Read,
+    /// See the images of views.
+    View,
     /// Everything, including changes of calibrations and cameras.
     Admin,
 }

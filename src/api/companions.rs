@@ -7,7 +7,7 @@ use lookdown_common::{OwnCameras, ServerClient};
 use parking_lot::RwLock;
 use utoipa::openapi::OpenApi;
 
-use crate::cameras::Cameras;
+use crate::{cameras::Cameras, results::FollowedPersons};
 
 /// Returns metrics in the text format of Prometheus.
 type MetricsText = Arc<dyn Fn() -> Vec<u8> + Send + Sync>;
@@ -27,6 +27,7 @@ struct Parts {
     count_warning: Option<CountWarning>,
     cameras: Option<Arc<Cameras>>,
     own_cameras: OwnCameras,
+    followed: FollowedPersons,
     metrics: BTreeMap<&'static str, MetricsText>,
 }
 
@@ -73,6 +74,12 @@ impl Companions {
     #[must_use]
     pub fn own_cameras(&self) -> OwnCameras {
         self.0.read().own_cameras.clone()
+    }
+
+    /// Returns the numbers of persons that the counts follow.
+    #[must_use]
+    pub fn followed(&self) -> FollowedPersons {
+        self.0.read().followed.clone()
     }
 
     /// Answers requests to `/cameras` with these cameras.

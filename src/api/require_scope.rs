@@ -8,11 +8,13 @@ use axum::{
     http::{HeaderMap, request::Parts},
 };
 
+use lookdown_http::keys::basic_password;
+
 use super::{
     ApiState,
     http::{access::Identity, context::RequestContext, problem::Problem},
 };
-use crate::access::Scope;
+use crate::access::{Holder, Scope};
 
 /// Proof that the request has the scope of `S`.
 pub(super) struct RequireScope<S>(PhantomData<S>);
@@ -23,6 +25,9 @@ pub(super) type RequireDetect = RequireScope<Detect>;
 pub(super) type RequireRead = RequireScope<Read>;
 /// Proof that the request may change the calibrations and the cameras of the server.
 pub(super) type RequireAdmin = RequireScope<Admin>;
+
+/// Proof that the request may see the images of views.
+pub(super) type RequireView = RequireScope<View>;
 
 /// A required scope.
 pub(super) trait RequiredScope {
@@ -49,6 +54,7 @@ required_scopes! {
     Detect = Detect, false;
     Read = Read, false;
     Admin = Admin, true;
+    View = View, false;
 }
 
 impl<S: RequiredScope> RequireScope<S> {
@@ -60,6 +66,25 @@ impl<S: RequiredScope> RequireScope<S> {
             access.check(headers, identity, S::SCOPE)?;
         }
         Ok(Self(PhantomData))
+    }
+
+    /// Checks the scope of a request whose key may also be the password of Basic authentication, or
+    /// `in_query`. Returns the holder of such a key.
+    pub(super) fn with_key(
+        state: &ApiState,
+        headers: &HeaderMap,
+        in_query: Option<&str>,
+    ) -> Result<(Self, Option<Holder>), Problem> {
+        let access = &state.options.access;
+        let identity = access.identify(headers);
+        let password = basic_password(headers);
+        if S::OWN_MACHINE_ONLY {
+            access.check_of_its_own(headers, &identity, S::SCOPE)?;
+            return Ok((Self(PhantomData), None));
+        }
+        let elsewhere = in_query.or(password.as_deref());
+        let holder = access.check_with(headers, &identity, elsewhere, S::SCOPE)?;
+        Ok((Self(PhantomData), holder))
     }
 
     /// Checks the scope of a stream again: its key may have been removed.

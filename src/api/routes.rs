@@ -11,6 +11,7 @@ pub(super) mod problems;
 pub(super) mod results;
 pub(super) mod web_page;
 
+use utoipa::OpenApi as _;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::{ApiState, detect};
@@ -40,6 +41,15 @@ pub(super) fn client_routes() -> OpenApiRouter<ApiState> {
         .routes(routes!(cameras::test))
         .routes(routes!(cameras::get_frame))
         .routes(routes!(cameras::suggestion::get))
+        .routes(routes!(cameras::views::list))
+        .routes(routes!(
+            cameras::views::get,
+            cameras::views::put,
+            cameras::views::delete
+        ))
+        .merge(OpenApiRouter::with_openapi(
+            cameras::views::ImageRoutes::openapi(),
+        ))
         .routes(routes!(cameras::reference_counts::list))
         .routes(routes!(
             cameras::reference_counts::put,
@@ -47,7 +57,6 @@ pub(super) fn client_routes() -> OpenApiRouter<ApiState> {
         ))
         .routes(routes!(results::list))
         .routes(routes!(results::delete::delete))
-        .routes(routes!(results::followed::put))
         .routes(routes!(results::latest::get_latest))
         .routes(routes!(results::latest_image::get_latest_image))
         .routes(routes!(results::history::get_history))

@@ -14,7 +14,7 @@ use lookdown_detect::{
     pipeline::{PipelineError, WorkerPool},
 };
 use lookdown_http::{csrf::AllowedOrigins, header_limits::HeaderLimits};
-use lookdown_imaging::annotate::Concealment;
+use lookdown_imaging::{annotate::Concealment, decode::DecodeLimits};
 use lookdown_lens::self_calibration::IdealLens;
 
 use super::{
@@ -37,6 +37,7 @@ use crate::{
     results::{ImagesOf, ResultStore},
     suggestions::Suggestions,
     telemetry::Tracer,
+    views::Views,
 };
 
 /// Divisor of `max_upload_bytes` for the memory of bodies whose key has not been checked.
@@ -78,6 +79,8 @@ pub struct ApiOptions {
     pub min_upload_bytes_per_second: Option<NonZeroU64>,
     /// Rate limit of each client; `None` for no limit.
     pub request_rate: Option<RequestRate>,
+    /// The straight views of cameras.
+    pub views: Arc<Views>,
     /// The access rules.
     pub access: Access,
     /// Origins of web pages that may call the server from a browser.
@@ -141,6 +144,7 @@ impl ApiOptions {
             request_timeout: Duration::from_secs(20),
             min_upload_bytes_per_second: None,
             request_rate: None,
+            views: Arc::new(Views::new("state".into(), DecodeLimits::default(), None)),
             access: Access::Open {
                 own_machine_only: true,
             },

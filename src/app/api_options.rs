@@ -7,11 +7,13 @@ use crate::{
     reference_counts::ReferenceCounts,
     settings::Settings,
     telemetry::Tracer,
+    views::Views,
 };
 
 /// Returns the options of the API.
 pub(super) fn api_options(
     settings: &Settings,
+    views: Arc<Views>,
     access: Access,
     companions: Companions,
     references: Arc<ReferenceCounts>,
@@ -40,6 +42,7 @@ pub(super) fn api_options(
                 per_second,
                 burst: settings.limits.request_burst,
             }),
+        views,
         access,
         cors_origins: settings.access.cors_origins.clone(),
         hosts: settings.access.hosts.clone(),

@@ -4,7 +4,6 @@
 mod change;
 mod content;
 mod error;
-mod file_reader;
 mod load;
 mod named_file;
 mod samples;
@@ -28,7 +27,7 @@ use lookdown_detect::{
 };
 use parking_lot::{Mutex, MutexGuard, RwLock};
 
-use self::{file_reader::FileReader, snapshot::Snapshot};
+use self::snapshot::Snapshot;
 use super::{CalibrationStore, StoreError};
 use crate::metrics::Metrics;
 
@@ -42,7 +41,6 @@ pub use snapshot::{CalibrationRow, CalibrationsHealth};
 pub struct Calibrations {
     store: Box<dyn CalibrationStore>,
     writable: bool,
-    reader: FileReader,
     /// True when the store was read once, with or without success.
     is_read: AtomicBool,
     now: RwLock<Arc<Snapshot>>,
@@ -63,7 +61,7 @@ impl Calibrations {
         writable: bool,
         metrics: Arc<Metrics>,
     ) -> Result<Self, StoreError> {
-        let calibrations = Self::unread(store, writable, FileReader::default(), metrics);
+        let calibrations = Self::unread(store, writable, metrics);
         calibrations.scan(&calibrations.lock())?;
         calibrations.is_read.store(true, Ordering::Relaxed);
         Ok(calibrations)
@@ -81,17 +79,7 @@ impl Calibrations {
         timeout: Duration,
         metrics: Arc<Metrics>,
     ) -> Result<Arc<Self>, StoreError> {
-        Self::open_with(store, writable, FileReader::default(), timeout, metrics)
-    }
-
-    fn open_with(
-        store: Box<dyn CalibrationStore>,
-        writable: bool,
-        reader: FileReader,
-        timeout: Duration,
-        metrics: Arc<Metrics>,
-    ) -> Result<Arc<Self>, StoreError> {
-        let calibrations = Arc::new(Self::unread(store, writable, reader, metrics));
+        let calibrations = Arc::new(Self::unread(store, writable, metrics));
         let (done, outcome) = sync_channel(0);
         let reading = Arc::clone(&calibrations);
         let read = move || {
@@ -118,18 +106,12 @@ impl Calibrations {
         Ok(calibrations)
     }
 
-    fn unread(
-        store: Box<dyn CalibrationStore>,
-        writable: bool,
-        reader: FileReader,
-        metrics: Arc<Metrics>,
-    ) -> Self {
+    fn unread(store: Box<dyn CalibrationStore>, writable: bool, metrics: Arc<Metrics>) -> Self {
         start_at_zero(&metrics.calibration_loads, &["success", "failure"]);
         Snapshot::default().publish(&metrics, None);
         Self {
             store,
             writable,
-            reader,
             is_read: AtomicBool::new(false),
             now: RwLock::default(),
             changing: Mutex::default(),

@@ -16,25 +16,25 @@ use super::error::CameraError;
 const PASSWORDS: &str = "passwords";
 
 /// The state folder, which may be missing.
-pub(super) struct StateFolder(PathBuf);
+pub(crate) struct StateFolder(PathBuf);
 
 impl StateFolder {
-    pub(super) fn new(path: PathBuf) -> Self {
+    pub(crate) fn new(path: PathBuf) -> Self {
         Self(path)
     }
 
     /// Returns the path of a file.
-    pub(super) fn file(&self, name: &str) -> PathBuf {
+    pub(crate) fn file(&self, name: &str) -> PathBuf {
         self.0.join(name)
     }
 
     /// Returns the path of the file with the password of a camera.
-    pub(super) fn password(&self, camera: &str) -> PathBuf {
+    pub(crate) fn password(&self, camera: &str) -> PathBuf {
         self.0.join(PASSWORDS).join(camera)
     }
 
     /// Reads a JSON file. A missing file is empty.
-    pub(super) fn read<T: Default + DeserializeOwned>(&self, name: &str) -> Result<T, ConfigError> {
+    pub(crate) fn read<T: Default + DeserializeOwned>(&self, name: &str) -> Result<T, ConfigError> {
         let path = self.file(name);
         if !path.exists() {
             return Ok(T::default());
@@ -44,7 +44,7 @@ impl StateFolder {
     }
 
     /// Reads the password of a camera as it was given. Without a file, it is empty.
-    pub(super) fn read_password(&self, camera: &str) -> Result<Secret, ConfigError> {
+    pub(crate) fn read_password(&self, camera: &str) -> Result<Secret, ConfigError> {
         let path = self.password(camera);
         if !path.exists() {
             return Ok(Secret::default());
@@ -55,18 +55,18 @@ impl StateFolder {
     }
 
     /// Returns the error of a file with another content.
-    pub(super) fn malformed(&self, name: &str, error: &serde_json::Error) -> ConfigError {
+    pub(crate) fn malformed(&self, name: &str, error: &serde_json::Error) -> ConfigError {
         self.refused(name, &format!("is not a file of cameras: {error}"))
     }
 
     /// Returns the error of a file with this problem, the end of a sentence.
-    pub(super) fn refused(&self, name: &str, problem: &str) -> ConfigError {
+    pub(crate) fn refused(&self, name: &str, problem: &str) -> ConfigError {
         let problem = format!("{} {problem}", self.file(name).display());
         ConfigError::problem("state.path", &problem)
     }
 
     /// Writes a file that only this user can read, in one step.
-    pub(super) fn write(&self, path: &Path, content: &str) -> Result<(), CameraError> {
+    pub(crate) fn write(&self, path: &Path, content: &str) -> Result<(), CameraError> {
         let unwritable = |error| CameraError::Folder(path.to_owned(), error);
         fs::DirBuilder::new()
             .recursive(true)
@@ -79,12 +79,12 @@ impl StateFolder {
     }
 
     /// Removes a file, if it exists.
-    pub(super) fn remove(path: &Path) -> Result<(), CameraError> {
+    pub(crate) fn remove(path: &Path) -> Result<(), CameraError> {
         unless_missing(path, fs::remove_file(path))
     }
 
     /// Renames a file, if it exists.
-    pub(super) fn rename(from: &Path, to: &Path) -> Result<(), CameraError> {
+    pub(crate) fn rename(from: &Path, to: &Path) -> Result<(), CameraError> {
         unless_missing(from, fs::rename(from, to))
     }
 }

@@ -144,9 +144,6 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
             progress.advance();
         }
     }
-    if let Some(progress) = progress {
-        progress.finish();
-    }
     if let Some(labels) = labels {
         labels.write()?;
     }

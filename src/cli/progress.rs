@@ -1,68 +1,58 @@
-//! The progress of a long run: a bar on a terminal, otherwise occasional lines.
+//! The progress of a long run: one line that changes on a terminal, otherwise occasional lines.
 
 use std::{
     io::{self, IsTerminal, Write},
     time::{Duration, Instant},
 };
 
-use indicatif::{ProgressBar, ProgressStyle};
 use parking_lot::Mutex;
 
 /// Approximate number of lines per run without a terminal.
 const LINES: usize = 10;
-const BAR: &str = "{prefix} {wide_bar} {pos} of {len} images, {eta} left";
 
 /// The progress of one run over images, on standard error.
-pub(super) enum Progress {
-    /// On a terminal.
-    Bar(ProgressBar),
-    /// Without a terminal.
-    Lines(Mutex<Lines>),
-}
+pub(super) struct Progress(Mutex<Lines>);
 
 impl Progress {
     /// Starts with no image done of `total`.
     pub(super) fn start(name: &str, total: usize) -> Self {
-        if !io::stderr().is_terminal() {
-            return Self::Lines(Mutex::new(Lines {
-                name: name.to_owned(),
-                total,
-                done: 0,
-                started: Instant::now(),
-            }));
-        }
-        let style = ProgressStyle::with_template(BAR);
-        let bar = ProgressBar::new(total as u64)
-            .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
-            .with_prefix(name.to_owned());
-        Self::Bar(bar)
+        Self(Mutex::new(Lines {
+            name: name.to_owned(),
+            total,
+            done: 0,
+            started: Instant::now(),
+        }))
     }
 
     /// Counts another image. May be called from any thread.
     pub(super) fn advance(&self) {
-        match self {
-            Self::Bar(bar) => bar.inc(1),
-            Self::Lines(lines) => {
-                let mut lines = lines.lock();
-                lines.done += 1;
-                if let Some(line) = lines.due(lines.started.elapsed()) {
-                    // A failure to print the progress does not stop the run.
-                    let _ = writeln!(io::stderr(), "{line}");
-                }
-            }
-        }
+        let mut lines = self.0.lock();
+        lines.done += 1;
+        let line = lines.line(lines.started.elapsed());
+        let mut errors = io::stderr();
+        // A failure to print the progress does not stop the run.
+        let _ = if errors.is_terminal() {
+            write!(errors, "\r{line}\x1b[K")
+        } else if lines.is_due() {
+            writeln!(errors, "{line}")
+        } else {
+            Ok(())
+        };
     }
+}
 
-    /// Ends the run. The bar stays visible.
-    pub(super) fn finish(&self) {
-        if let Self::Bar(bar) = self {
-            bar.abandon();
+impl Drop for Progress {
+    /// Ends the line of a terminal.
+    fn drop(&mut self) {
+        let mut errors = io::stderr();
+        if errors.is_terminal() {
+            let _ = writeln!(errors);
         }
     }
 }
 
 /// Progress lines, limited in number so that they do not flood a log.
-pub(super) struct Lines {
+struct Lines {
     name: String,
     total: usize,
     done: usize,
@@ -70,23 +60,23 @@ pub(super) struct Lines {
 }
 
 impl Lines {
-    /// Returns the line for the last image, if one is due.
-    fn due(&self, elapsed: Duration) -> Option<String> {
+    /// Returns true if the last image has a line without a terminal.
+    fn is_due(&self) -> bool {
+        self.done.is_multiple_of(self.total.div_ceil(LINES).max(1)) || self.done == self.total
+    }
+
+    /// Returns the line for the last image.
+    fn line(&self, elapsed: Duration) -> String {
         let Self {
             name, total, done, ..
         } = self;
-        if !done.is_multiple_of(total.div_ceil(LINES).max(1)) && done != total {
-            return None;
-        }
         #[expect(
             clippy::cast_precision_loss,
             reason = "an approximate value is sufficient"
         )]
         let to_go = total.saturating_sub(*done) as f64 / (*done).max(1) as f64;
         let seconds = elapsed.as_secs_f64() * to_go;
-        Some(format!(
-            "{name}: {done} of {total} images, about {seconds:.0} s left"
-        ))
+        format!("{name}: {done} of {total} images, about {seconds:.0} s left")
     }
 }
 
@@ -102,7 +92,9 @@ mod tests {
                 done,
                 started: Instant::now(),
             };
-            lines.due(Duration::from_secs(done as u64))
+            lines
+                .is_due()
+                .then(|| lines.line(Duration::from_secs(done as u64)))
         };
         (1..=total).filter_map(line_after).collect()
     }

@@ -249,6 +249,7 @@ impl Parts {
         let settings = counting(&self.settings, Some(server.clone()));
         let started = |started: Started| {
             companions.set_counts(started.routes, started.warning);
+            companions.followed().set(started.persons);
             companions.set_metrics("counts", started.metrics);
         };
         let counts = run_counts(&settings, started, async || {

@@ -30,7 +30,7 @@ use super::{
 use crate::{
     metrics::Metrics,
     reference_counts::ReferenceCounts,
-    results::{self, Headline, ListenError, ResultStore, StoredReport},
+    results::{self, FollowedPersons, Headline, ListenError, ResultStore, StoredReport},
     tls::TlsError,
 };
 
@@ -80,6 +80,7 @@ pub struct Publisher {
 struct Publication {
     options: MqttOptions,
     results: Arc<dyn ResultStore>,
+    counted: FollowedPersons,
     references: Arc<ReferenceCounts>,
     metrics: Arc<Metrics>,
     topics: Topics,
@@ -97,6 +98,7 @@ impl Publisher {
     pub fn new(
         options: MqttOptions,
         results: Arc<dyn ResultStore>,
+        counted: FollowedPersons,
         references: Arc<ReferenceCounts>,
         metrics: Arc<Metrics>,
     ) -> Result<Self, TlsError> {
@@ -109,6 +111,7 @@ impl Publisher {
             topics: Topics::new(&options.topic_prefix, options.discovery_prefix.as_deref()),
             options,
             results,
+            counted,
             references,
             metrics,
             switched: None,
@@ -272,7 +275,7 @@ impl Publication {
                     session.publish(self.without_removed(cameras).await).await?;
                 }
                 _ = numbers.tick() => {
-                    session.publish(self.followed(cameras).await).await?;
+                    session.publish(self.followed(cameras)).await?;
                     if let Some(switches) = &mut switches {
                         session.publish(switches.update(Instant::now()).await).await?;
                     }
@@ -308,21 +311,23 @@ impl Publication {
     async fn headline(&self, report: &StoredReport) -> NumberWithBar {
         // A paused camera is unavailable, whatever its number.
         let own = OwnCameras::default();
-        let headline = Headline::for_latest(&*self.results, report, &own, &self.references).await;
+        let (counted, references) = (&self.counted, &self.references);
+        let headline =
+            Headline::for_latest(&*self.results, report, &own, counted, references).await;
         let number = headline.ok().and_then(|headline| headline.number);
         number.unwrap_or_else(|| NumberWithBar::untaught(report.report.persons))
     }
 
     /// Updates what changes without a report: the followed numbers, and cameras that are paused.
     /// Returns the messages.
-    async fn followed(&self, cameras: &mut Cameras) -> Vec<Message> {
+    fn followed(&self, cameras: &mut Cameras) -> Vec<Message> {
         let mut messages = cameras.pause(Instant::now());
         for camera in cameras.available() {
-            // Without an answer or a number, and with a taught one, the next report decides.
+            // Without a number, and with a taught one, the next report decides.
             if self.references.number(&camera).is_none()
-                && let Ok(Some(number)) = self.results.followed(&camera).await
+                && let Some(persons) = self.counted.at(&camera)
             {
-                let number = NumberWithBar::untaught(number.persons);
+                let number = NumberWithBar::untaught(persons);
                 messages.extend(cameras.set_number(&camera, number, Instant::now()));
             }
         }

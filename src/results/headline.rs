@@ -1,16 +1,15 @@
 //! The headline number of a camera: how many people are there now, with its error bar.
 //!
-//! With enough reference counts, it is the number that they teach. Else it is the number of
-//! followed persons while `lookdown count` hands it back, and else that of the reports. Numbers of
-//! reports are medians. Without reference counts, all servers with one result store have the same
-//! number.
+//! With enough reference counts, it is the number that they teach. Else it is the number of persons
+//! that the counts follow, while it is known, and else that of the reports. Numbers of reports are
+//! medians. Without reference counts, all servers with one result store have the same number.
 
 use std::{num::NonZeroUsize, sync::Arc, time::Duration};
 
 use lookdown_common::OwnCameras;
 use lookdown_tracking::taught::{NumberWithBar, TaughtNumber};
 
-use super::{Cameras, ReportId, ResultStore, StoredReport, Unreachable};
+use super::{Cameras, FollowedPersons, ReportId, ResultStore, StoredReport, Unreachable};
 use crate::reference_counts::ReferenceCounts;
 
 /// The reports of this time before the latest one, inclusively, have a part in the median.
@@ -42,7 +41,7 @@ pub struct Headline {
 
 impl Headline {
     /// Returns the headline number of the camera with this latest report. `own` are the cameras of
-    /// this process, which may be paused.
+    /// this process, which may be paused, and `followed` the numbers of the counts.
     ///
     /// # Errors
     /// [`Unreachable`].
@@ -50,6 +49,7 @@ impl Headline {
         store: &dyn ResultStore,
         latest: &StoredReport,
         own: &OwnCameras,
+        followed: &FollowedPersons,
         references: &ReferenceCounts,
     ) -> Result<Self, Unreachable> {
         let camera = &latest.report.camera;
@@ -62,10 +62,10 @@ impl Headline {
         let taught = references.number(camera);
         let taught = taught.filter(|_| latest.report.scores.is_some());
         if taught.is_none()
-            && let Some(followed) = store.followed(camera).await?
+            && let Some(persons) = followed.at(camera)
         {
             return Ok(Self {
-                number: Some(NumberWithBar::untaught(followed.persons)),
+                number: Some(NumberWithBar::untaught(persons)),
                 source: HeadlineSource::Tracks,
             });
         }
@@ -155,7 +155,7 @@ mod tests {
     use crate::{
         metrics::Metrics,
         reference_counts::ReferenceCount,
-        results::{FollowedNumber, MemoryResults, NewReport, ResultLimits},
+        results::{MemoryResults, NewReport, ResultLimits},
     };
 
     fn store_of(numbers: &[usize]) -> (MemoryResults, Arc<StoredReport>) {
@@ -179,10 +179,18 @@ mod tests {
         store: &MemoryResults,
         latest: &StoredReport,
         own: &OwnCameras,
+        counted: Option<u64>,
     ) -> Headline {
-        Headline::for_latest(store, latest, own, &ReferenceCounts::default())
+        let references = ReferenceCounts::default();
+        Headline::for_latest(store, latest, own, &followed(counted), &references)
             .await
             .unwrap()
+    }
+
+    fn followed(counted: Option<u64>) -> FollowedPersons {
+        let followed = FollowedPersons::default();
+        followed.set(move |camera| counted.filter(|_| camera == "hall"));
+        followed
     }
 
     fn persons(headline: Headline) -> Option<usize> {
@@ -199,7 +207,7 @@ mod tests {
             (&[5, 5, 8, 5, 14, 5, 3], 5),
         ] {
             let (store, latest) = store_of(numbers);
-            let headline = headline_of(&store, &latest, &OwnCameras::default()).await;
+            let headline = headline_of(&store, &latest, &OwnCameras::default(), None).await;
             assert_eq!(persons(headline), Some(expected), "{numbers:?}");
             let NumberWithBar { low, high, .. } = headline.number.unwrap();
             assert!(low <= expected && expected <= high && low < high);
@@ -211,38 +219,12 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn followed_number_replaces_the_median_while_it_is_valid() {
-        let (store, latest) = store_of(&[9, 9, 9]);
-        let follow = async |persons: usize, age: i64| {
-            let at = Timestamp::now() - jiff::SignedDuration::from_secs(age);
-            let number = FollowedNumber { persons, at };
-            assert!(store.follow("hall", number).await.unwrap());
-            headline_of(&store, &latest, &OwnCameras::default()).await
-        };
-        let headline = follow(5, 0).await;
-        assert_eq!(
-            (persons(headline), headline.source.name()),
-            (Some(5), "tracks")
-        );
-        assert_eq!(persons(follow(6, 10).await), Some(6));
-        assert_eq!(persons(follow(6, 20).await), Some(9));
-        let number = FollowedNumber {
-            persons: 1,
-            at: Timestamp::now(),
-        };
-        assert!(!store.follow("other", number).await.unwrap());
-        follow(5, 0).await;
-        assert!(store.delete("hall").await.unwrap());
-        assert_eq!(store.followed("hall").await.unwrap(), None);
-    }
-
-    #[tokio::test]
-    async fn paused_camera_has_no_number() {
+    async fn paused_camera_has_no_number_and_others_the_followed_one() {
         let (store, latest) = store_of(&[7, 7, 7]);
         let own = OwnCameras::default();
-        for (is_paused, expected, source) in [(true, None, "paused"), (false, Some(7), "median")] {
+        for (is_paused, expected, source) in [(true, None, "paused"), (false, Some(5), "tracks")] {
             own.set([("hall".to_owned(), is_paused)].into());
-            let headline = headline_of(&store, &latest, &own).await;
+            let headline = headline_of(&store, &latest, &own, Some(5)).await;
             assert_eq!(
                 (persons(headline), headline.source.name()),
                 (expected, source)
@@ -255,18 +237,6 @@ mod tests {
         let (store, latest) = store_of(&[4, 4, 4]);
         let (references, own) = (ReferenceCounts::default(), OwnCameras::default());
         let now = Timestamp::now();
-        assert!(
-            store
-                .follow(
-                    "hall",
-                    FollowedNumber {
-                        persons: 4,
-                        at: now
-                    }
-                )
-                .await
-                .unwrap()
-        );
         for persons in 1..6_u8 {
             let scores = [vec![0.9; persons.into()], vec![0.1; persons.into()]].concat();
             let told = ReferenceCount {
@@ -276,7 +246,8 @@ mod tests {
                 scores,
             };
             references.put("hall", told, now).unwrap();
-            let headline = Headline::for_latest(&store, &latest, &own, &references);
+            let followed = followed(Some(4));
+            let headline = Headline::for_latest(&store, &latest, &own, &followed, &references);
             let headline = headline.await.unwrap();
             let expected = if persons == 5 {
                 (8, "taught")

@@ -3,7 +3,7 @@
 mod images;
 mod kept;
 
-use std::{collections::BTreeMap, num::NonZeroUsize, sync::Arc};
+use std::{num::NonZeroUsize, sync::Arc};
 
 use async_trait::async_trait;
 use jiff::Timestamp;
@@ -13,8 +13,8 @@ use parking_lot::{Mutex, MutexGuard};
 
 use self::kept::BoundedReports;
 use super::{
-    Cameras, FollowedNumber, ListenError, Listeners, Listening, NewReport, ReportId, ResultLimits,
-    ResultStore, ResultUse, StoreHealth, StoredImage, StoredReport, Unreachable,
+    Cameras, ListenError, Listeners, Listening, NewReport, ReportId, ResultLimits, ResultStore,
+    ResultUse, StoreHealth, StoredImage, StoredReport, Unreachable,
 };
 use crate::{annotated_image::StoredFrame, metrics::Metrics};
 
@@ -22,8 +22,6 @@ use crate::{annotated_image::StoredFrame, metrics::Metrics};
 #[derive(Debug)]
 pub struct MemoryResults {
     kept: Mutex<BoundedReports>,
-    /// The followed numbers of the cameras.
-    followed: Mutex<BTreeMap<String, FollowedNumber>>,
     listeners: Arc<Listeners>,
     metrics: Arc<Metrics>,
 }
@@ -36,7 +34,6 @@ impl MemoryResults {
         Self {
             listeners: Arc::new(Listeners::new(limits.max_listeners, Arc::clone(&metrics))),
             kept: Mutex::new(BoundedReports::new(limits)),
-            followed: Mutex::default(),
             metrics,
         }
     }
@@ -72,10 +69,6 @@ impl MemoryResults {
 
     fn note_removals(&self, kept: &BoundedReports, before: u64) {
         if kept.removed_cameras() > before {
-            let cameras = kept.cameras();
-            self.followed
-                .lock()
-                .retain(|camera, _| cameras.contains(camera));
             self.listeners.note_removal();
         }
     }
@@ -102,7 +95,6 @@ impl ResultStore for MemoryResults {
     async fn delete(&self, camera: &str) -> Result<bool, Unreachable> {
         let is_deleted = self.kept().delete(camera);
         if is_deleted {
-            self.followed.lock().remove(camera);
             self.listeners.note_removal();
         }
         Ok(is_deleted)
@@ -123,19 +115,6 @@ impl ResultStore for MemoryResults {
 
     async fn image(&self, camera: &str) -> Result<Option<Arc<StoredImage>>, Unreachable> {
         Ok(self.kept().image(camera))
-    }
-
-    async fn follow(&self, camera: &str, number: FollowedNumber) -> Result<bool, Unreachable> {
-        let is_known = self.kept().latest(camera).is_some();
-        if is_known {
-            self.followed.lock().insert(camera.to_owned(), number);
-        }
-        Ok(is_known)
-    }
-
-    async fn followed(&self, camera: &str) -> Result<Option<FollowedNumber>, Unreachable> {
-        let number = self.followed.lock().get(camera).copied();
-        Ok(number.filter(|number| number.is_valid(Timestamp::now())))
     }
 
     async fn listen(&self, client: &Client, to: Cameras) -> Result<Listening, ListenError> {

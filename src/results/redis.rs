@@ -40,8 +40,8 @@ use self::{
     shared::Shared,
 };
 use super::{
-    Cameras, FollowedNumber, ListenError, Listeners, Listening, NewReport, ReportId, ResultLimits,
-    ResultStore, ResultUse, StoreHealth, StoredImage, StoredReport, Unreachable,
+    Cameras, ListenError, Listeners, Listening, NewReport, ReportId, ResultLimits, ResultStore,
+    ResultUse, StoreHealth, StoredImage, StoredReport, Unreachable,
 };
 use crate::{annotated_image::StoredFrame, metrics::Metrics, tls::TlsError};
 
@@ -146,16 +146,6 @@ impl ResultStore for RedisResults {
 
     async fn image(&self, camera: &str) -> Result<Option<Arc<StoredImage>>, Unreachable> {
         self.ask(async |mut reader| reader.image(camera).await)
-            .await
-    }
-
-    async fn follow(&self, camera: &str, number: FollowedNumber) -> Result<bool, Unreachable> {
-        self.ask(async |mut reader| reader.follow(camera, number).await)
-            .await
-    }
-
-    async fn followed(&self, camera: &str) -> Result<Option<FollowedNumber>, Unreachable> {
-        self.ask(async |mut reader| reader.followed(camera).await)
             .await
     }
 

@@ -6,8 +6,8 @@ use async_trait::async_trait;
 use lookdown_detect::fairness::Client;
 
 use super::{
-    Cameras, FollowedNumber, ListenError, Listeners, Listening, NewReport, ReportId, StoredImage,
-    StoredReport, Unreachable,
+    Cameras, ListenError, Listeners, Listening, NewReport, ReportId, StoredImage, StoredReport,
+    Unreachable,
 };
 use crate::annotated_image::StoredFrame;
 
@@ -60,18 +60,6 @@ pub trait ResultStore: Send + Sync {
     /// # Errors
     /// [`Unreachable`].
     async fn image(&self, camera: &str) -> Result<Option<Arc<StoredImage>>, Unreachable>;
-
-    /// Stores the followed number of a camera. Returns false for a camera without a report.
-    ///
-    /// # Errors
-    /// [`Unreachable`].
-    async fn follow(&self, camera: &str, number: FollowedNumber) -> Result<bool, Unreachable>;
-
-    /// The followed number of a camera while it is valid.
-    ///
-    /// # Errors
-    /// [`Unreachable`].
-    async fn followed(&self, camera: &str) -> Result<Option<FollowedNumber>, Unreachable>;
 
     /// Adds a listener that receives every report of these cameras that is stored after this
     /// returns, and perhaps some that were stored before.

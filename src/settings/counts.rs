@@ -33,8 +33,9 @@ settings! {
         /// The address of `lookdown count`. `lookdown run` serves the counts on `server.listen`.
         listen: SocketAddr = SocketAddr::from(([127, 0, 0, 1], 8090)) => address();
         /// The address of a `lookdown count` to which `lookdown serve` forwards requests to
-        /// `/counts`, `/sites` and `/cameras/{camera}/furniture`, such as `http://10.0.0.3:8090`. A
-        /// caller needs the scope `read` of this server. Empty: none.
+        /// `/counts`, `/sites` and `/cameras/{camera}/furniture`, such as `http://10.0.0.3:8090`,
+        /// and whose numbers of persons it shows. A caller needs the scope `read` of this server.
+        /// Empty: none.
         url: Option<Url> = None => optional(web_address());
         /// The file with the key of `lookdown count`, at least 16 characters on the first line:
         /// `count` requires it of its clients, and `serve` sends it to `counts.url`. Empty: none.

@@ -16,6 +16,7 @@ use crate::{
 pub(crate) const FINDER: &str = "lookdown_finder";
 pub(crate) const READER: &str = "lookdown_reader";
 pub(crate) const ADMINISTRATOR: &str = "lookdown_administrator";
+pub(crate) const VIEWER: &str = "lookdown_viewer";
 pub(crate) const BOTH: &str = "lookdown_both";
 
 /// All routes that need a scope.
@@ -53,6 +54,7 @@ fn write_keys(file: &Path) {
         line("finder", "\"detect\"", FINDER),
         line("reader", "\"read\"", READER),
         line("administrator", "\"admin\"", ADMINISTRATOR),
+        line("viewer", "\"view\"", VIEWER),
         line("both", "\"detect\", \"read\"", BOTH),
     ];
     fs::write(file, lines.concat()).unwrap();

@@ -46,4 +46,5 @@ mod suggestions;
 mod tls;
 mod traces;
 mod v2;
+mod views;
 mod web_pages;

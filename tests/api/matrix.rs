@@ -7,7 +7,7 @@ use serde_json::Value;
 use tokio::task::spawn_blocking;
 
 use crate::{
-    access::{ADMINISTRATOR, BOTH, FINDER, READER, guarded},
+    access::{ADMINISTRATOR, BOTH, FINDER, READER, VIEWER, guarded},
     listeners::{KEY, accepts, answer, start_count, status},
     service::{Answer, Service},
 };
@@ -26,11 +26,12 @@ const PARAMETERS: [(&str, &str); 9] = [
     ("{name}", "eager"),
 ];
 /// Keys of the tests, each with the scopes that it allows.
-const KEYS: [(&str, &[&str]); 4] = [
+const KEYS: [(&str, &[&str]); 5] = [
     (FINDER, &["detect"]),
     (READER, &["read"]),
+    (VIEWER, &["view"]),
     (BOTH, &["detect", "read"]),
-    (ADMINISTRATOR, &["detect", "read", "admin"]),
+    (ADMINISTRATOR, &["detect", "read", "view", "admin"]),
 ];
 
 /// An operation of the document.

@@ -23,6 +23,7 @@ use lookdown::{
     results::{ImagesOf, MemoryResults, ResultLimits, ResultStore},
     settings::explain,
     telemetry::Tracer,
+    views::Views,
 };
 use lookdown_detect::{
     inference::{InferenceError, Model, ModelFolder, ModelRepository, RepositoryOptions},
@@ -32,6 +33,7 @@ use lookdown_detect::{
 use lookdown_imaging::{
     Frame, NetworkInput,
     annotate::{Concealment, encode_png},
+    decode::DecodeLimits,
 };
 use serde_json::Value;
 use tempfile::TempDir;
@@ -262,6 +264,11 @@ impl Service {
                 hosts: bounds.hosts.clone(),
                 companions: bounds.companions.clone(),
                 tracer: bounds.tracer.clone(),
+                views: Arc::new(Views::new(
+                    folder.path().join("state"),
+                    DecodeLimits::default(),
+                    bounds.conceal_images,
+                )),
                 ..ApiOptions::for_testing()
             },
         );

@@ -37,12 +37,12 @@ fn samples_with_detections() -> tempfile::TempDir {
 }
 
 #[test]
-fn saved_detections_are_scored_and_plotted_without_a_model() {
+fn saved_detections_are_scored_without_a_model() {
     let folder = samples_with_detections();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-    let (rows, plot) = (path("rows"), path("curves.svg"));
+    let rows = path("rows");
     let data_set = folder.path().to_str().unwrap();
-    let flags = ["--from-detections", &rows, "--json", "--plot", &plot];
+    let flags = ["--from-detections", &rows, "--json"];
     let no_library = [("LOOKDOWN__INFERENCE__LIBRARY_PATH", "/nowhere.so")];
     let output = lookdown(&[&["eval", data_set], &flags[..]].concat(), &no_library);
     assert!(output.status.success(), "{output:?}");
@@ -67,8 +67,6 @@ fn saved_detections_are_scored_and_plotted_without_a_model() {
         );
         assert_eq!(row["seconds_per_image"], serde_json::Value::Null);
     }
-    let svg = std::fs::read_to_string(plot).unwrap();
-    assert!(svg.contains("another detector") && svg.contains("paper nms tiny"));
 }
 
 #[test]
@@ -150,11 +148,4 @@ fn the_calibration_for_every_image_must_exist() {
     ];
     let output = lookdown(&[&["eval", data_set], &flags[..]].concat(), &[]);
     assert_fails_with(&output, &["--calibration", "no/such.json"]);
-}
-
-#[test]
-fn a_sweep_takes_one_profile() {
-    let flags = ["--sweep", "out", "--profile", "fast", "--profile", "paper"];
-    let output = lookdown(&[&["eval", "somewhere"], &flags[..]].concat(), &[]);
-    assert_fails_with(&output, &["--sweep", "one --profile"]);
 }

@@ -85,7 +85,10 @@ fn unknown_choices_are_refused_with_the_possible_values() {
             ["eval", "folder", "--by", "best"],
             "distance, size, visibility",
         ),
-        (["key", "new", "--scope", "best"], "detect, read, admin"),
+        (
+            ["key", "new", "--scope", "best"],
+            "detect, read, view, admin",
+        ),
     ] {
         assert_lists_values(&lookdown(&arguments, &[]), "best", possible);
     }

@@ -1,7 +1,12 @@
 //! The commands of the README, in a folder with the samples, against a server with the default
-//! models.
+//! models, and the commands and requests of the other pages as far as they can be read alone.
 
-use std::{fs, os::unix::fs::symlink, path::Path, process::Command};
+use std::{
+    env, fs,
+    os::unix::fs::symlink,
+    path::Path,
+    process::{Command, Stdio},
+};
 
 use serde_json::Value;
 use tempfile::tempdir;
@@ -75,4 +80,105 @@ fn commands_of_the_readme_run_and_answer_as_shown() {
         near(&format!("/box/{side}"), 2.0);
     }
     near("/score", 0.03);
+}
+
+/// The commands of a page of docs/ that begin with one of the `programs`, joined over continued
+/// lines, without comments.
+fn commands_of_page(page: &str, programs: &[&str]) -> Vec<String> {
+    let joined = page.replace("\\\n", " ");
+    let mut found = Vec::new();
+    for line in joined.lines() {
+        let line = line.strip_prefix("    ").unwrap_or(line);
+        let line = line.split(" # ").next().unwrap_or(line).trim();
+        let mut words = line.split(' ');
+        let program = words.find(|word| !word.contains('=') || word.contains('/'));
+        if program.is_some_and(|program| programs.contains(&program)) {
+            found.push(line.to_owned());
+        }
+    }
+    found
+}
+
+fn pages() -> Vec<(String, String)> {
+    let mut pages = Vec::new();
+    for entry in fs::read_dir(Path::new(ROOT).join("docs")).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|extension| extension == "md") {
+            let name = path.file_name().unwrap().to_string_lossy().into_owned();
+            pages.push((name, fs::read_to_string(path).unwrap()));
+        }
+    }
+    pages
+}
+
+#[test]
+fn commands_of_all_pages_have_known_options() {
+    let program = Path::new(env!("CARGO_BIN_EXE_lookdown"));
+    let system = env::var("PATH").unwrap();
+    let path = format!("{}:{system}", program.parent().unwrap().display());
+    let mut tried = 0;
+    for (page, text) in pages() {
+        for command in commands_of_page(&text, &["lookdown"]) {
+            let (command, _) = command.split_once(" > ").unwrap_or((&command, ""));
+            let command = command.replace("FILE|FOLDER", "FOLDER");
+            let output = Command::new("sh")
+                .args(["-c", &format!("{command} --help")])
+                .env("PATH", &path)
+                .stdin(Stdio::null())
+                .output()
+                .unwrap();
+            let said = String::from_utf8_lossy(&output.stderr);
+            assert!(output.status.success(), "{page}: {command}: {said}");
+            tried += 1;
+        }
+    }
+    assert!(tried > 25, "{tried} commands");
+}
+
+#[test]
+fn requests_of_all_pages_are_in_the_openapi_document() {
+    let document = fs::read(Path::new(ROOT).join("openapi/openapi.json")).unwrap();
+    let document: Value = serde_json::from_slice(&document).unwrap();
+    let counts = fs::read(Path::new(ROOT).join("openapi/counts.json")).unwrap();
+    let counts: Value = serde_json::from_slice(&counts).unwrap();
+    let mut tried = 0;
+    for (page, text) in pages() {
+        for command in commands_of_page(&text, &["curl"]) {
+            let Some((_, request)) = command.split_once("localhost:8080") else {
+                continue;
+            };
+            let path = request.split(['?', ' ', '\'', '"']).next().unwrap();
+            let mut words = command.split(' ');
+            let method = if words.clone().any(|word| word == "-T") {
+                "put"
+            } else if words.clone().any(|word| word == "-F") {
+                "post"
+            } else if words.any(|word| word == "-X") {
+                words.next().unwrap()
+            } else {
+                "get"
+            };
+            let has_route = |document: &Value| {
+                let routes = document["paths"].as_object().unwrap();
+                routes.iter().any(|(route, methods)| {
+                    is_of_route(path, route) && methods.get(method.to_lowercase()).is_some()
+                })
+            };
+            assert!(
+                has_route(&document) || has_route(&counts),
+                "{page}: {command}: no route {method} {path}"
+            );
+            tried += 1;
+        }
+    }
+    assert!(tried > 20, "{tried} requests");
+}
+
+/// Returns true if `path` is one of those of a route with names in braces.
+fn is_of_route(path: &str, route: &str) -> bool {
+    let (path, route) = (path.split('/'), route.split('/'));
+    path.clone().count() == route.clone().count()
+        && path
+            .zip(route)
+            .all(|(word, name)| word == name || name.starts_with('{'))
 }

@@ -1,16 +1,22 @@
 """Runs the tests against real software: `run.py [PART...]`, where `PART` is a `test_PART.py` in this folder.
 
-Each test starts the release binary, or the one that `LOOKDOWN_BINARY` names, and the other software, uses them like a user, and stops them. Exits with
-1 if a test fails. All parts are run by default.
+Each test starts the binary of the profile that the variable `PROFILE` names (default: release) and the other software,
+uses them like a user, and stops them. Exits with 1 if a test fails. All parts are run by default. Most parts wait most of the time, so
+several parts run at the same time, each in its own process; those of `ALONE` measure times and run after them.
 """
 
+import concurrent.futures
+import os
 import signal
+import subprocess
 import sys
 import time
 import unittest
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
+ALONE = ("walks", "number", "page", "count", "camera_hashing")
+"""Parts whose frames must be on time."""
 for folder in (HERE, HERE.parent / "reliability", HERE.parents[1] / "lab/benches"):
     sys.path.insert(0, str(folder))
 
@@ -36,9 +42,33 @@ def main(parts: list[str]) -> int:
         return 2
     # Started servers are stopped on exit.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    tests = unittest.defaultTestLoader.loadTestsFromNames([f"test_{part}" for part in parts or there])
+    if len(parts) == 1:
+        return 0 if passes(parts[0]) else 1
+    wanted = parts or there
+    with concurrent.futures.ThreadPoolExecutor(1 + (os.cpu_count() or 1)) as pool:
+        together = {pool.submit(run_process, part, subprocess.PIPE): part for part in wanted if part not in ALONE}
+        failed = []
+        for done in concurrent.futures.as_completed(together):
+            process = done.result()
+            print(f"== {together[done]}", process.stdout, sep="\n", flush=True)
+            failed += [together[done]] if process.returncode else []
+    failed += [part for part in ALONE if part in wanted and run_process(part, None).returncode]
+    print(f"real: failed: {', '.join(failed)}" if failed else f"real: all {len(wanted)} parts passed")
+    return 1 if failed else 0
+
+
+def run_process(part: str, output: int | None) -> subprocess.CompletedProcess[str]:
+    """Runs one part in its own process."""
+    return subprocess.run(
+        [sys.executable, __file__, part], stdout=output, stderr=output and subprocess.STDOUT, text=True, check=False
+    )
+
+
+def passes(part: str) -> bool:
+    """Runs the tests of a part in this process."""
+    tests = unittest.defaultTestLoader.loadTestsFromName(f"test_{part}")
     result = unittest.TextTestRunner(verbosity=2, resultclass=TimedResult).run(tests)
-    return 0 if result.wasSuccessful() and result.testsRun else 1
+    return result.wasSuccessful() and result.testsRun > 0
 
 
 if __name__ == "__main__":

@@ -245,6 +245,10 @@ class Counts(CountedCamera):
             self.assertIs(False, config["enabled_by_default"])
             count.stop(signal.SIGKILL)
         self.server.delete("/results/office")
+        self.server.post(DETECT, OFFICE)
+        source = lambda: json.loads(self.server.get("/results"))[0]["persons_source"]  # noqa: E731
+        wait_until(lambda: source() == "median", "the number of the counts has expired")
+        self.server.delete("/results/office")
         last = [len(json.loads(self.server.post(DETECT, OFFICE))["persons"]) for _ in range(3)]
         rows = json.loads(self.server.get("/results"))
         self.assertEqual([(last[-1], "median")], [(row["persons"], row["persons_source"]) for row in rows])

@@ -83,6 +83,6 @@ class Keys(unittest.TestCase):
                 self.assertGreater(len(ask(client, server, key=KEY)["predictions"]), 3)
                 for key in ("", "wrong"):
                     self.assertIn("401", ask(client, server, key=key)["raised"])
-        log = (ROOT / ".setup" / "benches" / "work" / "lookdown.log").read_text(errors="replace")
+            log = server.log.read_text(errors="replace")
         self.assertIn("/v1/vision/detection", log)
         self.assertNotIn(KEY, log)

@@ -9,7 +9,7 @@ import unittest
 from pathlib import Path
 
 from commands import run
-from harness.places import ROOT, SAMPLES
+from harness.places import SAMPLES
 from mosquitto import PASSWORD, PASSWORD_IN_URL, broker
 from state import metric, wait_until
 from support.lookdown import TINY, lookdown
@@ -179,9 +179,8 @@ class Mqtt(unittest.TestCase):
         wrong = self.broker.url.replace(PASSWORD_IN_URL, "wr0ng")
         with self.lookdown(MQTT__URL=wrong, LOG__FILTER="trace") as server:
             server.post(DETECT, OFFICE)
-            log = ROOT / ".setup" / "benches" / "work" / "lookdown.log"
-            wait_until(lambda: "mqtt.url" in log.read_text(errors="replace"), "the warning is logged")
-            text = log.read_text(errors="replace")
+            wait_until(lambda: "mqtt.url" in server.log.read_text(errors="replace"), "the warning is logged")
+            text = server.log.read_text(errors="replace")
         self.assertEqual(text.count("not publishing"), 1)
         for secret in ("wr0ng", PASSWORD, PASSWORD_IN_URL):
             self.assertNotIn(secret, text)
@@ -217,6 +216,5 @@ class MqttOverTls(unittest.TestCase):
     def test_a_broker_with_an_untrusted_certificate_is_refused(self):
         with lookdown(TINY | {"MQTT__URL": self.broker.url}) as server:
             server.post(DETECT, OFFICE)
-            log = ROOT / ".setup" / "benches" / "work" / "lookdown.log"
-            wait_until(lambda: "not publishing" in log.read_text(errors="replace"), "the warning is logged")
+            wait_until(lambda: "not publishing" in server.log.read_text(errors="replace"), "the warning is logged")
             self.assertEqual(self.broker.retained(), {})

@@ -60,7 +60,7 @@ const LASTING: [&str; 2] = [
 const CLOCKS: [&str; 3] = ["SystemTime::now()", "Timestamp::now()", "Zoned::now()"];
 /// The files that may make them: they date reports, and compare with the dates of others.
 /// docs/lab/reliability.md states what holds when the clock jumps.
-const CLOCK_READERS: [&str; 21] = [
+const CLOCK_READERS: [&str; 20] = [
     "crates/lookdown-count/src/follower.rs",
     "crates/lookdown-count/src/http/shared.rs",
     "crates/lookdown-count/src/now.rs",
@@ -73,7 +73,6 @@ const CLOCK_READERS: [&str; 21] = [
     "src/api/routes/cameras.rs",
     "src/api/routes/cameras/reference_counts.rs",
     "src/api/routes/results.rs",
-    "src/api/routes/results/followed.rs",
     "src/api/detect/upload/received_request.rs",
     "src/app.rs",
     "src/calibration_store/store/folder.rs",

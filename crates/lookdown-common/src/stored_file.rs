@@ -13,6 +13,8 @@ pub enum StoredFile {
     Calibration,
     /// The cameras of `lookdown run` that are added over HTTP.
     Cameras,
+    /// The straight views of cameras.
+    Views,
     /// The counts: `user_version` of the `SQLite` file.
     Counts,
     /// The state of a tracker in the counts: its first byte.
@@ -27,7 +29,7 @@ impl StoredFile {
     #[must_use]
     pub const fn version(self) -> u8 {
         match self {
-            Self::Settings | Self::Calibration | Self::Cameras | Self::Counts => 1,
+            Self::Settings | Self::Calibration | Self::Cameras | Self::Views | Self::Counts => 1,
             Self::Tracks => 3,
         }
     }

@@ -8,6 +8,7 @@
 //! Around it: the follower reads `/events` and feeds the counter, the store keeps sums per minute
 //! with the state and the ID of the last report, and the HTTP API answers from both.
 
+mod bars;
 mod batch;
 mod calibrations;
 #[cfg(test)]
@@ -21,7 +22,6 @@ mod event_parser;
 mod event_stream;
 mod follower;
 mod frame_rate;
-mod hand_back;
 mod http;
 mod message;
 mod metrics;
@@ -29,6 +29,7 @@ mod now;
 mod options;
 mod presence;
 mod recording;
+mod remote_persons;
 mod report;
 mod report_time;
 mod run;
@@ -44,6 +45,7 @@ pub use event_image::latest_image;
 pub use http::openapi_document;
 pub use options::{CountEntry, CountOptions, read_key};
 pub use recording::{Recording, RecordingError};
+pub use remote_persons::{PersonsByCamera, read_persons};
 pub use run::{CountError, Started, count};
 pub use snapshot::{CameraSnapshot, LineSnapshot, SiteSnapshot, Snapshot, ZoneSnapshot};
 pub use store::StoreError;

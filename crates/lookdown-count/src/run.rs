@@ -20,10 +20,10 @@ use tokio::{
 use tokio_util::task::AbortOnDropHandle;
 
 use crate::{
+    bars::read_bars,
     calibrations::Calibrations,
     counter::{Counter, CountingOptions},
     follower::Follower,
-    hand_back::hand_back,
     http::{Api, operation_router, probes, router},
     metrics::Metrics,
     now::time_of,
@@ -36,6 +36,8 @@ use crate::{
 /// Longest time for the last transaction.
 const LAST_COMMIT: Duration = Duration::from_secs(10);
 
+/// Returns the number of persons at a camera; `None` while it is unknown.
+type Persons = Box<dyn Fn(&str) -> Option<u64> + Send + Sync>;
 /// Returns the sentence about a camera that is not counted, or whose counts may be too low.
 type CountWarning = Box<dyn Fn(&str) -> Option<String> + Send + Sync>;
 
@@ -45,6 +47,8 @@ pub struct Started {
     pub routes: Router,
     /// Returns all metrics in the text format of Prometheus.
     pub metrics: Box<dyn Fn() -> Vec<u8> + Send + Sync>,
+    /// Returns the number of persons at a camera now; `None` while it is unknown.
+    pub persons: Persons,
     /// Returns the reason why a camera is not counted now, or why its counts may be too low.
     pub warning: CountWarning,
 }
@@ -127,19 +131,17 @@ pub async fn count(
     let _serving = listener.map(own_listener);
     let (shown, shown_counter) = (Arc::clone(&metrics), Arc::clone(&counter));
     let warned = Arc::clone(&counter);
+    let latest = snapshots.subscribe();
     started(Started {
+        persons: Box::new(move |camera| latest.borrow().persons(camera)),
         warning: Box::new(move |camera| warned.lock().warning(camera)),
         routes: counts,
         metrics: Box::new(move || {
             shown.text(&shown_counter.lock(), Timestamp::now().as_millisecond())
         }),
     });
-    let handing_back = tokio::spawn(hand_back(
-        client.clone(),
-        snapshots.subscribe(),
-        Arc::clone(&counter),
-    ));
-    let _handing_back = AbortOnDropHandle::new(handing_back);
+    let reading_bars = tokio::spawn(read_bars(client.clone(), Arc::clone(&counter)));
+    let _reading_bars = AbortOnDropHandle::new(reading_bars);
     let (stop_sender, stop_receiver) = watch::channel(false);
     let mut follower = Follower {
         deliveries: Deliveries::start(

@@ -68,6 +68,14 @@ pub struct SiteSnapshot {
     pub persons: Option<u64>,
 }
 
+impl Snapshot {
+    /// Returns the number of persons at a camera; `None` while it is unknown.
+    pub(crate) fn persons(&self, camera: &str) -> Option<u64> {
+        let known = self.cameras.iter().find(|known| known.name == camera);
+        known?.persons
+    }
+}
+
 impl Counter {
     /// Returns the reason why a camera is not counted now, or why its counts may be too low.
     pub(crate) fn warning(&self, camera: &str) -> Option<String> {

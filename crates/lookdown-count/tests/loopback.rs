@@ -12,8 +12,10 @@ use std::{
 
 use events::{CALIBRATION, START_MS, Server, event, person, walks};
 use lookdown_calibration::Calibration;
-use lookdown_common::{HttpClient, ServerEntry};
-use lookdown_count::{CountEntry, Recording, Snapshot, WebhookEntry, count};
+use lookdown_common::{HttpClient, ServerClient, ServerEntry};
+use lookdown_count::{
+    CountEntry, PersonsByCamera, Recording, Snapshot, WebhookEntry, count, read_persons,
+};
 use reqwest::RequestBuilder;
 use serde_json::{Value, json};
 use tokio::{
@@ -317,8 +319,18 @@ async fn tracks_are_current_and_anonymous() {
             metrics.contains("lookdown_count_persons{camera=\"hall\"} 2"),
             "{metrics}"
         );
-        let cameras = companion.json("/counts").await;
-        assert_eq!(cameras[0]["name"], "hall");
+        let entry = ServerEntry {
+            url: Some(companion.url.clone()),
+            ..ServerEntry::default()
+        };
+        let counts = ServerClient::new(&entry.check().unwrap()).unwrap();
+        let (sender, mut numbers) = watch::channel(PersonsByCamera::new());
+        let read = async {
+            numbers.changed().await.unwrap();
+            assert_eq!(numbers.borrow().get("hall"), Some(&2));
+            drop(numbers);
+        };
+        tokio::join!(read_persons(counts, sender), read);
     })
     .await;
 }

@@ -28,7 +28,8 @@ impl PrecisionRecallCurve {
     }
 
     /// `(recall, envelope precision)` of each point, by ascending recall.
-    pub(super) fn envelope(&self) -> Vec<(f64, f64)> {
+    #[must_use]
+    pub fn envelope(&self) -> Vec<(f64, f64)> {
         let mut greatest: f64 = 0.0;
         let mut envelope: Vec<(f64, f64)> = self
             .points()

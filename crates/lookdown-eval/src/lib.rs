@@ -10,7 +10,6 @@ mod ground_truth;
 mod in_order;
 mod matching;
 mod outline;
-mod plot;
 mod precision_recall;
 mod region;
 mod rotated_box;
@@ -19,7 +18,6 @@ mod run;
 mod saved;
 mod strata;
 mod summary;
-pub mod sweep;
 
 pub use average_precision::AveragePrecision;
 pub use counts::{CalibrationError, CountFigures, Counts, DEFAULT_COUNT_THRESHOLD};
@@ -27,7 +25,6 @@ pub use data_set::{DataSet, DataSetError, DataSetImage, ImageId, ScoringMismatch
 pub use ground_truth::{AnnotatedPerson, EvaluatedImage, GroundTruth, ScoredBox};
 pub use matching::{MatchingRule, Outcome};
 pub use outline::{Outline, Scoring};
-pub use plot::{Line, LinePlot, PlotError, precision_recall_plot};
 pub use precision_recall::{OperatingPoint, PrecisionRecallCurve};
 pub use region::Region;
 pub use rotated_box::RotatedBox;

@@ -1,6 +1,7 @@
 //! The keys that a request presents, and the check of a single key.
 
 use axum::http::{HeaderMap, HeaderName, HeaderValue, header::AUTHORIZATION};
+use base64::{Engine as _, engine::general_purpose::STANDARD};
 use secrecy::{ExposeSecret, SecretString};
 use sha2::{Digest, Sha256};
 use subtle::ConstantTimeEq;
@@ -10,6 +11,7 @@ use crate::problem::{Kind, Problem};
 /// The header that holds a key alone.
 pub const API_KEY: HeaderName = HeaderName::from_static("x-api-key");
 const BEARER: &[u8] = b"bearer ";
+const BASIC: &[u8] = b"basic ";
 
 /// Returns the keys in the headers. Other schemes of `Authorization` are ignored: they may be meant
 /// for a proxy.
@@ -22,6 +24,18 @@ pub fn presented(headers: &HeaderMap) -> impl Iterator<Item = &[u8]> {
     });
     let plain = headers.get_all(API_KEY).iter();
     bearers.chain(plain.map(HeaderValue::as_bytes))
+}
+
+/// Returns the password of Basic authentication (RFC 7617).
+#[must_use]
+pub fn basic_password(headers: &HeaderMap) -> Option<String> {
+    let value = headers.get(AUTHORIZATION)?.as_bytes();
+    let (scheme, credentials) = value.split_at_checked(BASIC.len())?;
+    let is_basic = scheme.eq_ignore_ascii_case(BASIC);
+    let credentials = STANDARD.decode(credentials.trim_ascii());
+    let credentials = String::from_utf8(credentials.ok().filter(|_| is_basic)?).ok()?;
+    let (_, password) = credentials.split_once(':')?;
+    Some(password.to_owned())
 }
 
 /// Returns the single key of a request.

@@ -13,7 +13,7 @@ mod lens_sketch;
 mod mark;
 mod room_sketch;
 mod style;
-pub(super) mod text;
+mod text;
 
 use super::frame::Frame;
 pub use area_sketch::{ZoneOutline, sketch_areas, sketch_foot_filter, sketch_lines};

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::buffer_pool::Pixels;
+use super::buffer_pool::{Pixels, zeros};
 
 /// An image in 8-bit RGB, rows from top to bottom, without padding.
 ///
@@ -61,6 +61,17 @@ impl Frame {
             height,
             pixels: pixels.into(),
         })
+    }
+
+    /// A black image. A side of zero becomes 1.
+    #[must_use]
+    pub fn black(width: u32, height: u32) -> Self {
+        let (width, height) = (width.max(1), height.max(1));
+        Self {
+            width,
+            height,
+            pixels: zeros(3 * width as usize * height as usize).into(),
+        }
     }
 
     /// Width in pixels, at least 1.

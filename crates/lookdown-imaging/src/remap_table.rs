@@ -25,7 +25,7 @@ use rayon::prelude::*;
 use self::avx2 as vector;
 #[cfg(target_arch = "aarch64")]
 use self::neon as vector;
-use lookdown_lens::geometry::{FrameCrop, Lens, Pixel, VirtualView};
+use lookdown_lens::geometry::{FrameCrop, Lens, Panorama, Pixel, VirtualView};
 
 use self::{
     band::Band,
@@ -96,6 +96,20 @@ impl RemapTable {
             Self::from_grid(grid, frame_from_plane, frame_width, frame_height)
         };
         shared.into_iter().map(table).collect()
+    }
+
+    /// The table of a panorama into frames of `frame_width` × `frame_height` pixels. The lens image
+    /// ends at a node.
+    #[must_use]
+    pub fn for_panorama(
+        panorama: &Panorama,
+        lens: &Lens,
+        frame_width: u32,
+        frame_height: u32,
+    ) -> Self {
+        let grid = Arc::new(NodeGrid::for_panorama(panorama, lens));
+        let frame_from_plane = FrameFromPlane::new(lens.image_plane(), 0.0);
+        Self::from_grid(grid, frame_from_plane, frame_width, frame_height)
     }
 
     /// The table of a crop of frames of `frame_width` × `frame_height` pixels. Positions are exact
@@ -193,16 +207,48 @@ impl RemapTable {
     /// into one view's slot `[3, height, width]` of the network's input (of the view's size).
     /// Pixels that see nothing of the lens image become black.
     pub fn render(&self, frame: &Frame, input: &NetworkInput, slot: &mut [f32]) {
-        #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
-        if let Some(supported) = vector::Supported::detect()
-            && i32::try_from(frame.pixels().len()).is_ok()
-        {
-            self.render_bands(frame, input, slot, |source, band, planes| {
-                vector::render(supported, source, band, planes);
-            });
-            return;
+        self.render_bands(frame, input, slot, render_band);
+    }
+
+    /// Samples `frame` into the rectangle of `image` with this upper left corner and the size of
+    /// the view. Pixels that see nothing of the lens image become black.
+    ///
+    /// # Panics
+    /// Panics if the rectangle reaches beyond the image.
+    pub fn paint(
+        &self,
+        frame: &Frame,
+        [width, height]: [u32; 2],
+        image: &mut Frame,
+        [left, top]: [u32; 2],
+    ) {
+        let input = NetworkInput::plain(width, height);
+        let source = Source::new(frame, &input);
+        let (stride, width) = (3 * image.width() as usize, width as usize);
+        let columns = 3 * left as usize..3 * (left as usize + width);
+        let mut rows = image
+            .pixels_mut()
+            .chunks_exact_mut(stride)
+            .skip(top as usize);
+        // A band stays in the cache of the processor.
+        let mut values = vec![0.0; 3 * LANES * width];
+        for index in 0..self.grid.visibility().bands() {
+            let band = self.band(index);
+            let plane_len = band.rows.len() * width;
+            let (red, rest) = values.split_at_mut(plane_len);
+            let (green, rest) = rest.split_at_mut(plane_len);
+            let blue = &mut rest[..plane_len];
+            render_band(&source, &band, [&mut *red, &mut *green, &mut *blue]);
+            let planes = red.chunks_exact(width).zip(green.chunks_exact(width));
+            let planes = planes.zip(blue.chunks_exact(width));
+            for (((red, green), blue), row) in planes.zip(&mut rows) {
+                let pixels = row[columns.clone()].as_chunks_mut().0;
+                let colors = red.iter().zip(green).zip(blue);
+                for (pixel, ((red, green), blue)) in pixels.iter_mut().zip(colors) {
+                    *pixel = [*red, *green, *blue].map(rounded);
+                }
+            }
         }
-        self.render_portably(frame, input, slot);
     }
 
     /// Portable version of [`RemapTable::render`] for processors without supported vector
@@ -247,6 +293,26 @@ impl RemapTable {
             whole_patches: self.whole_patches.band(index),
         }
     }
+}
+
+/// Renders a band with the fastest instructions of this processor.
+fn render_band(source: &Source, band: &Band, planes: Planes) {
+    #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+    if let Some(supported) = vector::Supported::detect()
+        && i32::try_from(source.pixels.len()).is_ok()
+    {
+        return vector::render(supported, source, band, planes);
+    }
+    scalar::render(source, band, planes);
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a mean of bytes"
+)]
+fn rounded(value: f32) -> u8 {
+    (value + 0.5) as u8
 }
 
 #[cfg(test)]

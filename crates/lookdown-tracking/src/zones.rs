@@ -172,12 +172,6 @@ impl ZoneCounter {
         zones.map(|zone| self.inside(zone).count()).collect()
     }
 
-    /// Returns the times since which the persons in a zone are there, seconds since the Unix epoch.
-    #[must_use]
-    pub fn inside_since_s(&self, zone: usize) -> Vec<f64> {
-        self.inside(zone).map(|visit| visit.since_s).collect()
-    }
-
     fn inside(&self, zone: usize) -> impl Iterator<Item = &Visit> {
         let visits = self.state.tracks.values();
         visits.filter_map(move |visits| visits.get(zone).filter(|visit| visit.is_inside))

@@ -26,6 +26,7 @@ mod source;
 mod source_error;
 mod stderr_line;
 mod video;
+mod viewers;
 mod watcher;
 
 pub use camera::{Camera, Transport, VideoOptions};
@@ -40,4 +41,5 @@ pub use rate::Rate;
 pub use source::{ImageReader, first_frame};
 pub use source_error::SourceError;
 pub use video::{VideoFrames, VideoWriter, video_created_at, video_duration};
+pub use viewers::{Viewers, Viewing};
 pub use watcher::{Origin, WatchError, watch};

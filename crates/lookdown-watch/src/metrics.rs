@@ -9,7 +9,7 @@ use lookdown_common::{metric_set, metrics::text};
 use parking_lot::Mutex;
 use prometheus::{GaugeVec, IntCounter, IntCounterVec, IntGauge, Registry};
 
-use crate::{operating_point::Choice, rate::Rate};
+use crate::{Frame, Viewers, operating_point::Choice, rate::Rate};
 
 /// The reason why a frame did not become a report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,11 +68,13 @@ metric_set! {
 pub struct Metrics {
     pub(crate) series: Series,
     cameras: Mutex<Vec<Arc<CameraMetrics>>>,
+    viewers: Arc<Viewers>,
 }
 
 /// The metrics of one camera.
 pub(crate) struct CameraMetrics {
     camera: String,
+    viewers: Arc<Viewers>,
     last_frame: Mutex<Instant>,
     received: IntCounter,
     sent: IntCounter,
@@ -116,6 +118,7 @@ impl Metrics {
         Ok(Self {
             series: Series::registered_with(&registry.clone(), registry)?,
             cameras: Mutex::default(),
+            viewers: Arc::default(),
         })
     }
 
@@ -125,6 +128,7 @@ impl Metrics {
         let of = |counter: &IntCounterVec| counter.with_label_values(&[camera]);
         let metrics = Arc::new(CameraMetrics {
             camera: camera.to_owned(),
+            viewers: Arc::clone(&self.viewers),
             last_frame: Mutex::new(Instant::now()),
             received: of(&series.received),
             sent: of(&series.sent),
@@ -163,6 +167,12 @@ impl Metrics {
         }
     }
 
+    /// Returns the viewers of the cameras.
+    #[must_use]
+    pub fn viewers(&self) -> &Arc<Viewers> {
+        &self.viewers
+    }
+
     /// Returns the states of all cameras.
     #[must_use]
     pub fn states(&self) -> Vec<CameraState> {
@@ -199,10 +209,21 @@ impl Metrics {
 }
 
 impl CameraMetrics {
-    pub(crate) fn received(&self, at: Instant) {
-        *self.last_frame.lock() = at;
+    pub(crate) fn received(&self, frame: &Frame) {
+        *self.last_frame.lock() = frame.received;
         *self.problem.lock() = None;
         self.received.inc();
+        self.viewers.offer(&self.camera, frame);
+    }
+
+    /// Returns true while all frames of the camera are shown.
+    pub(crate) fn has_viewers(&self) -> bool {
+        self.viewers.has_any(&self.camera)
+    }
+
+    /// Waits until that changes.
+    pub(crate) async fn viewers_changed(&self, had_any: bool) {
+        self.viewers.changed(&self.camera, had_any).await;
     }
 
     pub(crate) fn sent(&self) {
@@ -264,7 +285,8 @@ mod tests {
         let metrics = Metrics::new().unwrap();
         let hall = metrics.add("hall", String::new());
         metrics.add("gate", String::new());
-        hall.received(Instant::now());
+        let jpeg = bytes::Bytes::from_static(b"\xff\xd8\xff\xe0..\xff\xd9");
+        hall.received(&Frame::new(jpeg, jiff::Timestamp::UNIX_EPOCH).unwrap());
         hall.failed(Failure::Refused);
         let text = String::from_utf8(metrics.text()).unwrap();
         for series in [

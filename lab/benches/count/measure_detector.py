@@ -1,7 +1,7 @@
 """Measures a detector for the simulation of walks: `measure_detector.py LOOKDOWN DATASET DETECTIONS`.
 
 LOOKDOWN is the program, and DETECTIONS a file of `lookdown eval DATASET --save-detections FOLDER`. Prints the constants
-of crates/lookdown-tracking/examples/simulate/figures.rs: misses by the angle off the axis, false alarms and the error of
+of lab/benches/simulate/figures.rs: misses by the angle off the axis, false alarms and the error of
 the edges of boxes.
 """
 

@@ -1,6 +1,6 @@
 """Scores the tracks and counts of simulated walks: `score.py [--seeds 101 102 ...] [--detectors rendered photographs]`.
 
-Each run of the example `simulate` of the crate lookdown-count writes truth, detections and tracks. ByteTrack in pixel
+Each run of `cargo run -p lookdown-simulate` writes truth, detections and tracks. ByteTrack in pixel
 space (package `trackers`) gets the same detections. TrackEval computes HOTA, IDF1 and MOTA.
 """
 
@@ -193,7 +193,7 @@ def summary(results):
 def main():
     """Prints a Markdown table row for each detector, rate and tracker."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--binary", default=ROOT / "target/debug/examples/simulate")
+    parser.add_argument("--binary", default=ROOT / "target/debug/simulate")
     parser.add_argument("--seeds", type=int, nargs="+", default=list(range(101, 107)))
     parser.add_argument("--rates", type=float, nargs="+", default=RATES)
     parser.add_argument("--detectors", nargs="+", default=["rendered", "photographs"])

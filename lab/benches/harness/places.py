@@ -14,9 +14,10 @@ PYTHONS = ROOT / ".setup" / "benches"
 WORK = PYTHONS / "work"
 """Generated files: frames, plans, logs."""
 
-LOOKDOWN = Path(os.environ.get("LOOKDOWN_BINARY") or ROOT / "target" / "release" / "lookdown")
-"""The release binary, or the one that the environment names."""
-LOAD = ROOT / "target" / "release" / "load"
+BINARIES = ROOT / "target" / os.environ.get("PROFILE", "release")
+"""The binaries of the profile that the environment names."""
+LOOKDOWN = BINARIES / "lookdown"
+LOAD = BINARIES / "load"
 
 
 def model(name: str) -> Path:

@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import random
 import signal
 import socket
 import subprocess
@@ -16,6 +17,7 @@ from .places import ROOT, WORK
 from .usage import Usage, usage_of
 
 LAST_WORDS = 15
+PORTS = (12_000, 32_000)
 STOP_SECONDS = 20.0
 
 
@@ -30,6 +32,8 @@ class Server:
     address: str
     process: subprocess.Popen
     seconds_to_ready: float
+    log: Path
+    """What it prints; removed after a use without an error."""
 
     @property
     def pid(self) -> int:
@@ -75,12 +79,18 @@ class Server:
 
 
 def free_ports(count: int) -> list[int]:
-    """Returns unused ports."""
-    with contextlib.ExitStack() as stack:
-        sockets = [stack.enter_context(socket.socket()) for _ in range(count)]
-        for opened in sockets:
-            opened.bind(("127.0.0.1", 0))
-        return [opened.getsockname()[1] for opened in sockets]
+    """Returns unused ports.
+
+    They are drawn at random below those that the system gives to connections, so that tests that run at the same time
+    hardly ever get the same one.
+    """
+    found: list[int] = []
+    while len(found) < count:
+        port = random.randrange(*PORTS)
+        with socket.socket() as tried, contextlib.suppress(OSError):
+            tried.bind(("127.0.0.1", port))
+            found += [port] if port not in found else []
+    return found
 
 
 @contextlib.contextmanager
@@ -95,7 +105,7 @@ def running(
 ) -> Iterator[Server]:
     """Starts a server on `port` of `host` and waits until `ready` returns 200."""
     WORK.mkdir(parents=True, exist_ok=True)
-    log = WORK / f"{name}.log"
+    log = WORK / f"{name}-{port}.log"
     started = time.monotonic()
     with open(log, "wb") as output:
         process = subprocess.Popen(
@@ -110,9 +120,10 @@ def running(
         try:
             address = f"{host}:{port}"
             _wait(process, f"http://{address}{ready}", name, log)
-            yield Server(address, process, time.monotonic() - started)
+            yield Server(address, process, time.monotonic() - started, log)
         finally:
             _stop(process)
+    log.unlink()
 
 
 def _wait(process: subprocess.Popen, url: str, name: str, log: Path, seconds: float = 90.0) -> None:

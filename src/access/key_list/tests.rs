@@ -68,11 +68,11 @@ fn errors_name_the_position_and_do_not_repeat_the_input() {
         ),
         (
             format!("gate = {{ scopes = [\"{leak}\"], sha256 = \"{good}\" }}"),
-            "detect, read and admin",
+            "detect, read, view and admin",
         ),
         (
             format!("gate = {{ scopes = [], sha256 = \"{good}\" }}"),
-            "detect, read and admin",
+            "detect, read, view and admin",
         ),
         (
             format!("\"{leak}!\" = {{ scopes = [\"read\"], sha256 = \"{good}\" }}"),
@@ -90,7 +90,10 @@ fn errors_name_the_position_and_do_not_repeat_the_input() {
     for (text, expected) in [
         (leak.to_owned(), "name:scope+scope:sha256"),
         (format!("gate:detect:{leak}"), "never the key itself"),
-        (format!("gate:{leak}:{good}"), "detect, read and admin"),
+        (
+            format!("gate:{leak}:{good}"),
+            "detect, read, view and admin",
+        ),
         (format!("a:read:{good},a:read:{good}"), "key 2: its name"),
     ] {
         let message = text.parse::<KeyList>().unwrap_err().to_string();

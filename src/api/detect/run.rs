@@ -73,9 +73,12 @@ pub(in crate::api) async fn run_detection<T: Send + 'static>(
     let is_stored = job.parameters.store;
     let concealment = state.options.conceal_images;
     let observer = state.clone();
+    let frame = job.image.clone();
     let work = state.workers.detect_and(job, move |detected| {
         if is_stored {
             observer.suggestions.observe(&detected, Instant::now());
+            let views = &observer.options.views;
+            views.detected(&frame, &detected);
         }
         // Drawing needs the frame after the report has been taken.
         let report = detected.report.clone();

@@ -3,6 +3,7 @@
 pub(in crate::api) mod reference_counts;
 mod rows;
 pub(in crate::api) mod suggestion;
+pub(in crate::api) mod views;
 
 use std::{sync::Arc, time::Duration};
 
@@ -288,6 +289,9 @@ pub(in crate::api) async fn delete(
     let _ = timeout(END_TIMEOUT, ended).await;
     state.results.delete(&name).await?;
     counts::remove(&state, &name).await;
+    let (views, of) = (Arc::clone(&state.options.views), name.clone());
+    let removed = deadline.using(&CAMERAS, move || views.remove(&of).map_err(refused));
+    removed.await?;
     let (forgotten, references) = (name.clone(), state.clone());
     let forget = move || references.references.forget(&forgotten, Timestamp::now());
     deadline.using(&CAMERAS, forget).await?;

@@ -203,13 +203,14 @@ async fn read_cameras(state: &ApiState) {
     let Ok(mut latest) = state.results.latest_of_all().await else {
         return;
     };
-    let own = state.options.companions.own_cameras();
+    let companions = &state.options.companions;
+    let (own, followed) = (companions.own_cameras(), companions.followed());
     latest.retain(|report| !own.is_paused(&report.report.camera));
     let cameras = latest.iter().map(|report| report.report.camera.clone());
     state.metrics.retain_cameras(&cameras.collect::<Vec<_>>());
     for report in latest.iter().filter(|_| state.options.camera_metrics) {
         let Ok(headline) =
-            Headline::for_latest(&*state.results, report, &own, &state.references).await
+            Headline::for_latest(&*state.results, report, &own, &followed, &state.references).await
         else {
             return;
         };

@@ -5,7 +5,6 @@ mod address;
 pub(in crate::api) mod delete;
 pub(in crate::api) mod events;
 mod feed;
-pub(in crate::api) mod followed;
 pub(in crate::api) mod history;
 pub(in crate::api) mod latest;
 pub(in crate::api) mod latest_image;
@@ -59,12 +58,14 @@ pub(in crate::api) async fn list(
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
     let now = Timestamp::now();
-    let own = state.options.companions.own_cameras();
+    let companions = &state.options.companions;
+    let (own, followed) = (companions.own_cameras(), companions.followed());
     let latest = state.results.latest_of_all().await?;
     let mut rows = Vec::with_capacity(latest.len());
     for report in &latest {
         let headline =
-            Headline::for_latest(&*state.results, report, &own, &state.references).await?;
+            Headline::for_latest(&*state.results, report, &own, &followed, &state.references)
+                .await?;
         rows.push(CameraRow::at(report, headline, now));
     }
     rows.sort_unstable_by(|one, other| one.camera.cmp(&other.camera));

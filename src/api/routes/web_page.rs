@@ -75,6 +75,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "findings.js",
         "find_lens.js",
         "live_frames.js",
+        "live_view.js",
         "geometry.js",
         "views.js",
         "straighten.js",

@@ -5,8 +5,7 @@ use std::{collections::BTreeMap, sync::Arc};
 use lookdown_calibration::CalibrationId;
 
 use super::{
-    content::CalibrationEntry,
-    file_reader::{FileReader, Unread},
+    content::{CalibrationEntry, cameras},
     named_file::NamedFile,
 };
 use crate::calibration_store::StoreError;
@@ -27,30 +26,24 @@ pub(super) struct LoadedFile {
 impl LoadedFile {
     /// The file of the ID `stem`; what cannot be used stays as it is in `before`.
     pub(super) fn new(
-        reader: &FileReader,
         stem: &CalibrationId,
         mut named: NamedFile,
         content: Result<Vec<u8>, StoreError>,
         before: Option<&Self>,
     ) -> Self {
-        let name = &named.file.name;
         let found = match content {
-            Ok(content) => reader.read(stem, name, content),
-            Err(error) => Err(Unread {
-                problem: error.to_string(),
-                is_passing: true,
-            }),
+            Ok(content) => {
+                cameras(stem, &named.file.name, &content).map_err(|error| error.to_string())
+            }
+            Err(error) => {
+                // So that it is tried again, although it may never change.
+                named.file.stamp.clear();
+                Err(error.to_string())
+            }
         };
         let found = match found {
             Ok(found) => found,
-            Err(Unread {
-                problem,
-                is_passing,
-            }) => {
-                if is_passing {
-                    // So that it is tried again, although it may never change.
-                    named.file.stamp.clear();
-                }
+            Err(problem) => {
                 return Self {
                     named,
                     cameras: before.map(|file| file.cameras.clone()).unwrap_or_default(),

@@ -52,7 +52,7 @@ impl Calibrations {
             let content = self
                 .store
                 .read(&named.file.name, CalibrationFile::MAX_BYTES + 1);
-            let loaded = LoadedFile::new(&self.reader, &id, named, content, known);
+            let loaded = LoadedFile::new(&id, named, content, known);
             self.record_change(&loaded, known);
             files.insert(id, Arc::new(loaded));
         }

@@ -1,9 +1,10 @@
-mod slow;
-
 use std::{
     fs,
     path::Path,
-    sync::atomic::{AtomicBool, Ordering},
+    sync::{
+        atomic::{AtomicBool, Ordering},
+        mpsc::Receiver,
+    },
 };
 
 use super::*;
@@ -324,4 +325,41 @@ fn an_unusable_file_is_not_hidden_by_a_sample() {
         "{}",
         refused.place
     );
+}
+
+#[test]
+fn a_store_that_fails_after_the_start_is_reported() {
+    /// Fails as soon as the test allows it.
+    #[derive(Debug)]
+    struct Late(Mutex<Receiver<()>>);
+    impl CalibrationStore for Late {
+        fn place(&self) -> String {
+            "late".to_owned()
+        }
+        fn list(&self) -> Result<Vec<ListedFile>, StoreError> {
+            let _ = self.0.lock().recv();
+            let (place, problem) = (self.place(), "it is silent".to_owned());
+            Err(StoreError::Failed { place, problem })
+        }
+        fn read(&self, _: &str, _: usize) -> Result<Vec<u8>, StoreError> {
+            Ok(Vec::new())
+        }
+        fn write(&self, _: &str, _: &[u8], _: Replaces<'_>) -> Result<(), StoreError> {
+            Ok(())
+        }
+        fn delete(&self, _: &str) -> Result<(), StoreError> {
+            Ok(())
+        }
+    }
+    let (release, released) = sync_channel(0);
+    let store = Box::new(Late(Mutex::new(released)));
+    let calibrations =
+        Calibrations::open_within(store, true, Duration::ZERO, Arc::default()).unwrap();
+    assert_eq!(calibrations.health().store_problem, None);
+    drop(release);
+    while !calibrations.is_read() {
+        thread::yield_now();
+    }
+    let problem = calibrations.health().store_problem.unwrap();
+    assert!(problem.contains("it is silent"), "{problem}");
 }

@@ -296,7 +296,6 @@ impl Counting<'_> {
             let finished = self.runtime.block_on(writer.finish());
             finished.with_context(|| unwritable(path))?;
         }
-        self.progress.finish();
         Ok(self.recording)
     }
 }

@@ -206,9 +206,6 @@ impl StreamReader {
 
     /// Ends the reader. A read of standard input may never end, so it is not waited for.
     pub(super) fn end(self) {
-        if let Some(progress) = self.progress {
-            progress.finish();
-        }
         drop(self.frames);
         self.runtime.shutdown_background();
     }

@@ -6,7 +6,7 @@ use clap::Args;
 use lookdown_detect::{detection::Refinement, parameters::Profile};
 use lookdown_eval::Stratification;
 
-use super::{plot_file::PlotFile, truth::TruthFlags};
+use super::truth::TruthFlags;
 use crate::cli::{parameters::one_of, settings_file::SettingsFile};
 
 /// C_t without `--score-threshold`: low, as average precision considers all scores.
@@ -19,10 +19,9 @@ pub(in crate::cli) struct Arguments {
     pub(super) truth: TruthFlags,
     /// Also score the persons of each stratum: by distance from the optical axis, size or
     /// visibility; may be repeated
-    #[arg(long, value_name = "NAME", conflicts_with = "sweep", value_parser = one_of::<Stratification>())]
+    #[arg(long, value_name = "NAME", value_parser = one_of::<Stratification>())]
     pub(super) by: Vec<Stratification>,
-    /// Trade-off between accuracy and cost; may be repeated [default: balanced; with --sweep:
-    /// paper]
+    /// Trade-off between accuracy and cost; may be repeated [default: balanced]
     #[arg(long, value_name = "NAME", value_parser = one_of::<Profile>())]
     pub(super) profile: Vec<Profile>,
     /// Method that merges overlapping boxes into persons; may be repeated [default: all of them]
@@ -31,16 +30,6 @@ pub(in crate::cli) struct Arguments {
     /// The rows of the paper's table: its three refinements, and the detector without views
     #[arg(long, conflicts_with_all = ["profile", "refine"])]
     pub(super) paper: bool,
-    /// Write the paper's sweeps to this folder: `cells.csv` (AP of NMS and Soft-NMS over N_t from 0
-    /// to 1, of Gaussian Soft-NMS over C_t and sigma), `iou_threshold.svg` (AP over N_t) and
-    /// `matrix.jpg` (detections at each C_t and sigma in the image with the most persons)
-    #[arg(
-        long,
-        value_name = "FOLDER",
-        conflicts_with_all = ["refine", "paper", "iou_threshold", "sigma", "plot",
-                              "save_detections", "from_detections", "turn_deg"]
-    )]
-    pub(super) sweep: Option<PathBuf>,
     /// Model [default: the profile's]
     #[arg(long, value_name = "NAME")]
     pub(super) model: Option<String>,
@@ -65,9 +54,6 @@ pub(in crate::cli) struct Arguments {
     /// Print one JSON object per row instead of a table
     #[arg(long)]
     pub(super) json: bool,
-    /// Also plot the precision-recall curves of all rows into one image
-    #[arg(long, value_name = "OUT.svg|OUT.png")]
-    pub(super) plot: Option<PlotFile>,
     /// Also write the detections as COCO results: a file per row, named
     /// PROFILE.REFINEMENT.MODEL.json
     #[arg(long, value_name = "FOLDER")]

@@ -133,29 +133,6 @@ impl<'a> Row<'a> {
     }
 }
 
-/// The header of a sweep.
-pub(super) const SWEEP_HEAD: &str =
-    "refine               C_t    N_t  sigma   AP50   AP75  AP50:95     F1  recall";
-
-impl Row<'_> {
-    /// The line of a cell of a sweep. Each refinement shows the parameters that it uses.
-    pub(super) fn sweep_line(&self) -> String {
-        let refine = self.refine.unwrap_or("-");
-        let is_gaussian = refine == Refinement::SoftNmsGaussian.name();
-        format!(
-            "{refine:<18} {:>5} {:>6} {:>6} {:>6} {:>6} {:>8} {:>6} {:>7}",
-            number(self.score_threshold, 2),
-            number(self.iou_threshold.filter(|_| !is_gaussian), 1),
-            number(self.sigma.filter(|_| is_gaussian), 1),
-            number(self.ap50, 3),
-            number(self.ap75, 3),
-            number(self.ap50_95, 3),
-            number(self.f1, 3),
-            number(self.recall, 3),
-        )
-    }
-}
-
 fn number(value: Option<f64>, decimals: usize) -> String {
     match value {
         Some(value) => format!("{value:.decimals$}"),

@@ -51,7 +51,14 @@ async fn setup_with(image_every: Option<Duration>) -> Setup {
     Setup {
         listener,
         results,
-        publisher: Publisher::new(options, store, Arc::default(), Arc::clone(&metrics)).unwrap(),
+        publisher: Publisher::new(
+            options,
+            store,
+            FollowedPersons::default(),
+            Arc::default(),
+            Arc::clone(&metrics),
+        )
+        .unwrap(),
         metrics,
     }
 }

@@ -56,11 +56,6 @@ impl Keys {
         self.prefix_of_images() + camera
     }
 
-    /// The followed number of a camera: the number, a space, and its time in microseconds.
-    pub(super) fn followed(&self, camera: &str) -> String {
-        self.key("followed:") + camera
-    }
-
     /// The prefix of the keys of all images.
     pub(super) fn prefix_of_images(&self) -> String {
         self.key("image:")

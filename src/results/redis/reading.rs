@@ -4,7 +4,6 @@
 use std::{num::NonZeroUsize, sync::Arc};
 
 use bytes::Bytes;
-use jiff::Timestamp;
 use lookdown_common::text::is_camera_name;
 use redis::{
     FromRedisValue, Pipeline, RedisResult, Script, Value,
@@ -16,10 +15,7 @@ use redis::{
 use super::{keys::Keys, message::is_one_line};
 use crate::{
     annotated_image::StoredFrame,
-    results::{
-        Cameras, FOLLOWED_FOR, FollowedNumber, NewReport, ReportId, ResultUse, StoredImage,
-        StoredReport,
-    },
+    results::{Cameras, NewReport, ReportId, ResultUse, StoredImage, StoredReport},
 };
 
 /// The script that deletes a camera.
@@ -59,9 +55,6 @@ impl Reader<'_> {
     pub(super) async fn delete(&mut self, camera: &str) -> RedisResult<bool> {
         let script = Script::new(DELETE);
         let keys = self.keys;
-        let mut forget = cmd("DEL");
-        forget.arg(keys.followed(camera));
-        let () = forget.query_async(&mut self.connection).await?;
         let mut call = script.prepare_invoke();
         call.key(&keys.index()[..]);
         call.arg(keys.prefix_of_cameras());
@@ -173,42 +166,6 @@ impl Reader<'_> {
             }))
         };
         Ok(stored())
-    }
-
-    /// Stores the followed number of a camera for as long as it is valid. Returns false for a
-    /// camera without a report.
-    pub(super) async fn follow(
-        &mut self,
-        camera: &str,
-        FollowedNumber { persons, at }: FollowedNumber,
-    ) -> RedisResult<bool> {
-        let mut known = cmd("EXISTS");
-        known.arg(self.keys.camera(camera));
-        let is_known: bool = known.query_async(&mut self.connection).await?;
-        if is_known {
-            let mut set = cmd("SET");
-            set.arg(self.keys.followed(camera));
-            set.arg(format!("{persons} {}", at.as_microsecond()));
-            set.arg("EX").arg(FOLLOWED_FOR.as_secs());
-            let () = set.query_async(&mut self.connection).await?;
-        }
-        Ok(is_known)
-    }
-
-    /// The followed number of a camera while it is valid.
-    pub(super) async fn followed(&mut self, camera: &str) -> RedisResult<Option<FollowedNumber>> {
-        let mut get = cmd("GET");
-        get.arg(self.keys.followed(camera));
-        let text: Option<String> = get.query_async(&mut self.connection).await?;
-        let parsed = || {
-            let text = text?;
-            let (persons, micros) = text.split_once(' ')?;
-            Some(FollowedNumber {
-                persons: persons.parse().ok()?,
-                at: Timestamp::from_microsecond(micros.parse().ok()?).ok()?,
-            })
-        };
-        Ok(parsed())
     }
 
     /// The newest ID that was ever assigned.

@@ -47,6 +47,16 @@ pageTest(
     assert.equal((await camera("hall")).keep_image, false);
     await keep.check();
     await image.waitFor();
+    const views = card.getByRole("group", { name: "Views of hall" });
+    await views.getByRole("button", { name: "Panorama" }).click();
+    const straight = card.getByAltText("A straight view of hall");
+    await page.waitForFunction((node) => node.naturalWidth === 1600, await straight.elementHandle());
+    page.once("dialog", (question) => question.accept("ring"));
+    await views.getByRole("button", { name: "Keep this view" }).click();
+    await views.getByText("The view ring is kept.").waitFor();
+    assert.equal((await fetch(`${RUN}/cameras/hall/views/ring`)).status, 200);
+    await views.getByRole("button", { name: "Disc" }).click();
+    await image.waitFor();
     await assertFits(page);
     await assertAccessible(page);
     // The frame is read from the camera, because no image of it is kept.

@@ -7,6 +7,7 @@ import { replacedIn } from "../../../web/calibration_sources.js";
 import { valuesOf } from "../../../web/calibration_values.js";
 import { assumedCircle, calibrationOf, circleOf, pixelOfFloor, rimOf, withFound } from "../../../web/lens.js";
 import { countedNumbers, steps } from "../../../web/plot.js";
+import { turned, zoomed } from "../../../web/live_view.js";
 import { parseEvent } from "../../../web/server.js";
 import { continued, straighten } from "../../../web/straighten.js";
 
@@ -239,4 +240,13 @@ test("a time without a number is a gap of the plot, one with too few frames is m
   ]);
   const path = steps(history, (time) => time / 60_000, (persons) => persons);
   assert.equal(path, "M0.0 2.0H2.0M3.0 1.0H4.0V1.0");
+});
+
+test("a dragged view turns with the pointer, and a panorama keeps its height", () => {
+  const view = { kind: "fixed", azimuth_deg: 10, tilt_deg: 45, field_of_view_deg: 80 };
+  assert.deepEqual(turned(view, 0.25, 0.1), { ...view, azimuth_deg: 350, tilt_deg: 53 });
+  assert.equal(turned(view, 0, 1).tilt_deg, 90);
+  assert.deepEqual(turned({ kind: "panorama", azimuth_deg: 0 }, 0.5, 1), { kind: "panorama", azimuth_deg: 180 });
+  near(zoomed(view, 1).field_of_view_deg, 80 / 1.1);
+  assert.equal(zoomed(view, -20).field_of_view_deg, 150);
 });

@@ -5,7 +5,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from harness.places import LOOKDOWN, WORK
+from harness.places import LOOKDOWN
 from harness.processes import free_ports, running
 from support.cameras import http_camera
 from support.companion import metric
@@ -73,6 +73,6 @@ def _watch(target: str, urls: list[str]) -> Watched:
             sent = metric(watch.address, 'lookdown_watch_frames_sent_total{camera="camera0"}')
             cores = watch.usage().cpu_seconds / SECONDS
             status = Path(f"/proc/{watch.pid}/status").read_text(encoding="utf-8")
+            log = watch.log.read_text(encoding="utf-8", errors="replace")
     peak = next(line for line in status.splitlines() if line.startswith("VmHWM:"))
-    log = (WORK / "watch.log").read_text(encoding="utf-8", errors="replace")
     return Watched(cores, int(peak.split()[1]) // 1024, sent, log)

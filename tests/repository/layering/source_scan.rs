@@ -7,7 +7,7 @@ use std::{
 };
 
 /// The crates of the workspace with the folders of their sources.
-pub const CRATES: [(&str, &str); 14] = [
+pub const CRATES: [(&str, &str); 15] = [
     ("lookdown-common", "crates/lookdown-common/src"),
     ("lookdown-lens", "crates/lookdown-lens/src"),
     ("lookdown-calibration", "crates/lookdown-calibration/src"),
@@ -21,7 +21,8 @@ pub const CRATES: [(&str, &str); 14] = [
     ("lookdown", "src"),
     ("lookdown-python", "crates/lookdown-python/src"),
     ("lookdown-load", "lab/benches/load"),
-    ("simulate", "crates/lookdown-tracking/examples/simulate"),
+    ("lookdown-paper", "lab/benches/paper"),
+    ("simulate", "lab/benches/simulate"),
 ];
 
 /// Every source file of a crate with its module path, such as `api::http::csrf`.

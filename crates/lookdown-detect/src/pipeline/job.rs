@@ -4,7 +4,7 @@ use std::{sync::Arc, time::Instant};
 
 use bytes::Bytes;
 use jiff::Timestamp;
-use lookdown_calibration::Calibration;
+use lookdown_calibration::{Calibration, CameraGeometry};
 use lookdown_lens::geometry::Pixel;
 use tokio_util::sync::CancellationToken;
 
@@ -131,12 +131,17 @@ impl DetectedFrame {
         found.chain(unsearched).collect()
     }
 
+    /// Returns the camera of the frame: its lens, mount and areas in pixels of the frame.
+    #[must_use]
+    pub fn camera(&self) -> Option<&CameraGeometry> {
+        // All rigs belong to one camera.
+        self.rigs.first().map(|rig| rig.geometry())
+    }
+
     /// Returns the outlines of the calibration's zones in the frame.
     #[must_use]
     pub fn zone_outlines(&self) -> Vec<ZoneOutline> {
-        // All rigs belong to one camera.
-        let camera = self.rigs.first().map(|rig| rig.geometry());
-        let outlines = camera.into_iter().flat_map(|camera| {
+        let outlines = self.camera().into_iter().flat_map(|camera| {
             let outline = |zone| ZoneOutline::new(zone, &camera.lens, &camera.mount);
             camera.areas.zones.iter().map(outline)
         });

@@ -2,7 +2,7 @@
 //! a frame crop, in the frame.
 
 use lookdown_lens::geometry::{
-    FrameCrop, Lens, Pixel, VirtualView,
+    FrameCrop, Lens, Panorama, Pixel, VirtualView,
     pixels::{PixelConvention, cross_half_pixel},
 };
 
@@ -32,6 +32,16 @@ impl NodeGrid {
         Self::from_positions(size, Visibility::new(view, lens), |pixel| {
             let place = lens.continued_beyond_rim(&view.ray_in_camera(pixel));
             // A node without a place hides the four patches around it.
+            place.unwrap_or(Pixel::new(f64::NAN, f64::NAN))
+        })
+    }
+
+    /// The nodes of a panorama. Those beyond the lens image have no place.
+    pub(super) fn for_panorama(panorama: &Panorama, lens: &Lens) -> Self {
+        let size = [panorama.width(), panorama.height()];
+        Self::from_positions(size, Visibility::everywhere(size), |pixel| {
+            let ray = panorama.ray_in_camera(pixel);
+            let place = lens.project(&ray).and(lens.continued_beyond_rim(&ray));
             place.unwrap_or(Pixel::new(f64::NAN, f64::NAN))
         })
     }

@@ -1,5 +1,7 @@
 //! Virtual views: pinhole cameras that share the fisheye camera's center.
 
+use std::f64::consts::FRAC_PI_2;
+
 use nalgebra::{Matrix3, Rotation3, Vector2, Vector3};
 
 use super::{Mount, Pixel, Ray};
@@ -47,6 +49,28 @@ impl VirtualView {
         Self {
             camera_from_view,
             focal: f64::from(width) / 2.0 / (direction.field_of_view / 2.0).tan(),
+            width,
+            height,
+        }
+    }
+
+    /// A view that is upright under any mount: its axis is `tilt` from straight down, toward
+    /// `azimuth` (0 toward image right, clockwise on the screen). All angles in radians,
+    /// `field_of_view` horizontal and below 180°.
+    #[must_use]
+    pub fn leveled(
+        azimuth: f64,
+        tilt: f64,
+        field_of_view: f64,
+        mount: &Mount,
+        width: u32,
+        height: u32,
+    ) -> Self {
+        let spin = Rotation3::from_axis_angle(&Vector3::z_axis(), azimuth + FRAC_PI_2);
+        let tilt = Rotation3::from_axis_angle(&Vector3::x_axis(), tilt);
+        Self {
+            camera_from_view: mount.camera_from_floor() * spin * tilt,
+            focal: f64::from(width) / 2.0 / (field_of_view / 2.0).tan(),
             width,
             height,
         }

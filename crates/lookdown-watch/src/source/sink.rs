@@ -55,7 +55,7 @@ impl<'a> Sink<'a> {
     pub(super) fn accept_at(&self, image: Bytes, captured_at: Timestamp) -> Result<(), FrameError> {
         let frame = Frame::new(image, captured_at)
             .inspect_err(|_| self.metrics.failed(Failure::Damaged))?;
-        self.metrics.received(frame.received);
+        self.metrics.received(&frame);
         self.alive();
         if self.slot.put(frame).is_some() {
             self.metrics.skipped();
@@ -64,6 +64,11 @@ impl<'a> Sink<'a> {
             tracing::info!("the camera sends frames again");
         }
         Ok(())
+    }
+
+    /// Returns the metrics of the camera, which know its viewers.
+    pub(super) fn metrics(&self) -> &CameraMetrics {
+        self.metrics
     }
 
     /// Notes that the camera works, although it sent no new frame.

@@ -25,10 +25,28 @@ const STREAM_FORMATS: &str = "concat,rtsp";
 /// The bytes and the time that `ffmpeg` reads of a stream before its first frame.
 const PROBE: [(&str, &str); 2] = [("probesize", "1000000"), ("analyzeduration", "1000000")];
 
-/// Reads frames of an RTSP stream until it ends.
+/// Reads frames of an RTSP stream until it ends: one of each interval, and all while it has
+/// viewers.
 pub(super) async fn run_stream(
     camera: &Camera,
     url: &Url,
+    login: &mut Login,
+    sink: &Sink<'_>,
+) -> Result<Infallible, SourceError> {
+    loop {
+        let has_viewers = sink.metrics().has_viewers();
+        let every = (!has_viewers).then(|| camera.every());
+        tokio::select! {
+            ended = read_stream(camera, url, every, login, sink) => return ended,
+            () = sink.metrics().viewers_changed(has_viewers) => login.restart(),
+        }
+    }
+}
+
+async fn read_stream(
+    camera: &Camera,
+    url: &Url,
+    every: Option<Duration>,
     login: &mut Login,
     sink: &Sink<'_>,
 ) -> Result<Infallible, SourceError> {
@@ -58,12 +76,10 @@ pub(super) async fn run_stream(
         STREAM_FORMATS,
     ]);
     add(&["-i", "pipe:0", "-an", "-sn", "-dn"]);
-    add(&[
-        "-vf",
-        &first_of_each(camera.every()),
-        "-fps_mode",
-        "passthrough",
-    ]);
+    if let Some(every) = every {
+        add(&["-vf", &first_of_each(every)]);
+    }
+    add(&["-fps_mode", "passthrough"]);
     let script = script(camera, relay.url());
     let input = Input::Stream {
         script: &script,
@@ -97,8 +113,11 @@ pub(super) async fn run_file(
     let mut arguments = decoding(&camera.video);
     arguments.push("-re".into());
     arguments.extend(file_input(path));
-    let filter = first_of_each(camera.every());
-    arguments.extend(["-vf", &filter, "-fps_mode", "passthrough"].map(OsString::from));
+    // A file cannot continue with another rate.
+    if !sink.metrics().has_viewers() {
+        arguments.extend(["-vf", &first_of_each(camera.every())].map(OsString::from));
+    }
+    arguments.extend(["-fps_mode", "passthrough"].map(OsString::from));
     let mut ffmpeg = Ffmpeg::start(&camera.video, &arguments, Input::File).await?;
     while let Some(frame) = ffmpeg.next_frame().await? {
         sink.accept(frame)?;

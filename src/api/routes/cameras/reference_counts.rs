@@ -95,8 +95,10 @@ pub(in crate::api) async fn list(
     }
     let mut moment = None;
     if let Some(latest) = latest.filter(|latest| latest.report.scores.is_some()) {
-        let own = state.options.companions.own_cameras();
-        let headline = Headline::for_latest(&*state.results, &latest, &own, &state.references);
+        let companions = &state.options.companions;
+        let (own, followed) = (companions.own_cameras(), companions.followed());
+        let headline =
+            Headline::for_latest(&*state.results, &latest, &own, &followed, &state.references);
         let number = headline.await?.number;
         moment = number.and_then(|number| good_moment(&counts, latest.id.time(), number));
     }

@@ -20,6 +20,7 @@ pub(in crate::api) async fn delete(
     _admin: RequireAdmin,
     CameraAddress(camera): CameraAddress,
 ) -> Result<StatusCode, Problem> {
+    state.options.views.forget(&camera);
     let had_reports = state.results.delete(&camera).await?;
     // The counts may know a camera that has had no frame since the start of the server.
     if counts::remove(&state, &camera).await || had_reports {

@@ -4,7 +4,7 @@ use std::{convert::Infallible, future::pending, sync::Arc, time::Duration};
 
 use axum::{
     extract::State,
-    http::{HeaderMap, HeaderName},
+    http::{HeaderMap, HeaderName, Uri},
     response::{
         IntoResponse, Response,
         sse::{KeepAlive, Sse},
@@ -13,11 +13,14 @@ use axum::{
 use futures_util::stream::unfold;
 use tokio::time::sleep;
 
-use super::{address::CameraAddress, feed::Feed};
+use super::{
+    address::CameraAddress,
+    feed::{Feed, ViewBoxes},
+};
 use crate::{
     api::{
         ApiState,
-        http::{caller::Caller, problem::Problem},
+        http::{caller::Caller, problem::Problem, query::parameters_named},
         require_scope::RequireRead,
     },
     results::Cameras,
@@ -26,11 +29,11 @@ use crate::{
 pub(in crate::api) const LAST_EVENT_ID: HeaderName = HeaderName::from_static("last-event-id");
 /// Interval without a report after which a keep-alive comment is sent. Proxies close silent
 /// connections, and the comment detects clients that have disconnected.
-const KEEP_ALIVE: Duration = Duration::from_secs(15);
+pub(in crate::api) const KEEP_ALIVE: Duration = Duration::from_secs(15);
 /// Interval of the checks that the key of a stream is still valid.
 const KEY_CHECK: Duration = Duration::from_secs(1);
 /// Disables the response buffering of nginx and compatible proxies.
-const ACCEL_BUFFERING: HeaderName = HeaderName::from_static("x-accel-buffering");
+pub(in crate::api) const ACCEL_BUFFERING: HeaderName = HeaderName::from_static("x-accel-buffering");
 
 /// Stream the reports of a camera
 ///
@@ -41,6 +44,8 @@ const ACCEL_BUFFERING: HeaderName = HeaderName::from_static("x-accel-buffering")
     get, path = "/results/{camera}/events", tag = "results", operation_id = "listen_to_camera",
     params(
         ("camera" = String, Path, description = "The name of the camera; it need not have a report yet."),
+        ("view" = Option<String>, Query, nullable = false, description = "The name of a view of the camera: \
+            each person has `view_boxes` with its box in the pixels of the view, or null."),
         ("Last-Event-ID" = Option<String>, Header, nullable = false,
             description = "The ID of the last report that the client received."),
     ),
@@ -56,8 +61,15 @@ pub(in crate::api) async fn camera_events(
     caller: Caller,
     CameraAddress(camera): CameraAddress,
     headers: HeaderMap,
+    uri: Uri,
 ) -> Result<Response, Problem> {
-    stream(state, &caller, Cameras::One(camera), headers).await
+    let [view] = parameters_named(&uri, ["view"])?;
+    let boxes = view.map(|name| ViewBoxes {
+        views: Arc::clone(&state.options.views),
+        camera: camera.clone(),
+        name,
+    });
+    stream(state, &caller, Cameras::One(camera), headers, boxes).await
 }
 
 /// Stream all reports
@@ -81,7 +93,7 @@ pub(in crate::api) async fn all_events(
     caller: Caller,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    stream(state, &caller, Cameras::All, headers).await
+    stream(state, &caller, Cameras::All, headers, None).await
 }
 
 async fn stream(
@@ -89,6 +101,7 @@ async fn stream(
     caller: &Caller,
     cameras: Cameras,
     headers: HeaderMap,
+    boxes: Option<ViewBoxes>,
 ) -> Result<Response, Problem> {
     let last_heard = headers.get(LAST_EVENT_ID);
     // An invalid ID does not come from this server and is ignored.
@@ -98,6 +111,7 @@ async fn stream(
         &caller.client,
         cameras,
         last_heard,
+        boxes,
     )
     .await?;
     let listener = (feed, state, headers);

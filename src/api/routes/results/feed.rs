@@ -4,11 +4,15 @@ use std::{collections::VecDeque, num::NonZeroUsize, sync::Arc, time::Duration};
 
 use axum::response::sse::Event;
 use lookdown_detect::fairness::Client;
+use lookdown_lens::geometry::{OrientedBox, Pixel};
+use serde_json::{Value, json};
 use tokio::time::sleep;
 
 use crate::{
     api::http::problem::Problem,
     results::{Cameras, Listening, ReportId, ResultStore, StoredReport},
+    rounding::pixels,
+    views::Views,
 };
 
 /// Pause before a retry when the result store does not respond.
@@ -27,6 +31,42 @@ pub(super) struct Feed {
     missed: VecDeque<Arc<StoredReport>>,
     /// `true` if the store may have more missed reports.
     behind: bool,
+    /// The view whose boxes are added.
+    boxes: Option<ViewBoxes>,
+}
+
+/// The boxes of the persons in a view of their camera.
+pub(super) struct ViewBoxes {
+    pub(super) views: Arc<Views>,
+    pub(super) camera: String,
+    pub(super) name: String,
+}
+
+impl ViewBoxes {
+    /// Returns a report with the boxes of the view, if there is such a view now.
+    fn added_to(&self, report: &[u8]) -> Option<String> {
+        let view = self.views.list(&self.camera).remove(&self.name)?;
+        let live = self.views.live(&self.camera)?;
+        let mut report: Value = serde_json::from_slice(report).ok()?;
+        for person in report["persons"].as_array_mut()? {
+            let of = |key: &str| person["oriented_box"][key].as_f64();
+            let center = Pixel::new(of("cx")?, of("cy")?);
+            let angle = of("angle_deg")?.to_radians();
+            let oriented = OrientedBox::turned(center, of("width")?, of("height")?, angle);
+            let boxes = live.boxes(&view, &[oriented]).ok()?;
+            let sides = boxes
+                .first()
+                .copied()
+                .flatten()
+                .map(|sides| sides.map(pixels));
+            person["view_boxes"] = json!({
+                &self.name: sides.map(|[x_min, y_min, x_max, y_max]| {
+                    json!({ "x_min": x_min, "y_min": y_min, "x_max": x_max, "y_max": y_max })
+                })
+            });
+        }
+        serde_json::to_string(&report).ok()
+    }
 }
 
 impl Feed {
@@ -39,6 +79,7 @@ impl Feed {
         client: &Client,
         cameras: Cameras,
         last_heard: Option<ReportId>,
+        boxes: Option<ViewBoxes>,
     ) -> Result<Self, Problem> {
         // Subscribes before the first read, so no report is missed in between.
         let listening = results.listen(client, cameras.clone()).await?;
@@ -55,6 +96,7 @@ impl Feed {
             listening,
             last: last_heard.unwrap_or(newest),
             behind: last_heard.is_some(),
+            boxes,
             missed: match last_heard {
                 None => latest.into(),
                 Some(_) => VecDeque::new(),
@@ -89,8 +131,13 @@ impl Feed {
 
     fn event(&mut self, stored: &StoredReport) -> Event {
         self.last = stored.id;
-        Event::default()
-            .id(stored.id.to_string())
-            .data(String::from_utf8_lossy(&stored.report.json))
+        let json = &stored.report.json;
+        let boxes = self.boxes.as_ref();
+        let with_boxes = boxes.and_then(|boxes| boxes.added_to(json));
+        let event = Event::default().id(stored.id.to_string());
+        match with_boxes {
+            Some(json) => event.data(json),
+            None => event.data(String::from_utf8_lossy(json)),
+        }
     }
 }

@@ -21,9 +21,9 @@ pub(in crate::api) struct CameraRow {
     /// Age of the report in seconds.
     #[schema(minimum = 0, example = 0.731)]
     age_seconds: f64,
-    /// Number of persons there now: what reference counts teach, else the followed persons while
-    /// `lookdown count` hands their number back, else the median of the reports of the last 5 s;
-    /// `null` while the camera is paused.
+    /// Number of persons there now: what reference counts teach, else those whom the counts follow
+    /// while their number is known, else the median of the reports of the last 5 s; `null` while
+    /// the camera is paused.
     #[schema(example = 3)]
     persons: Option<usize>,
     /// In 90 % of frames, the true number is at least this one.

@@ -1,17 +1,15 @@
 //! The parameter sweeps of the paper (Seidel et al., section IV): AP over N_t, and the detections
 //! of Gaussian Soft-NMS over C_t and σ.
 
-mod matrix;
-
 use std::fmt::Write;
-
-use super::{DetectedRow, EvaluatedRow, Line, LinePlot};
 
 use lookdown_detect::{
     detection::{Refinement, RefinementParameters},
     parameters::DetectParameters,
 };
-pub use matrix::matrix;
+use lookdown_eval::{DetectedRow, EvaluatedRow};
+
+use crate::plot::{Line, LinePlot};
 
 /// `N_t` from 0 to 1.
 const IOU_STEPS: u8 = 10;

@@ -2,11 +2,11 @@
 //! as JSON lines for lab/benches/count/score.py.
 //!
 //!     simulate --rate 5 --seed 1 --seconds 300 --persons 8 --detector rendered [--site] [--follow]
-#![allow(missing_docs, reason = "an example has no documentation of its own")]
+#![allow(missing_docs, reason = "a program of the laboratory")]
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
-    reason = "an example may stop"
+    reason = "a program of the laboratory may stop"
 )]
 
 mod chance;

@@ -1,7 +1,8 @@
 //! The precision-recall curves of several rows.
 
+use lookdown_eval::{EvaluatedRow, PrecisionRecallCurve};
+
 use super::{Line, LinePlot};
-use crate::{EvaluatedRow, PrecisionRecallCurve};
 
 /// Plots precision over recall of named rows at `O_t` = 0.5, and dashed at 0.75. The precision at a
 /// recall is the maximum at that recall or a higher one: the area under a line is its average
@@ -51,8 +52,9 @@ fn steps(curve: &PrecisionRecallCurve) -> Vec<[f64; 2]> {
 mod tests {
     use lookdown_detect::detection::{BBox, FramePixels};
 
+    use lookdown_eval::{EvaluatedImage, GroundTruth, MatchingRule, ScoredBox};
+
     use super::*;
-    use crate::{EvaluatedImage, GroundTruth, MatchingRule, ScoredBox};
 
     #[test]
     fn the_area_under_a_line_is_the_average_precision() {

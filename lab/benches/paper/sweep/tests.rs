@@ -1,11 +1,10 @@
 use lookdown_detect::detection::BBox;
-use lookdown_imaging::Frame;
-
-use super::*;
-use crate::{
+use lookdown_eval::{
     EvaluatedImage, FoundPerson, GroundTruth, MatchingRule, PrecisionRecallCurve, RowName,
     ScoredBox, Summary,
 };
+
+use super::*;
 
 fn cells_of_paper() -> Vec<DetectParameters> {
     let base =
@@ -107,28 +106,4 @@ fn the_plot_has_a_point_per_iou_threshold() {
         assert_eq!((line.points.len(), line.dashed.len()), (11, 11));
         assert_eq!(line.points[3], [0.3, 1.0]);
     }
-}
-
-#[test]
-fn the_matrix_is_cropped_to_the_boxes_of_all_cells() {
-    let gray = Frame::new(200, 200, vec![90; 200 * 200 * 3]).unwrap();
-    let image = matrix("tiny".to_owned(), &swept(), &gray, 0).unwrap();
-    // The two boxes lie within columns 20 to 160. With the margin this is a square of 157 pixels.
-    assert!(
-        (5 * 157..5 * 157 + 160).contains(&image.width()),
-        "{image:?}"
-    );
-    // The outline of the first box is bluish, that of the second yellowish, with soft edges.
-    let count = |more: usize, less: usize| {
-        let pixels = image.pixels().chunks_exact(3);
-        let outlined = pixels.filter(|pixel| pixel[more] > pixel[less].saturating_add(60));
-        outlined.count()
-    };
-    // The first box is in 20 cells, the second only in the five cells of C_t = 0.3.
-    let (first, second) = (count(2, 0), count(0, 2));
-    assert!(second > 500, "{second}");
-    assert!(
-        (3 * second..5 * second).contains(&first),
-        "{first} and {second}"
-    );
 }

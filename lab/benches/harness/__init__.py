@@ -1,1 +1,0 @@
-"""Code that all parts of the benchmarks share."""

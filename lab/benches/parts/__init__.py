@@ -1,1 +1,0 @@
-"""The parts of the benchmarks: each has `measure` and `tell` (Markdown)."""

@@ -1,1 +1,0 @@
-"""The ONNX files of our networks: the source NanoDet-g, weights in half precision, and INT8."""

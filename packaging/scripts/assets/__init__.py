@@ -1,1 +1,0 @@
-"""The set-up: ONNX Runtime, pinned and checked, and environments for checks and tests, inside the repository."""

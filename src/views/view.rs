@@ -1,0 +1,339 @@
+//! A straight view as it is stored: its values, their checks, and its parts in the camera frame.
+
+use std::{
+    f64::consts::{FRAC_PI_2, PI, TAU},
+    ops::RangeInclusive,
+};
+
+use lookdown_calibration::CameraGeometry;
+use lookdown_detect::parameters::ParameterError;
+use lookdown_lens::geometry::{
+    Mount, OrientedBox, Panorama, Pixel, Ray, VirtualView,
+    pixels::{PixelConvention, cross_half_pixel},
+};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// Sides of a view, pixels: a wall of screens is not wider.
+const SIDES: RangeInclusive<u32> = 64..=4096;
+/// Most pixels of a view.
+const MAX_PIXELS: u32 = 4096 * 1024;
+/// A perspective image stretches its corners by 15 at 150°.
+const FIELDS_OF_VIEW_DEG: RangeInclusive<f64> = 10.0..=150.0;
+/// From straight down to the horizon.
+const TILTS_DEG: RangeInclusive<f64> = 0.0..=90.0;
+/// The upper border of a panorama, from straight down: rooms show nothing above it but the ceiling.
+const PANORAMA_TILT: f64 = 85.0 * PI / 180.0;
+/// Proportions of a panorama from which on all of it is one strip. A narrower one is two strips of
+/// half a turn, which show people twice as large.
+const ONE_STRIP: f64 = 1.5;
+/// The quarters begin near the nadir and end near the horizon.
+const QUARTER_TILT_DEG: f64 = 50.0;
+/// Points along each side of a box that is projected into a view.
+const BOX_STEPS: u32 = 4;
+
+/// The kinds of views.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ViewKind {
+    /// One direction.
+    #[default]
+    Fixed,
+    /// The ring around the camera, unrolled: one strip of 360°, or two of 180° below a proportion
+    /// of 3:2.
+    Panorama,
+    /// Four directions, 90° apart.
+    Quarters,
+    /// A person: the newest arrival while it is there, then who is left. The axis turns smoothly.
+    Follow,
+}
+
+/// A straight view of a camera.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, default)]
+#[schema(example = json!({ "azimuth_deg": 90, "tilt_deg": 50, "field_of_view_deg": 80 }))]
+pub struct View {
+    /// The kind.
+    pub kind: ViewKind,
+    /// Direction of the middle of the view, or of its first quarter: 0 toward image right,
+    /// clockwise on the screen, degrees. `follow` begins there.
+    pub azimuth_deg: f64,
+    /// Angle of the axis from straight down, degrees; 45 by default, 50 for `quarters`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0, maximum = 90, nullable = false)]
+    pub tilt_deg: Option<f64>,
+    /// Horizontal field of view, degrees; 90 by default. `follow` adapts it to the person.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 10, maximum = 150, nullable = false)]
+    pub field_of_view_deg: Option<f64>,
+    /// Width, pixels.
+    #[schema(minimum = 64, maximum = 4096)]
+    pub width: u32,
+    /// Height, pixels.
+    #[schema(minimum = 64, maximum = 4096)]
+    pub height: u32,
+}
+
+impl Default for View {
+    fn default() -> Self {
+        Self {
+            kind: ViewKind::Fixed,
+            azimuth_deg: 0.0,
+            tilt_deg: None,
+            field_of_view_deg: None,
+            width: 960,
+            height: 720,
+        }
+    }
+}
+
+/// The direction and the width of a view.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Direction {
+    /// 0 toward image right, clockwise on the screen, radians.
+    pub(super) azimuth: f64,
+    /// From straight down, radians.
+    pub(super) tilt: f64,
+    /// Horizontal, radians.
+    pub(super) field_of_view: f64,
+}
+
+/// A rectangle of a view, and its rays.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Part {
+    /// Left and upper border in the view, pixels.
+    pub(super) origin: [u32; 2],
+    pub(super) projection: Projection,
+}
+
+/// The rays of a part.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Projection {
+    Pinhole(VirtualView),
+    Panorama(Panorama),
+}
+
+impl View {
+    /// Checks the values.
+    ///
+    /// # Errors
+    /// [`ParameterError`] with the field, its value and its range.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        for (name, side) in [("width", self.width), ("height", self.height)] {
+            if !SIDES.contains(&side) {
+                return Err(out_of_range(name, side, &SIDES, "pixels"));
+            }
+        }
+        if self.width * self.height > MAX_PIXELS {
+            let (width, height) = (self.width, self.height);
+            let problem =
+                format!("{width} × {height} are more than {MAX_PIXELS} pixels: lower one");
+            return Err(ParameterError::bad_value("width", problem));
+        }
+        if !(self.azimuth_deg.abs() <= 360.0) {
+            let range = -360.0..=360.0;
+            return Err(out_of_range(
+                "azimuth_deg",
+                self.azimuth_deg,
+                &range,
+                "degrees",
+            ));
+        }
+        for (name, angle, range, unit) in [
+            (
+                "tilt_deg",
+                self.tilt_deg,
+                TILTS_DEG,
+                "degrees from straight down",
+            ),
+            (
+                "field_of_view_deg",
+                self.field_of_view_deg,
+                FIELDS_OF_VIEW_DEG,
+                "degrees",
+            ),
+        ] {
+            if let Some(angle) = angle.filter(|angle| !range.contains(angle)) {
+                return Err(out_of_range(name, angle, &range, unit));
+            }
+        }
+        Ok(())
+    }
+
+    /// The direction of the view, or of its first part.
+    pub(super) fn direction(&self) -> Direction {
+        let tilt_deg = match self.kind {
+            ViewKind::Quarters => QUARTER_TILT_DEG,
+            _ => 45.0,
+        };
+        Direction {
+            azimuth: self.azimuth_deg.to_radians(),
+            tilt: self.tilt_deg.unwrap_or(tilt_deg).to_radians(),
+            field_of_view: self.field_of_view_deg.unwrap_or(90.0).to_radians(),
+        }
+    }
+
+    /// The parts in the frames of a camera. `direction` replaces that of the view.
+    ///
+    /// # Errors
+    /// [`ParameterError`] if the axis of a part is outside of the lens image.
+    pub(super) fn parts(
+        &self,
+        direction: &Direction,
+        camera: &CameraGeometry,
+    ) -> Result<Vec<Part>, ParameterError> {
+        let mount = &camera.mount;
+        let pinhole = |turn: f64, width, height| {
+            let azimuth = direction.azimuth + turn;
+            let (tilt, field_of_view) = (direction.tilt, direction.field_of_view);
+            let view = VirtualView::leveled(azimuth, tilt, field_of_view, mount, width, height);
+            Projection::Pinhole(view)
+        };
+        let whole = |projection| Part {
+            origin: [0, 0],
+            projection,
+        };
+        let (width, height) = (self.width, self.height);
+        let parts = match self.kind {
+            ViewKind::Fixed | ViewKind::Follow => vec![whole(pinhole(0.0, width, height))],
+            ViewKind::Quarters => (0..4_u32)
+                .map(|quarter| {
+                    let [column, row] = [quarter % 2, quarter / 2];
+                    let turn = f64::from(quarter) * FRAC_PI_2;
+                    Part {
+                        origin: [column * (width / 2), row * (height / 2)],
+                        projection: pinhole(turn, width / 2, height / 2),
+                    }
+                })
+                .collect(),
+            ViewKind::Panorama => self.strips(direction.azimuth, camera.lens.max_theta(), mount),
+        };
+        let sees = |part: &Part| match &part.projection {
+            Projection::Pinhole(view) => {
+                let axis = view.ray_in_camera(&view.principal_point());
+                camera.lens.project(&axis).is_some()
+            }
+            Projection::Panorama(_) => true,
+        };
+        if parts.iter().all(sees) {
+            return Ok(parts);
+        }
+        let end = camera.lens.max_theta().to_degrees();
+        let tilt = direction.tilt.to_degrees();
+        let problem = format!(
+            "the axis of the view is beyond the lens image at {tilt:.0}: the lens ends {end:.0}° off its axis, \
+             choose a smaller tilt_deg"
+        );
+        Err(ParameterError::bad_value("tilt_deg", problem))
+    }
+
+    /// The strips of a panorama.
+    fn strips(&self, azimuth: f64, max_theta: f64, mount: &Mount) -> Vec<Part> {
+        let is_one = f64::from(self.width) >= ONE_STRIP * f64::from(self.height);
+        let count = if is_one { 1 } else { 2 };
+        let height = self.height / count;
+        let span = TAU / f64::from(count);
+        let tilt = PANORAMA_TILT.min(max_theta);
+        let strip = |index: u32| Part {
+            origin: [0, index * height],
+            projection: Projection::Panorama(Panorama::new(
+                azimuth + f64::from(index) * span,
+                span,
+                tilt,
+                mount,
+                self.width,
+                height,
+            )),
+        };
+        (0..count).map(strip).collect()
+    }
+}
+
+fn out_of_range<T: std::fmt::Display>(
+    name: &str,
+    value: T,
+    range: &RangeInclusive<T>,
+    unit: &str,
+) -> ParameterError {
+    let (least, most) = (range.start(), range.end());
+    ParameterError::bad_value(name, format!("{value} is not {least} to {most} {unit}"))
+}
+
+impl Part {
+    /// Width and height, pixels.
+    pub(super) fn size(&self) -> [u32; 2] {
+        match &self.projection {
+            Projection::Pinhole(view) => [view.width(), view.height()],
+            Projection::Panorama(panorama) => [panorama.width(), panorama.height()],
+        }
+    }
+
+    /// The point of the view (corner-origin pixels) at which a ray (camera frame) meets the part;
+    /// possibly beyond its borders.
+    fn project(&self, ray: &Ray) -> Option<Pixel> {
+        let point = match &self.projection {
+            Projection::Pinhole(view) => view.project(ray),
+            Projection::Panorama(panorama) => panorama.project(ray),
+        };
+        let point = cross_half_pixel(point?, PixelConvention::CornerOrigin);
+        let [left, top] = self.origin.map(f64::from);
+        Some(Pixel::new(point.x + left, point.y + top))
+    }
+}
+
+/// Returns the box of a person in a view: left, top, right and bottom, corner-origin pixels. `None`
+/// if the center of the person is in no part.
+pub(super) fn box_in_view(
+    parts: &[Part],
+    person: &OrientedBox,
+    camera: &CameraGeometry,
+) -> Option<[f64; 4]> {
+    let ray_at = |point: Pixel| {
+        let pixel = cross_half_pixel(point, PixelConvention::PixelCenter);
+        camera.lens.unproject(&pixel)
+    };
+    let center = ray_at(person.center)?;
+    let borders = |part: &Part| {
+        let ([left, top], [width, height]) = (part.origin, part.size());
+        [left, top, left + width, top + height].map(f64::from)
+    };
+    let part = parts.iter().find(|part| {
+        let [left, top, right, bottom] = borders(part);
+        let at = part.project(&center);
+        at.is_some_and(|at| (left..=right).contains(&at.x) && (top..=bottom).contains(&at.y))
+    })?;
+    let corners = person.corners();
+    let mut found = [
+        f64::INFINITY,
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+        f64::NEG_INFINITY,
+    ];
+    for (index, corner) in corners.iter().enumerate() {
+        let next = corners[(index + 1) % 4];
+        for step in 0..BOX_STEPS {
+            let share = f64::from(step) / f64::from(BOX_STEPS);
+            let ray = ray_at(corner + (next - corner) * share);
+            // The rim cuts off boxes there.
+            let Some(at) = ray.and_then(|ray| part.project(&ray)) else {
+                continue;
+            };
+            let [left, top, right, bottom] = found;
+            found = [
+                left.min(at.x),
+                top.min(at.y),
+                right.max(at.x),
+                bottom.max(at.y),
+            ];
+        }
+    }
+    let [left, top, right, bottom] = borders(part);
+    let [x_min, y_min, x_max, y_max] = found;
+    let clipped = [
+        x_min.max(left),
+        y_min.max(top),
+        x_max.min(right),
+        y_max.min(bottom),
+    ];
+    (clipped[0] < clipped[2] && clipped[1] < clipped[3]).then_some(clipped)
+}
