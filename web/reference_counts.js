@@ -82,7 +82,7 @@ function show(parts, { counts, counts_wanted: wanted, score_threshold: threshold
 /** Shows a frame with the people found, and asks for their number. */
 async function open(parts) {
   const { card, question } = parts;
-  const { report, picture } = await withProgress(parts.status, "Reading the frame", () => newFrameOf(card, parts.answered));
+  const { report, image } = await withProgress(parts.status, "Reading the frame", () => newFrameOf(card, parts.answered));
   let persons = card.history.at(-1)?.persons ?? card.report.persons.length;
   const number = element("output", { "aria-label": "People in this frame" });
   const change = (by) => () => {
@@ -98,7 +98,7 @@ async function open(parts) {
     button("Right", busy(parts, () => answer(parts, report, persons))),
     button("Cancel", () => close(parts)),
   ];
-  question.replaceChildren(picture, element("div", { class: "row" }, buttons));
+  question.replaceChildren(image, element("div", { class: "row" }, buttons));
 }
 
 /** Stores an answer, and asks again until there are enough. */
@@ -125,11 +125,11 @@ async function newFrameOf(card, answered) {
 async function frameOf(card) {
   try {
     const found = await ask(`results/${encodeURIComponent(card.camera)}/latest.jpg?width=${WIDTH}`);
-    const picture = element("img", { alt: `The frame of ${card.camera} to count people in`, src: URL.createObjectURL(await found.blob()) });
-    picture.addEventListener("load", () => URL.revokeObjectURL(picture.src));
-    return { report: found.headers.get("ETag").replaceAll('"', ""), picture };
+    const image = element("img", { alt: `The frame of ${card.camera} to count people in`, src: URL.createObjectURL(await found.blob()) });
+    image.addEventListener("load", () => URL.revokeObjectURL(image.src));
+    return { report: found.headers.get("ETag").replaceAll('"', ""), image };
   } catch (problem) {
     if (problem.status !== 404) throw problem;
-    return { report: card.id, picture: sketch(card.report) };
+    return { report: card.id, image: sketch(card.report) };
   }
 }
