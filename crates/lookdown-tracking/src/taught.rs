@@ -109,13 +109,14 @@ impl TaughtNumber {
         let left_out = counts.iter().enumerate().map(|(index, (persons, found))| {
             let others = counts.iter().enumerate();
             let others = others.filter(|(other, _)| other.abs_diff(index) > neighbors);
-            let weights = weights(others.map(|(_, frame)| frame));
+            let others: Vec<_> = others.map(|(_, frame)| frame).collect();
+            let weights = weights(&others);
             let number = estimate(&weights, found);
             (weights, (persons - number).abs() / scale(number))
         });
         Some(Self {
             left_out: left_out.collect(),
-            weights: weights(counts.iter()),
+            weights: weights(&counts.iter().collect::<Vec<_>>()),
         })
     }
 
@@ -169,16 +170,16 @@ fn found(scores: &[f32]) -> Weights {
 }
 
 /// Returns the weight of each threshold times its ratio.
-fn weights<'a>(frames: impl Iterator<Item = &'a (f64, Weights)> + Clone) -> Weights {
-    let given: f64 = frames.clone().map(|(persons, _)| persons).sum();
+fn weights(frames: &[&(f64, Weights)]) -> Weights {
+    let given: f64 = frames.iter().map(|(persons, _)| persons).sum();
     let mut ratios = [0.0; THRESHOLDS];
     let mut errors = [0.0; THRESHOLDS];
     for (index, (ratio, error)) in ratios.iter_mut().zip(&mut errors).enumerate() {
-        let seen: f64 = frames.clone().map(|(_, found)| found[index]).sum();
+        let seen: f64 = frames.iter().map(|(_, found)| found[index]).sum();
         let of_frames = (given + PRIOR_PERSONS) / (seen + PRIOR_PERSONS);
-        let off = |(persons, found): &(f64, Weights)| (persons - of_frames * found[index]).abs();
+        let off = |(persons, found): &&(f64, Weights)| (persons - of_frames * found[index]).abs();
         *ratio = of_frames;
-        *error = frames.clone().map(off).sum();
+        *error = frames.iter().map(off).sum();
     }
     let least = errors.iter().copied().fold(f64::INFINITY, f64::min);
     let votes = errors.map(|error| (-RATE * (error - least)).exp());
