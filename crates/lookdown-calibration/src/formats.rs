@@ -35,9 +35,12 @@ mod opencv_xml;
 mod opensfm;
 mod py_ocamcalib;
 mod recognize;
+mod rig;
 mod ros;
 mod slam;
 mod woodscape;
+
+use serde_json::Value;
 
 pub use camera_file::{CalibrationFile, Camera, FileCamera};
 pub use error::FormatError;
@@ -107,13 +110,61 @@ fn read_document(text: &str, syntax: Syntax) -> Result<CalibrationFile, FormatEr
         Document::Tree(tree) => tree,
     };
     let explained = |error| foreign::text(text, Some(&tree), error);
-    let fields = Fields::new(&tree).map_err(explained)?;
-    let format = recognize_tree(&fields).ok_or_else(|| explained(unrecognized()))?;
+    let fields = Fields::new(&tree);
+    let format = fields.as_ref().ok().and_then(recognize_tree);
+    let (fields, format) = match (fields, format) {
+        (Ok(fields), Some(format)) => (fields, format),
+        (fields, _) => {
+            // The advice of a file that is something else comes first.
+            let unknown = fields.err().unwrap_or_else(unrecognized);
+            let advice = explained(unknown.clone());
+            if advice != unknown {
+                return Err(advice);
+            }
+            return read_parts(&tree, 2).ok_or(unknown);
+        }
+    };
     if format == Format::Native {
         return native_file::read(&fields, text, syntax);
     }
     let cameras = read_tree(format, &fields)?;
     Ok(CalibrationFile { format, cameras })
+}
+
+/// Reads the entries of a list, or the content of an envelope, as those of a message or a variable,
+/// where they are in a format: the first one's, with a camera for each.
+fn read_parts(tree: &Value, depth: usize) -> Option<CalibrationFile> {
+    let parts: Vec<(String, &Value)> = match tree {
+        Value::Object(map) => map.iter().map(|(key, part)| (key.clone(), part)).collect(),
+        Value::Array(parts) => (0..)
+            .map(|index: usize| index.to_string())
+            .zip(parts)
+            .collect(),
+        _ => Vec::new(),
+    };
+    let mut file: Option<CalibrationFile> = None;
+    for (name, part) in parts {
+        let fields = Fields::new(part).ok();
+        let format = fields.as_ref().and_then(recognize_tree);
+        let read = match (fields, format) {
+            (Some(fields), Some(format)) if format != Format::Native => {
+                let cameras = read_tree(format, &fields).ok();
+                cameras.map(|cameras| CalibrationFile { format, cameras })
+            }
+            _ if depth > 1 => read_parts(part, depth - 1),
+            _ => None,
+        };
+        let Some(mut read) = read else { continue };
+        for camera in &mut read.cameras {
+            camera.name.get_or_insert_with(|| name.clone());
+        }
+        match &mut file {
+            None => file = Some(read),
+            Some(file) if file.format == read.format => file.cameras.append(&mut read.cameras),
+            Some(_) => {}
+        }
+    }
+    file
 }
 
 fn unrecognized() -> FormatError {

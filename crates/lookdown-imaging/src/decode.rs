@@ -116,7 +116,7 @@ pub fn decode(bytes: &[u8], limits: &DecodeLimits) -> Result<DecodedFrame, Decod
             )))
         }
         Err(_) if container::is_heif(bytes) => Err(unsupported("in the format HEIF")),
-        Err(_) => Err(unsupported(container::name_of_text(bytes))),
+        Err(_) => Err(unsupported(container::name_of_other(bytes))),
     }
 }
 

@@ -175,6 +175,59 @@ fn every_file_is_recognized_and_projects_as_its_camera() {
     }
 }
 
+/// A matrix and coefficients, which stand for `$K`, `$F`, `$C` and `$D` below.
+const K: &str = "[[190.975, 0.0, 254.931], [0.0, 190.973, 256.897], [0.0, 0.0, 1.0]]";
+const F: &str = "190.975, 190.973";
+const C: &str = "254.931, 256.897";
+const D: &str = "[0.00348, 0.000715, -0.00205, 0.000203]";
+
+/// The same camera in the other names and wrappers of these programs.
+const VARIANTS: [&str; 14] = [
+    r#"{"K": $K, "D": $D, "DIM": [512, 512]}"#,
+    "calibrationDate: x\ncameraResolution: [512, 512]\ncameraMatrix: $K\ndist_coeffs: $D",
+    "CameraMat: $K\nDistCoeff: $D\nImageSize: [512, 512]\nDistModel: fisheye",
+    "[cam_0]\nname = 'a'\nsize = [512, 512]\nmatrix = $K\ndistortions = $D\nfisheye = true",
+    "image_size: [512, 512]\nLEFT.K: $K\nLEFT.D: $D\nRIGHT.K: $K\nRIGHT.D: $D",
+    "image_size: [512, 512]\nK_01: $K\nD_01: $D\nK_02: $K\nD_02: $D",
+    "image_size: [512, 512]\nrightcamera_matrix: 1\nKr: $K\nDr: $D\nKl: $K\nDl: $D",
+    "sensor_type: camera\nresolution: [512, 512]\ncamera_model: pinhole\nintrinsics: [$F, $C]\n\
+     distortion_model: equidistant\ndistortion_coefficients: $D",
+    r#"{"op": "publish", "msg": {"width": 512, "height": 512, "k": $K, "d": $D,
+        "distortion_model": "equidistant"}}"#,
+    r#"[{"name": "a", "K": $K, "dist": $D, "imgSize": [512, 512]}]"#,
+    r#"{"cameras": [{"id": 3, "camera_matrix": $K, "dist_coeffs": $D, "size": [512, 512]}]}"#,
+    "cameras:\n- {T_SC: [1], image_dimension: [512, 512], distortion_coefficients: $D,\n   \
+     distortion_type: equidistant, focal_length: [$F], principal_point: [$C]}",
+    "label: x\ncameras:\n- camera:\n    image_height: 512\n    image_width: 512\n    \
+     type: pinhole\n    intrinsics: {rows: 4, cols: 1, data: [$F, $C]}\n    \
+     distortion: {type: equidistant, parameters: {data: $D}}",
+    r#"{"camera_model": "pinhole", "intrinsics": [$F, $C], "resolution": [512, 512],
+        "distortion_model": "equidistant", "distortion_coeffs": $D}"#,
+];
+
+#[test]
+fn other_names_and_wrappers_of_a_camera_are_read() {
+    let expected =
+        format!(r#"{{"K": {K}, "D": {D}, "fisheye_model": true, "image_size": [512, 512]}}"#);
+    let expected = camera(expected.as_bytes(), 0);
+    for variant in VARIANTS {
+        let text = variant.replace("$K", K).replace("$D", D);
+        let text = text.replace("$F", F).replace("$C", C);
+        let found = CalibrationFile::parse(text.as_bytes());
+        let found = found.unwrap_or_else(|error| panic!("{variant}: {error}"));
+        for camera in found.cameras {
+            let camera = camera
+                .camera
+                .unwrap_or_else(|error| panic!("{variant}: {error}"));
+            assert_eq!(
+                (camera.image, &camera.lens),
+                (expected.image, &expected.lens),
+                "{variant}"
+            );
+        }
+    }
+}
+
 fn is_valid(point: &Value) -> bool {
     point["valid"] == true
 }

@@ -369,6 +369,42 @@ fn files_of_other_kinds_are_named_with_the_one_to_take() {
             "OpenSfM's reconstruction.json: take camera_models",
         ),
         (text("<html><body>login"), "it is a web page"),
+        (
+            text("<document><calibration type=\"equidistant_fisheye\"/></document>"),
+            "it is Metashape's XML",
+        ),
+        (
+            text("<lensdatabase><lens/></lensdatabase>"),
+            "it is a database of Lensfun",
+        ),
+        (
+            text("# Rig calib list with one line\n1 1 CAMERA"),
+            "it is COLMAP's rigs.txt",
+        ),
+        (
+            text("importantnote: Pix4D internal\n\nF 4.5"),
+            "it is the camera of Pix4D",
+        ),
+        (
+            text("[LEFT_CAM_2K]\nfx=1400\nk1=-0.17"),
+            "the calibration of a ZED camera",
+        ),
+        (
+            text("[{\"img_name\": \"a\", \"fx\": 400, \"fy\": 400, \"width\": 5, \"height\": 5}]"),
+            "cameras.json of Gaussian splatting",
+        ),
+        (
+            text("{\"camera_angle_x\": 0.69, \"frames\": []}"),
+            "take transforms.json with fl_x",
+        ),
+        (
+            text("{\"sfm_data_version\": \"0.3\", \"intrinsics\": [{\"key\": 0}]}"),
+            "it is OpenMVG's sfm_data.json",
+        ),
+        (
+            text("{\"K\": [[4, 0, 2], [0, 4, 2], [0, 0, 1]], \"RadialDistortion\": [0, 0]}"),
+            "it is MATLAB's model of ordinary lenses",
+        ),
     ] {
         let refusal = refusal(&content);
         assert!(refusal.starts_with("not a calibration file: "), "{refusal}");
@@ -440,6 +476,14 @@ fn models_without_a_lens_here_are_refused_by_name() {
         (
             changed("opensfm.json", "fisheye_opencv", "spherical"),
             "it is \"spherical\": fisheye,",
+        ),
+        (
+            "Camera: {model: equirectangular, cols: 1920, rows: 960}".to_owned(),
+            "Camera.model: it is \"equirectangular\": fisheye",
+        ),
+        (
+            "K: [0, 0, 0, 0, 0, 0, 0, 0, 0]\nD: []\ndistortion_model: equidistant".to_owned(),
+            "K: its focal lengths are 0: the camera is not calibrated",
         ),
         (text("depthai.json"), "cameraData[0].cameraType: it is"),
         (

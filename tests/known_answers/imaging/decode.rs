@@ -138,6 +138,27 @@ fn memory_for_a_png_follows_its_pixels() {
 }
 
 #[test]
+fn a_png_without_its_end_chunk_is_whole() {
+    let bytes = fixture("rgb.png");
+    for missing in [12, 6] {
+        let image = decode(&bytes[..bytes.len() - missing], &DecodeLimits::default());
+        assert_eq!(image.unwrap(), decoded("rgb.png"), "{missing}");
+    }
+}
+
+#[test]
+fn an_orientation_behind_the_pixels_of_a_png_is_read() {
+    let mut bytes = fixture("orientation_6.png");
+    let at = bytes.windows(4).position(|name| name == b"eXIf").unwrap() - 4;
+    let payload = u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+    let chunk: Vec<u8> = bytes.drain(at..at + payload + 12).collect();
+    let end = bytes.len() - 12;
+    bytes.splice(end..end, chunk);
+    let image = decode(&bytes, &DecodeLimits::default()).unwrap();
+    assert_eq!(image, decoded("orientation_6.png"));
+}
+
+#[test]
 fn png_and_webp_orientations_are_honoured_too() {
     for name in ["orientation_6.png", "orientation_6.webp"] {
         let image = decoded(name);
@@ -272,7 +293,7 @@ fn the_format_is_detected_from_content_and_others_are_named() {
         "JSON and not the bytes of a file"
     );
     assert_eq!(
-        refused(b"<html>").to_string(),
+        refused(b"no image").to_string(),
         "the image is not in a known image format: send a JPEG, PNG or WebP image"
     );
 }
@@ -281,8 +302,12 @@ fn the_format_is_detected_from_content_and_others_are_named() {
 fn a_truncated_file_is_an_error_and_never_gray_rows() {
     for name in IMAGES {
         let bytes = fixture(name);
-        // The end marker of a JPEG is not a part of its image.
-        let marker = if is_baseline(name) { 2 } else { 0 };
+        // The end marker of a JPEG is not a part of its image, nor is the end chunk of a PNG.
+        let marker = match name {
+            _ if is_baseline(name) => 2,
+            _ if name.ends_with(".png") => 12,
+            _ => 0,
+        };
         for length in 0..bytes.len() - marker {
             let error = refused(&bytes[..length]);
             assert!(
@@ -408,6 +433,7 @@ fn kinds_of_jpeg_that_are_not_read_are_named() {
     let at = segment(&whole, 0xC0).unwrap();
     for (offset, value, expected) in [
         (1, 0xC3, "a lossless JPEG"),
+        (1, 0xF7, "a lossless JPEG"),
         (1, 0xC6, "a hierarchical JPEG"),
         (1, 0xC9, "an arithmetic coded JPEG"),
         (4, 12, "a JPEG with 12 bits per sample"),
@@ -433,6 +459,19 @@ fn text_instead_of_an_image_is_named() {
         (b"_9j_4AAQSkZJRg", "base64 text"),
         (b"ffd8ffe000104a46", "hexadecimal text"),
         (b"\x1f\x8b\x08\0", "compressed with gzip"),
+        (b"\xff\x4f\xff\x51", "in the format JPEG 2000"),
+        (b"\0\0\0\x0cJXL \r\n", "in the format JPEG XL"),
+        (b"\0\0\0\x20ftypisom", "a video and not one of its frames"),
+        (b"RIFF\0\0\0\0AVI LIST", "a video and not one of its frames"),
+        (b"%PDF-1.7", "a PDF document"),
+        (b"\xef\xbb\xbf[255, 216]", "JSON"),
+        (b"b'\\xff\\xd8\\xff'", "the notation of Python"),
+        (b"ff d8 ff e0", "hexadecimal text"),
+        (b"=FF=D8=FF", "quoted-printable text"),
+        (b"[object File]", "the name of an object"),
+        (b"C:\\fakepath\\frame.jpg", "a path or an address"),
+        (b"https://camera/snap.jpg", "a path or an address"),
+        (b" <!DOCTYPE html>", "a web page or XML"),
         (b"hello", "not in a known image format"),
     ] {
         let refused = refused(text).to_string();

@@ -19,6 +19,11 @@ impl CameraMatrix {
     /// Reads the matrix in a field.
     pub(super) fn read(fields: &Fields<'_>, key: &str) -> Result<Self, FormatError> {
         let [fx, skew, cx, zero, fy, cy, bottom @ ..] = fields.exactly::<9>(key, "3 rows of 3")?;
+        if [fx, fy] == [0.0, 0.0] {
+            return Err(
+                fields.invalid(key, "its focal lengths are 0: the camera is not calibrated")
+            );
+        }
         if zero != 0.0 || bottom != [0.0, 0.0, 1.0] {
             return Err(fields.invalid(
                 key,

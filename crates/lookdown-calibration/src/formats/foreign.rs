@@ -94,11 +94,17 @@ camera matrix | the .ini form of ROS' camera_info: take its .yaml form (ost.yaml
 # 3d point list | COLMAP's points3D.txt: take cameras.txt
 !!python/ | settings of a Python program: take its result, as nerfstudio's transforms.json
 array( | printed NumPy arrays or code: write K, D and the frame size as JSON, or with cv2.FileStorage
-import | program code: write K, D and the size as JSON, or with cv2.FileStorage
+import  | program code: write K, D and the size as JSON, or with cv2.FileStorage
 with properties: | MATLAB's printed result: write the intrinsics as JSON with jsonencode
 intrinsic and extrinsic camera parameters | a script of MATLAB's toolbox: calibrate with cv::fisheye
 # hugin project file | a Hugin project: calibrate with cv::fisheye
 <calibration> | Metashape's XML: calibrate with cv::fisheye
+<calibration type | Metashape's XML: calibrate with cv::fisheye
+<lensdatabase | a database of Lensfun, whose models are not OpenCV's: calibrate with cv::fisheye
+# rig calib list | COLMAP's rigs.txt: take cameras.txt
+# frame list | COLMAP's frames.txt: take cameras.txt
+pix4d | the camera of Pix4D, whose model is not OpenCV's: calibrate with cv::fisheye
+[left_cam_ | the calibration of a ZED camera, an ordinary lens: calibrate with cv::fisheye
 <html | a web page: take the file with the result that the calibration program wrote";
 
 /// Fields of trees in no format, and the kinds of their files.
@@ -108,6 +114,9 @@ gyroscope_noise_density | the settings of an IMU: take Kalibr's camchain.yaml
 R1 | the rotations of a stereo pair: take the file with its matrices (intrinsics.yml)
 graph | a Meshroom project: take cameras.sfm of its StructureFromMotion node
 shots | OpenSfM's reconstruction.json: take camera_models.json
+img_name | cameras.json of Gaussian splatting, whose images are undistorted: take COLMAP's cameras.txt
+camera_angle_x | a scene of ordinary images without a lens: take transforms.json with fl_x
+sfm_data_version | OpenMVG's sfm_data.json: calibrate with cv::fisheye, or export cameras.txt of COLMAP
 RadialDistortion | MATLAB's model of ordinary lenses: calibrate with estimateFisheyeParameters
 transform | nerfstudio's dataparser_transforms.json: take transforms.json";
 

@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use super::{
     Camera, FileCamera, FormatError,
-    camera_file::named,
+    camera_file::{alone, named},
     distortion::{Distortion, are_all_zero, four, not_a_fisheye},
     fields::Fields,
 };
@@ -17,6 +17,9 @@ use lookdown_lens::geometry::lens::{
 };
 
 pub(super) fn read(fields: &Fields<'_>) -> Vec<FileCamera> {
+    if fields.has("camera_model") {
+        return alone(read_camera(fields));
+    }
     let is_camera = |entry: &Value| entry.get("camera_model").is_some();
     named(fields, is_camera, read_camera)
 }
@@ -86,6 +89,8 @@ fn lens(camera: &Fields<'_>) -> Result<LensModel, FormatError> {
 
 const MODEL: &str = "distortion_model";
 const COEFFICIENTS: &str = "distortion_coeffs";
+/// The name in the `sensor.yaml` of data sets in the form of `EuRoC`, which has one camera.
+const SENSOR_COEFFICIENTS: &str = "distortion_coefficients";
 
 /// The distortion with its coefficients; one whose coefficients are all 0 is none.
 fn distortion(camera: &Fields<'_>) -> Result<(Distortion, Vec<f64>), FormatError> {
@@ -102,7 +107,12 @@ fn distortion(camera: &Fields<'_>) -> Result<(Distortion, Vec<f64>), FormatError
     if distortion == Distortion::None {
         return Ok((distortion, Vec::new()));
     }
-    let coefficients = camera.numbers(COEFFICIENTS)?;
+    let key = if camera.has(SENSOR_COEFFICIENTS) {
+        SENSOR_COEFFICIENTS
+    } else {
+        COEFFICIENTS
+    };
+    let coefficients = camera.numbers(key)?;
     if distortion == Distortion::RadialTangential && are_all_zero(&coefficients) {
         return Ok((Distortion::None, Vec::new()));
     }

@@ -21,29 +21,12 @@ use crate::warning::{Warning, WarningCode};
 use lookdown_lens::geometry::lens::{LensModel, Mei};
 
 /// Names of the camera matrix that programs choose.
-const MATRIX: [&str; 9] = [
-    "camera_matrix",
-    "cameraMatrix",
-    "Camera_Matrix",
-    "CameraMatrix",
-    "K",
-    "M",
-    "mtx",
-    "intrinsic_matrix",
-    "intrinsics",
-];
+const MATRIX: &str = "camera_matrix cameraMatrix Camera_Matrix CameraMatrix CameraMat K M mtx \
+                      intrinsic_matrix intrinsics matrix";
 /// Names of the distortion coefficients.
-const COEFFICIENTS: [&str; 9] = [
-    "distortion_coefficients",
-    "distCoeffs",
-    "DistCoeffs",
-    "Distortion_Coefficients",
-    "D",
-    "dist",
-    "dist_coeffs",
-    "dist_coeff",
-    "distortion",
-];
+const COEFFICIENTS: &str = "distortion_coefficients distCoeffs DistCoeffs DistCoeff \
+                            Distortion_Coefficients D dist dist_coeffs dist_coeff distortion \
+                            distortions";
 /// Names of the frame's width and height.
 const SIZES: [(&str, &str); 4] = [
     ("image_width", "image_height"),
@@ -52,18 +35,21 @@ const SIZES: [(&str, &str); 4] = [
     ("width", "height"),
 ];
 /// Names of the frame size as one field.
-const SIZE_PAIRS: [&str; 4] = ["image_size", "imageSize", "img_size", "resolution"];
+const SIZE_PAIRS: &str = "image_size imageSize ImageSize img_size imgSize resolution size \
+                          cameraResolution DIM dim Dim";
+/// Fields of other programs, which have a camera matrix as well.
+const OTHERS: [&str; 2] = ["RadialDistortion", "sfm_data_version"];
+/// Names of the distortion model.
+const MODELS: &str = "distortion_model camera_model model DistModel";
 /// Fields that calibration programs store before they have a result.
 const CORNERS: [&str; 2] = ["imagePoints", "image_points"];
-
-/// Names of the cameras in a file of several.
-const SIDES: [&str; 13] = [
-    "0", "1", "2", "3", "4", "left", "right", "Left", "Right", "l", "r", "L", "R",
-];
 
 /// Returns true for a file with any of the names by which OpenCV's files are known.
 pub(super) fn is_storage(fields: &Fields<'_>) -> bool {
     let mut entries = fields.map().values().filter_map(Value::as_object);
+    if OTHERS.iter().any(|name| fields.has(name)) {
+        return false;
+    }
     has_matrix(fields.map())
         || CORNERS.iter().any(|name| fields.has(name))
         || !sides(fields).is_empty()
@@ -71,15 +57,29 @@ pub(super) fn is_storage(fields: &Fields<'_>) -> bool {
 }
 
 fn has_matrix(map: &Map<String, Value>) -> bool {
-    MATRIX.iter().any(|name| map.contains_key(*name))
+    MATRIX.split(' ').any(|name| map.contains_key(name))
 }
 
-/// The cameras of the file that have a matrix of their own.
-fn sides(fields: &Fields<'_>) -> Vec<&'static str> {
-    // A number under such a name is a coefficient.
-    let is_matrix = |key: &str| fields.numbers(key).is_ok_and(|numbers| numbers.len() == 9);
-    let has_matrix = |side: &&str| present(fields, &MATRIX, side).is_some_and(is_matrix);
-    SIDES.into_iter().filter(has_matrix).collect()
+/// Names of the cameras in a file of several: what stands before or behind the name of a matrix,
+/// as a number or a side.
+fn sides<'a>(fields: &Fields<'a>) -> Vec<&'a str> {
+    let mut sides = Vec::new();
+    for key in fields.map().keys() {
+        // A number under such a name is a coefficient.
+        if !fields.numbers(key).is_ok_and(|numbers| numbers.len() == 9) {
+            continue;
+        }
+        let parts = |name: &str| key.strip_prefix(name).or(key.strip_suffix(name));
+        for part in MATRIX.split(' ').filter_map(parts) {
+            let side = part.trim_matches(['_', '.']);
+            let is_number = !side.is_empty() && side.bytes().all(|byte| byte.is_ascii_digit());
+            let is_side = ["l", "r", "left", "right"].contains(&&*side.to_ascii_lowercase());
+            if (is_number || is_side) && !sides.contains(&side) {
+                sides.push(side);
+            }
+        }
+    }
+    sides
 }
 
 pub(super) fn read(fields: &Fields<'_>) -> Vec<FileCamera> {
@@ -101,15 +101,15 @@ pub(super) fn read(fields: &Fields<'_>) -> Vec<FileCamera> {
 }
 
 fn read_camera(fields: &Fields<'_>, side: &str) -> Result<Camera, FormatError> {
-    let Some(matrix) = present(fields, &MATRIX, side) else {
+    let Some(matrix) = present(fields, MATRIX, side) else {
         return Err(fields.invalid(
-            MATRIX[0],
+            "camera_matrix",
             "it is missing: the file holds the corner points of a calibration, not its result",
         ));
     };
     let matrix = CameraMatrix::read(fields, matrix)?;
-    let coefficients = present(fields, &COEFFICIENTS, side).unwrap_or(COEFFICIENTS[0]);
-    let (lens, note) = if let Some(xi) = present(fields, &["xi", "Xi"], side) {
+    let coefficients = present(fields, COEFFICIENTS, side).unwrap_or("distortion_coefficients");
+    let (lens, note) = if let Some(xi) = present(fields, "xi Xi", side) {
         let [xi] = fields.exactly(xi, "xi alone")?;
         let [k1, k2, p1, p2] = fields.exactly(coefficients, "k1, k2, p1, p2")?;
         let lens = Mei {
@@ -155,7 +155,7 @@ fn without_xi(
 
 /// Returns the model that the file states, and the field that states it.
 fn said_distortion<'a>(fields: &Fields<'a>) -> Result<(&'a str, Option<Distortion>), FormatError> {
-    if let Some(key) = present(fields, &["distortion_model", "camera_model", "model"], "") {
+    if let Some(key) = present(fields, MODELS, "") {
         let name = fields.text(key)?;
         let known = Distortion::from_name(name).ok_or_else(|| {
             fields.invalid(
@@ -165,7 +165,11 @@ fn said_distortion<'a>(fields: &Fields<'a>) -> Result<(&'a str, Option<Distortio
         })?;
         return Ok((key, Some(known)));
     }
-    let flag = "fisheye_model";
+    let flag = if fields.has("fisheye") {
+        "fisheye"
+    } else {
+        "fisheye_model"
+    };
     let distortion = match fields.map().get(flag) {
         None => None,
         Some(Value::Bool(false)) => Some(Distortion::RadialTangential),
@@ -179,28 +183,29 @@ fn said_distortion<'a>(fields: &Fields<'a>) -> Result<(&'a str, Option<Distortio
 fn image(fields: &Fields<'_>, side: &str) -> Result<Option<NativeImage>, FormatError> {
     for side in [side, ""] {
         for (width, height) in SIZES {
-            let keys = present(fields, &[width], side).zip(present(fields, &[height], side));
+            let keys = present(fields, width, side).zip(present(fields, height, side));
             if let Some((width, height)) = keys {
                 return fields.image(width, height).map(Some);
             }
         }
-        if let Some(key) = present(fields, &SIZE_PAIRS, side) {
+        if let Some(key) = present(fields, SIZE_PAIRS, side) {
             return fields.image_pair(key).map(Some);
         }
     }
     Ok(None)
 }
 
-/// The first of the names that the file has: as it is, or joined with that of a camera.
-fn present<'a>(fields: &Fields<'a>, names: &[&str], side: &str) -> Option<&'a str> {
-    let spellings = |name: &&str| {
-        [
-            format!("{name}{side}"),
-            format!("{name}_{side}"),
-            format!("{side}_{name}"),
-            format!("{side}{name}"),
-        ]
-    };
-    let mut spelled = names.iter().flat_map(spellings);
-    spelled.find_map(|key| Some(fields.map().get_key_value(&key)?.0.as_str()))
+/// The first of the names, between spaces, that the file has: as it is, or joined with that of a
+/// camera.
+fn present<'a>(fields: &Fields<'a>, names: &str, side: &str) -> Option<&'a str> {
+    names.split(' ').find_map(|name| {
+        let joined = ["", "_", "."].map(|joint| {
+            [
+                format!("{name}{joint}{side}"),
+                format!("{side}{joint}{name}"),
+            ]
+        });
+        let key = joined.iter().flatten().find(|key| fields.has(key))?;
+        Some(fields.map().get_key_value(key)?.0.as_str())
+    })
 }

@@ -46,7 +46,9 @@ pub(super) fn recognize_tree(fields: &Fields<'_>) -> Option<Format> {
     };
     Some(if has("lens") || (has("id") && has("image")) {
         Format::Native
-    } else if any_entry_has(&["camera_model", "intrinsics"]) {
+    } else if any_entry_has(&["camera_model", "intrinsics"])
+        || (has("camera_model") && has("intrinsics") && has("resolution"))
+    {
         Format::Kalibr
     } else if has("model_type") && has("camera_name") {
         Format::Camodocal

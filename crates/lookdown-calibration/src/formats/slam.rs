@@ -1,6 +1,6 @@
 //! Settings of visual SLAM: `OpenVSLAM` and `stella_vslam` (`Camera.model: fisheye`, or the fields
 //! below `Camera`), ORB-SLAM2 and 3 (`Camera.type: KannalaBrandt8` with `Camera.fx`, or
-//! `Camera1.fx` and `Camera2.fx` of two cameras).
+//! `Camera1.fx` and `Camera2.fx` of two cameras), and the lists of cameras in `rig.rs`.
 //!
 //! `k1` to `k4` are those of `cv::fisheye`.
 
@@ -11,6 +11,7 @@ use super::{
     distortion::{Distortion, are_all_zero, not_a_fisheye},
     fields::Fields,
     named_parameters::{self, NamedModel},
+    rig,
 };
 use lookdown_lens::geometry::lens::Rectilinear;
 
@@ -19,8 +20,11 @@ const CAMERAS: [&str; 3] = ["Camera1", "Camera", "Camera2"];
 
 /// Returns true for the settings of a SLAM program.
 pub(super) fn is_settings(fields: &Fields<'_>) -> bool {
-    let has_focal = |name: &str| group(fields, name).contains_key("fx");
-    CAMERAS.into_iter().any(has_focal)
+    let is_camera = |name: &str| {
+        let group = group(fields, name);
+        group.contains_key("fx") || (group.contains_key("model") && group.contains_key("cols"))
+    };
+    CAMERAS.into_iter().any(is_camera) || rig::is_rig(fields)
 }
 
 /// The fields below a name, or those whose names begin with it and a dot.
@@ -36,11 +40,15 @@ fn group(fields: &Fields<'_>, name: &str) -> Map<String, Value> {
 }
 
 pub(super) fn read(fields: &Fields<'_>) -> Vec<FileCamera> {
+    if rig::is_rig(fields) {
+        return rig::read(fields);
+    }
     let common = group(fields, "Camera");
     let mut cameras = Vec::new();
     for name in CAMERAS {
         let parameters = group(fields, name);
-        if parameters.contains_key("fx") {
+        // A panorama of the whole sphere has no focal length.
+        if parameters.contains_key("fx") || parameters.contains_key("model") {
             let parameters = fields.inside(name, &parameters);
             cameras.push(FileCamera {
                 name: Some(name.to_owned()),
@@ -68,6 +76,10 @@ fn read_camera(common: &Fields<'_>, parameters: &Fields<'_>) -> Result<Camera, F
     }
     let distortion = parameters.optional(["k1", "k2", "p1", "p2", "k3"])?;
     let is_plain = ["PinHole", "Rectified", "perspective"].contains(&model);
+    if !(is_plain || Distortion::from_name(model).is_some()) {
+        let problem = format!("it is {model:?}: fisheye and KannalaBrandt8 are read");
+        return Err(common.invalid(key, problem));
+    }
     if !(is_plain && are_all_zero(&distortion)) {
         return Err(common.invalid(key, not_a_fisheye(model)));
     }

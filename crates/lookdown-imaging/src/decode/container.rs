@@ -17,8 +17,51 @@ pub(super) fn is_heif(bytes: &[u8]) -> bool {
         )
 }
 
+const VIDEO: &str = "a video and not one of its frames";
+const PATH: &str = "a path or an address and not the bytes of the file";
+const HEXADECIMAL: &str = "hexadecimal text and not its bytes";
+/// Files and texts that clients send instead of an image: a position, the bytes there, and the end
+/// of a sentence.
+const OTHERS: [(usize, &[u8], &str); 30] = [
+    (4, b"jP  ", "in the format JPEG 2000"),
+    (0, b"\xff\x4f\xff\x51", "in the format JPEG 2000"),
+    (4, b"JXL ", "in the format JPEG XL"),
+    (0, b"\xff\x0a", "in the format JPEG XL"),
+    (0, b"II\xbc", "in the format JPEG XR"),
+    (0, b"II+\0", "in the format TIFF"),
+    (0, b"8BPS", "in the format of Photoshop"),
+    (4, b"ftyp", VIDEO),
+    (8, b"AVI ", VIDEO),
+    (0, b"\x1a\x45\xdf\xa3", VIDEO),
+    (0, b"FLV", VIDEO),
+    // The start code of H.264 and H.265.
+    (0, b"\0\0\0\x01", VIDEO),
+    (0, b"%PDF", "a PDF document"),
+    (0, b"PK\x03\x04", "an archive"),
+    (0, b"<svg", "in the format SVG"),
+    (0, b"<", "a web page or XML"),
+    (
+        0,
+        b"[object ",
+        "the name of an object and not the bytes of a file",
+    ),
+    (0, b"{", "JSON and not the bytes of a file"),
+    (0, b"[", "JSON and not the bytes of a file"),
+    (0, b"ffd8ff", HEXADECIMAL),
+    (0, b"FFD8FF", HEXADECIMAL),
+    (0, b"0xff", HEXADECIMAL),
+    (0, b"ff d8 ff", HEXADECIMAL),
+    (0, b"b'\\x", "the notation of Python and not its bytes"),
+    (0, b"=FF=D8", "quoted-printable text and not its bytes"),
+    (0, b"http://", PATH),
+    (0, b"https://", PATH),
+    (0, b"/", PATH),
+    (0, b"@", PATH),
+    (1, b":\\", PATH),
+];
+
 /// Returns what clients send instead of the bytes of an image, as the end of a sentence.
-pub(super) fn name_of_text(bytes: &[u8]) -> &'static str {
+pub(super) fn name_of_other(bytes: &[u8]) -> &'static str {
     /// The beginnings of images, also in the alphabet for URLs, and percent-encoded.
     const BASE64: [&[u8]; 6] = [
         b"data:image/",
@@ -30,19 +73,21 @@ pub(super) fn name_of_text(bytes: &[u8]) -> &'static str {
     ];
     /// Bytes that are searched: names of form fields may come before.
     const BEGIN: usize = 64;
-    let text = bytes.trim_ascii_start();
+    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let text = text.trim_ascii_start();
     let begin = &text[..text.len().min(BEGIN)];
     let contains = |part: &&[u8]| begin.windows(part.len()).any(|window| window == *part);
-    if text.starts_with(b"{") || text.starts_with(b"[") {
-        "JSON and not the bytes of a file"
-    } else if BASE64.iter().any(contains) {
+    let is_json = text.starts_with(b"{") || text.starts_with(b"[");
+    if !is_json && BASE64.iter().any(contains) {
         "base64 text and not its bytes"
-    } else if begin.starts_with(b"ffd8ff") || begin.starts_with(b"FFD8FF") {
-        "hexadecimal text and not its bytes"
     } else if bytes.starts_with(&[0x1F, 0x8B]) {
         "compressed with gzip"
     } else {
-        "not in a known image format"
+        let is_there = |(at, part, _): &&(usize, &[u8], _)| {
+            text.get(*at..).is_some_and(|rest| rest.starts_with(part))
+        };
+        let other = OTHERS.iter().find(is_there);
+        other.map_or("not in a known image format", |(.., name)| name)
     }
 }
 
@@ -56,34 +101,50 @@ pub(super) fn png_size(bytes: &[u8]) -> Option<(u32, u32)> {
     Some((side(16)?, side(20)?))
 }
 
-/// Returns a PNG without the chunks that its pixels do not need, `None` if it has no end chunk.
+/// The last chunk of a PNG.
+const PNG_END: &[u8] = b"\0\0\0\0IEND\xae\x42\x60\x82";
+/// The length of the signature with the first chunk, the header.
+const PNG_HEADER_LENGTH: usize = 33;
+
+/// Returns a PNG without the chunks that its pixels do not need, `None` if a chunk is cut off. An
+/// end chunk that is missing is added, as the pixels show whether they are whole.
 ///
 /// Profiles and texts are compressed a thousandfold, and the decoder would keep each. The frames of
-/// an animation after the first one are left out, too.
+/// an animation after the first one are left out, too. The orientation comes first, because the
+/// decoder reads no chunk behind the pixels.
 pub(super) fn png_essence(bytes: &[u8]) -> Option<Vec<u8>> {
     let (signature, mut rest) = bytes.split_at_checked(8)?;
     let mut essence = signature.to_vec();
-    while let [l0, l1, l2, l3, kind @ ..] = rest {
+    let mut has_exif = false;
+    while let [l0, l1, l2, l3, kind @ ..] = rest
+        && rest.len() >= PNG_END.len()
+    {
         let payload = u32::from_be_bytes([*l0, *l1, *l2, *l3]) as usize;
         // Length, name, payload and checksum.
         let (chunk, next) = rest.split_at_checked(payload.saturating_add(12))?;
         let name = kind.get(..4)?;
         // The name of a chunk that is needed to show the image begins with a capital letter.
-        if name[0].is_ascii_uppercase() || name == b"tRNS" || name == b"eXIf" {
+        if name == b"eXIf" && !has_exif && essence.len() >= PNG_HEADER_LENGTH {
+            has_exif = true;
+            let after_header = PNG_HEADER_LENGTH..PNG_HEADER_LENGTH;
+            essence.splice(after_header, chunk.iter().copied());
+        } else if name == b"IEND" {
+            break;
+        } else if name[0].is_ascii_uppercase() || name == b"tRNS" {
             essence.extend_from_slice(chunk);
-        }
-        if name == b"IEND" {
-            return Some(essence);
         }
         rest = next;
     }
-    None
+    essence.extend_from_slice(PNG_END);
+    Some(essence)
 }
 
 /// Returns the orientation of an EXIF block (TIFF 6.0, section 2; Exif 2.32, tag 0x0112), whatever
 /// the type of the integer.
 pub(super) fn exif_orientation(exif: &[u8]) -> Option<Orientation> {
     const ORIENTATION: u32 = 0x0112;
+    // Some programs write the prefix of JPEG into other formats.
+    let exif = exif.strip_prefix(b"Exif\0\0").unwrap_or(exif);
     let is_little = match exif.get(..4)? {
         b"II*\0" => true,
         b"MM\0*" => false,

@@ -28,7 +28,7 @@ impl JpegHead {
             };
             match marker {
                 0xC4 => head.has_huffman_tables = true,
-                0xC0..=0xC3 | 0xC5..=0xC7 | 0xC9..=0xCB | 0xCD..=0xCF => {
+                0xC0..=0xC3 | 0xC5..=0xC7 | 0xC9..=0xCB | 0xCD..=0xCF | 0xF7 => {
                     head.frame = payload.first().map(|bits| (*marker, *bits));
                 }
                 0xDA => break,
@@ -43,7 +43,7 @@ impl JpegHead {
     pub(super) fn unsupported_kind(&self) -> Option<String> {
         let (marker, bits) = self.frame?;
         let kind = match marker {
-            0xC3 => "a lossless",
+            0xC3 | 0xF7 => "a lossless",
             0xC5..=0xC7 => "a hierarchical",
             0xC9..=0xCF => "an arithmetic coded",
             _ if bits != 8 => return Some(format!("a JPEG with {bits} bits per sample")),
