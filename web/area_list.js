@@ -56,6 +56,10 @@ function rowOf({ key, kind }) {
     row.name = input;
     fields.push(label);
   }
+  if (kind === "zone") {
+    row.lying = element("input", { type: "checkbox", id: `lying-${key}`, onchange: () => change({ lying: row.lying.checked ? "expected" : undefined }) });
+    fields.push(element("label", { for: row.lying.id }, row.lying, " People may lie here: bed, sofa, mat"));
+  }
   if (kind === "line") {
     const sides = ["Along the arrow", "Against it"].map((label, side) => {
       const [input, node] = field(label, `direction-${side}`, () =>
@@ -89,6 +93,7 @@ function updateRow(row, area, { editor, countOf, invalid }) {
   row.count.textContent = countOf(area) ?? "";
   row.form.hidden = !isSelected;
   if (row.name && row.name.value.trim() !== area.name) row.name.value = area.name;
+  if (row.lying) row.lying.checked = area.lying === "expected";
   row.directions?.forEach((input, side) => {
     if (input.value.trim() !== area.directions[side]) input.value = area.directions[side];
   });

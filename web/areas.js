@@ -18,10 +18,10 @@ const TITLES = { ignore: "ignored place" };
 
 let lastKey = 0;
 
-/** A new area. `key` identifies it while the page is open; `space` is the field of its corners. */
-export function areaOf(kind, space, name, corners, directions = DIRECTIONS) {
+/** A new area. `key` identifies it while the page is open; `space` is the field of its corners; `lying` is `expected` for a bed. */
+export function areaOf(kind, space, name, corners, directions = DIRECTIONS, lying = undefined) {
   lastKey += 1;
-  return { key: String(lastKey), kind, space, name, corners, directions };
+  return { key: String(lastKey), kind, space, name, corners, directions, lying };
 }
 
 /** The areas of a calibration file. */
@@ -29,7 +29,7 @@ export function areasOf(file) {
   return Object.entries(KINDS).flatMap(([kind, { field }]) =>
     (file[field] ?? []).map((entry) => {
       const space = entry.floor_m ? "floor_m" : "frame_px";
-      return areaOf(kind, space, entry.name ?? "", entry[space], entry.directions);
+      return areaOf(kind, space, entry.name ?? "", entry[space], entry.directions, entry.lying);
     }),
   );
 }
@@ -45,10 +45,11 @@ export function withAreas(file, areas) {
   return changed;
 }
 
-function entryOf({ kind, space, name, corners, directions }) {
+function entryOf({ kind, space, name, corners, directions, lying }) {
   const entry = { [space]: corners };
   if (kind !== "mask" && (name || !isNameless(kind))) entry.name = name;
   if (kind === "line") entry.directions = directions;
+  if (lying) entry.lying = lying;
   return entry;
 }
 

@@ -3,6 +3,7 @@
 import { countRows, drawCounts } from "./counts_drawing.js";
 import { element, find, shape } from "./dom.js";
 import { options } from "./camera_states.js";
+import { floorAlerts } from "./floor_alerts.js";
 import { furnitureList } from "./furniture.js";
 import { key } from "./server.js";
 
@@ -17,7 +18,7 @@ const HEAT_MILLIS = 60_000;
 
 /** The shown cards by camera. */
 const cards = new Map();
-/** The drawings by camera: `{drawing, rows, furniture, heat, heatAt}`. */
+/** The drawings by camera: `{drawing, rows, furniture, floor, heat, heatAt}`. */
 const counted = new Map();
 let polling = null;
 const PATH = "counts";
@@ -90,7 +91,7 @@ async function load(camera, signal) {
   if (!answer) return remove(camera);
   if (!counted.has(camera)) {
     const drawing = shape("svg", { class: "counts", role: "img" });
-    counted.set(camera, { drawing, rows: element("ul", { class: "count-rows" }), furniture: furnitureList(camera), answer, heat: "", heatAt: 0 });
+    counted.set(camera, { drawing, rows: element("ul", { class: "count-rows" }), furniture: furnitureList(camera), floor: floorAlerts(camera), answer, heat: "", heatAt: 0 });
     attach(cards.get(camera));
   }
   counted.get(camera).answer = answer;
@@ -109,6 +110,7 @@ async function refresh(camera, signal = polling?.signal) {
     }
   }
   const card = cards.get(camera);
+  counts.floor.show(counts.answer.floor_alerts, card?.node);
   if (!card?.report || !counted.has(camera)) return;
   const { width, height } = card.report.image;
   drawCounts(counts.drawing, { camera, width, height, heat: bar.heat.checked ? counts.heat : "" }, counts.answer);
@@ -117,10 +119,11 @@ async function refresh(camera, signal = polling?.signal) {
 }
 
 function attach(card) {
-  const { drawing, rows, furniture } = counted.get(card.camera);
+  const { drawing, rows, furniture, floor } = counted.get(card.camera);
   card.node.classList.add("counted");
   const sight = find(".sight", card.node);
   sight.append(drawing);
+  sight.before(floor.node);
   sight.after(rows, furniture.node);
 }
 
@@ -132,7 +135,8 @@ function remove(camera) {
   counts.drawing.remove();
   counts.rows.remove();
   counts.furniture.node.remove();
-  cards.get(camera)?.node.classList.remove("counted");
+  counts.floor.node.remove();
+  cards.get(camera)?.node.classList.remove("counted", "has-floor-alert");
 }
 
 async function request(address, signal) {

@@ -15,7 +15,7 @@ use std::{
 
 use jiff::Timestamp;
 use lookdown_common::ServerClient;
-use lookdown_count::Snapshot;
+use lookdown_count::{FloorAlert, Snapshot};
 use rumqttc::Publish;
 use serde_json::{Value, json};
 use tokio::{
@@ -27,7 +27,7 @@ use super::{
     Broker,
     connector::Connector,
     discovery::{OFFLINE, ONLINE},
-    entity::{self, SENSOR},
+    entity,
     message::Message,
     retained::RetainedTopics,
     session::{Session, SessionError},
@@ -264,7 +264,7 @@ impl CountsPublisher {
 
     fn config_topic(&self, owner: Owner<'_>, number: Number<'_>) -> Option<String> {
         let id = self.device(owner, "").entity_id(&number.entity());
-        self.topics.config(SENSOR, &id)
+        self.topics.config(number.component(), &id)
     }
 
     /// Returns all messages that the broker is to retain.
@@ -280,9 +280,13 @@ impl CountsPublisher {
             let since = camera.too_low_since_ms.map(Timestamp::from_millisecond);
             let since = since.and_then(Result::ok).map(|time| time.to_string());
             let [low, high] = [0, 1].map(|end| camera.bar.map(|bar| bar[end]));
-            device.attributes(
-                &json!({ "persons_high": high, "persons_low": low, "too_low_since": since }),
-            );
+            let mut attributes =
+                json!({ "persons_high": high, "persons_low": low, "too_low_since": since });
+            if let Some(alerts) = &camera.floor_alerts {
+                attributes["floor_alerts"] = alerts.iter().map(floor_alert).collect();
+                device.floor_alert(!alerts.is_empty());
+            }
+            device.attributes(&attributes);
             for line in &camera.lines {
                 let (of, direction) = (level(&line.line), level(&line.direction));
                 let number = Number::Crossings {
@@ -359,6 +363,16 @@ impl<'a> Device<'a> {
         }
     }
 
+    /// Adds the state of the floor alert.
+    fn floor_alert(&mut self, is_on: bool) {
+        let number = Number::FloorAlert;
+        let config = json!({ "device_class": "safety" });
+        self.announce("Someone on the floor", number, &config, false);
+        let topic = self.publisher.state_topic(self.owner, number);
+        let state = if is_on { "ON" } else { "OFF" };
+        self.retained.insert(topic, state.to_owned());
+    }
+
     /// Adds a number that only grows.
     fn total(&mut self, name: &str, number: Number<'_>, value: u64, config: &Value) {
         let mut config = config.clone();
@@ -376,14 +390,24 @@ impl<'a> Device<'a> {
         let mut config = config.clone();
         config["name"] = json!(name);
         config["state_topic"] = json!(publisher.state_topic(owner, number));
-        if let (Owner::Camera(_), Number::Persons) = (owner, number) {
+        if let (Owner::Camera(_), Number::Persons | Number::FloorAlert) = (owner, number) {
             config["json_attributes_topic"] = json!(topics.counts(&owner.attributes()));
         }
         let device = publisher.device(owner, self.name);
         let entity = number.entity();
-        let announcement = device.announcement(topics, SENSOR, &entity, availability, config);
+        let announcement =
+            device.announcement(topics, number.component(), &entity, availability, config);
         self.retained.extend(announcement);
     }
+}
+
+/// Returns a floor alert as attributes and events have it.
+fn floor_alert(alert: &FloorAlert) -> Value {
+    let since = Timestamp::from_millisecond(alert.since_ms).ok();
+    json!({
+        "posture": alert.posture, "since": since.map(|time| time.to_string()), "zone": alert.zone,
+        "is_acknowledged": alert.is_acknowledged,
+    })
 }
 
 /// Returns the messages that turn the published state into the wanted one.

@@ -43,6 +43,12 @@ settings! {
         /// Lets every client of a `counts.listen` that other machines reach read the counts without
         /// a key.
         open: bool = false => flag();
+        /// Reports people who lie on the floor, outside of zones where that is expected
+        /// (docs/count.md#people-on-the-floor).
+        floor_alert: bool = false => flag();
+        /// The time on the floor after which there is an alert.
+        floor_alert_after: Duration = Duration::from_secs(20)
+            => duration(Duration::from_secs(1)..=Duration::from_hours(1));
     }
 }
 
@@ -59,6 +65,7 @@ impl CountSettings {
             commit_every: self.commit_every,
             longest_gap: self.longest_gap,
             max_cameras: self.max_cameras,
+            floor_alert_after: self.floor_alert.then_some(self.floor_alert_after),
             ..CountEntry::default()
         }
     }

@@ -15,7 +15,7 @@ use lookdown_detect::{
     },
 };
 use lookdown_lens::geometry::{
-    OrientedBox, PersonHeight, Pixel,
+    OrientedBox, PersonHeight, Pixel, Posture,
     floor::{Bearing, FloorPosition},
 };
 
@@ -43,6 +43,7 @@ fn person() -> Person {
             sd_m: 0.21,
             foot_angle: 1.0,
         }),
+        posture: (Posture::Upright, 0.912_34),
         views: 3,
         zones: Some(vec!["entrance".to_owned()]),
     }

@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 use super::{
     FormatError,
     formats::Camera,
-    native::{NativeImage, NativePlace},
+    native::{NativeImage, NativeLying, NativePlace},
 };
 use area_name::check_name;
 use lookdown_lens::geometry::{
@@ -76,6 +76,7 @@ impl Areas {
             Ok(Zone {
                 name: zone.name.clone(),
                 area: area(&field, (&zone.frame_px, &zone.floor_m), image, mount)?,
+                is_lying_expected: zone.lying == Some(NativeLying::Expected),
             })
         });
         let zones = zones.collect::<Result<_, _>>()?;

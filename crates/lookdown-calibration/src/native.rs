@@ -10,7 +10,7 @@ use std::{collections::BTreeMap, str::FromStr};
 use lookdown_common::StoredFile;
 use serde::{Deserialize, Serialize};
 
-pub use areas::{NativeLine, NativeMask, NativePlace, NativeZone};
+pub use areas::{NativeLine, NativeLying, NativeMask, NativePlace, NativeZone};
 pub use detect::NativeValue;
 pub use source::{NativeSource, SourcedValue, ValueSource};
 

@@ -201,12 +201,23 @@ pub struct ReportPerson {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub height_sd_m: Option<f64>,
+    /// `upright`, `seated`, `low`, `lying` or `unknown`, as far as one frame tells.
+    #[serde(default = "unknown")]
+    pub posture: Cow<'static, str>,
+    /// Probability of the most likely posture; below 0.6 the posture is `unknown`.
+    #[serde(default)]
+    pub posture_probability: f64,
     /// Number of views that detected the person.
     pub views: usize,
     /// Names of the zones that contain the person's foot point; absent without zones.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub zones: Option<Vec<String>>,
+}
+
+/// The posture in reports of earlier versions.
+fn unknown() -> Cow<'static, str> {
+    Cow::Borrowed("unknown")
 }
 
 /// Corner-origin frame pixels: a full frame is 0, 0, width, height.

@@ -30,7 +30,7 @@ impl StoredFile {
     pub const fn version(self) -> u8 {
         match self {
             Self::Settings | Self::Calibration | Self::Cameras | Self::Views | Self::Counts => 1,
-            Self::Tracks => 3,
+            Self::Tracks => 4,
         }
     }
 

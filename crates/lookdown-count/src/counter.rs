@@ -37,6 +37,8 @@ pub(crate) struct CountingOptions {
     pub(crate) longest_gap_ms: i64,
     /// Most cameras.
     pub(crate) max_cameras: usize,
+    /// Time after which people on the floor are an alert, milliseconds; `None` for no alerts.
+    pub(crate) floor_alert_after_ms: Option<i64>,
     /// Cameras that have a place beyond the limit, too.
     pub(crate) own: OwnCameras,
 }
@@ -183,6 +185,22 @@ impl Counter {
         self.options.longest_gap_ms
     }
 
+    /// Returns the time after which people on the floor are an alert; `None` for no alerts.
+    pub(crate) fn floor_alert_after_ms(&self) -> Option<i64> {
+        self.options.floor_alert_after_ms
+    }
+
+    /// Acknowledges a floor alert, which is stored with the next transaction. Returns false for an
+    /// unknown alert, and `None` for a camera that is not followed.
+    pub(crate) fn acknowledge(&mut self, camera: &str, id: u64) -> Option<bool> {
+        let owner = self.owners.get(camera)?.clone();
+        let (scene, index) = self.scene_at(&owner, camera).ok()?;
+        let is_known = scene.cameras[index].floor.acknowledge(id);
+        self.changed.insert(owner);
+        (self.has_news, self.is_urgent) = (true, true);
+        Some(is_known)
+    }
+
     /// Returns the definition that is in use for a camera.
     pub(crate) fn definition(&self, camera: &str) -> Option<Arc<CameraDefinition>> {
         let (_, camera) = self.scene_of(camera)?.camera(camera)?;
@@ -247,6 +265,7 @@ impl Counter {
         let time = ReportTime {
             at_ms: report.at_ms(is_on_site),
             longest_gap_ms: self.options.longest_gap_ms,
+            floor_alert_after_ms: self.options.floor_alert_after_ms,
             now: now.instant,
         };
         let (scene, index) = self.scene_at(&owner, &report.camera)?;

@@ -2,6 +2,7 @@
 
 mod counts;
 mod document;
+mod floor;
 mod frame_heat_map;
 mod furniture;
 mod heat_map;
@@ -48,6 +49,8 @@ fn routes() -> OpenApiRouter<Shared> {
         .routes(routes!(cameras))
         .routes(routes!(counts::camera_counts, removal::delete))
         .routes(routes!(tracks::camera_tracks))
+        .routes(routes!(floor::list))
+        .routes(routes!(floor::acknowledge))
         .routes(routes!(furniture::list))
         .routes(routes!(furniture::confirm, furniture::take_back))
         .routes(routes!(heat_map::json_of_camera))

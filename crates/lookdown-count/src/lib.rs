@@ -20,6 +20,7 @@ mod drops;
 mod event_image;
 mod event_parser;
 mod event_stream;
+mod floor;
 mod follower;
 mod frame_rate;
 mod http;
@@ -47,6 +48,8 @@ pub use options::{CountEntry, CountOptions, read_key};
 pub use recording::{Recording, RecordingError};
 pub use remote_persons::{PersonsByCamera, read_persons};
 pub use run::{CountError, Started, count};
-pub use snapshot::{CameraSnapshot, LineSnapshot, SiteSnapshot, Snapshot, ZoneSnapshot};
+pub use snapshot::{
+    CameraSnapshot, FloorAlert, LineSnapshot, SiteSnapshot, Snapshot, ZoneSnapshot,
+};
 pub use store::StoreError;
 pub use webhooks::WebhookEntry;

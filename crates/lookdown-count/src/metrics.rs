@@ -45,6 +45,9 @@ metric_set! {
     /// 1 while crossings may be missed, as fewer frames than lines need became reports, else 0;
     /// absent while unknown or without lines.
     too_low: IntGaugeVec = "too_low" ["camera"];
+    /// 1 while someone is on the floor and no user has acknowledged it, else 0; absent without
+    /// `counts.floor_alert`.
+    floor_alert: IntGaugeVec = "floor_alert" ["camera"];
     /// Time of the last frame.
     last_report: IntGaugeVec = "last_report_timestamp_seconds" ["camera"];
 }
@@ -77,6 +80,7 @@ impl Metrics {
             &self.zone_persons,
             &self.site_persons,
             &self.too_low,
+            &self.floor_alert,
             &self.last_report,
         ] {
             gauges.reset();
@@ -97,6 +101,12 @@ impl Metrics {
                         .with_label_values(&[name])
                         .set(is_too_low.into());
                 }
+            }
+            if let Some(alerts) = &camera.floor_alerts {
+                let is_open = alerts.iter().any(|alert| !alert.is_acknowledged);
+                self.floor_alert
+                    .with_label_values(&[name])
+                    .set(is_open.into());
             }
             for line in &camera.lines {
                 let labels = [name, line.line.as_str(), line.direction.as_str()];

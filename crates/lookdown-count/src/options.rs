@@ -39,6 +39,8 @@ pub struct CountEntry {
     pub longest_gap: Duration,
     /// Most cameras.
     pub max_cameras: usize,
+    /// The time after which people on the floor are an alert; `None` for no alerts.
+    pub floor_alert_after: Option<Duration>,
     /// Receivers of messages.
     pub webhooks: Vec<WebhookEntry>,
 }
@@ -56,6 +58,7 @@ impl Default for CountEntry {
             commit_every: Duration::from_secs(2),
             longest_gap: Duration::from_secs(10),
             max_cameras: 64,
+            floor_alert_after: None,
             webhooks: Vec::new(),
         }
     }
@@ -84,6 +87,8 @@ pub struct CountOptions {
     pub longest_gap: Duration,
     /// Most cameras.
     pub max_cameras: usize,
+    /// The time after which people on the floor are an alert; `None` for no alerts.
+    pub floor_alert_after: Option<Duration>,
     /// Receivers of messages.
     pub(crate) webhooks: Vec<Webhook>,
 }
@@ -118,6 +123,7 @@ impl CountEntry {
             commit_every: self.commit_every,
             longest_gap: self.longest_gap,
             max_cameras: self.max_cameras,
+            floor_alert_after: self.floor_alert_after,
             webhooks: webhooks.collect::<Result<_, _>>()?,
         })
     }

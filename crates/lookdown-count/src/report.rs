@@ -6,7 +6,7 @@ use lookdown_common::{
     report::{Report, ReportCalibration, ReportImage, ReportOrientedBox, ReportPerson},
     text::is_camera_name,
 };
-use lookdown_lens::geometry::{OrientedBox, Pixel};
+use lookdown_lens::geometry::{BoxAngles, OrientedBox, Pixel};
 use lookdown_tracking::Observation;
 use serde::{Deserialize, Serialize};
 
@@ -155,15 +155,18 @@ fn observation(
     } = person.oriented_box;
     let center = Pixel::new(cx, cy);
     // The angle does not tell the head from the foot.
-    let foot = OrientedBox::turned(center, width, height, angle_deg.to_radians())
-        .with_head_toward(&definition.up_at(center))
-        .foot();
+    let oriented = OrientedBox::turned(center, width, height, angle_deg.to_radians())
+        .with_head_toward(&definition.up_at(center));
+    let foot = oriented.foot();
+    let camera = definition.geometry.as_ref();
+    let angles = camera.and_then(|camera| BoxAngles::new(&oriented, &camera.lens, &camera.mount));
     Some(Observation {
         floor_m: person.floor.map(|floor| [floor.x_m, floor.y_m]),
         azimuth_deg: bearing.azimuth_deg,
         off_axis_deg: bearing.off_axis_deg,
         center_px: [cx, cy],
         size_px: [width, height],
+        angles,
         foot_px: [foot.x, foot.y],
         score: person.score,
         is_in_margin,

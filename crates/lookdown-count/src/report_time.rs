@@ -9,6 +9,8 @@ pub(crate) struct ReportTime {
     pub(crate) at_ms: i64,
     /// Longest time between two reports of a camera that is known, milliseconds.
     pub(crate) longest_gap_ms: i64,
+    /// Time after which people on the floor are an alert, milliseconds; `None` for no alerts.
+    pub(crate) floor_alert_after_ms: Option<i64>,
     /// Its arrival, by a clock that never jumps.
     pub(crate) now: Instant,
 }

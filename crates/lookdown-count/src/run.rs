@@ -108,6 +108,9 @@ pub async fn count(
     let counting = CountingOptions {
         longest_gap_ms: i64::try_from(options.longest_gap.as_millis()).unwrap_or(i64::MAX),
         max_cameras: options.max_cameras,
+        floor_alert_after_ms: options
+            .floor_alert_after
+            .map(|after| i64::try_from(after.as_millis()).unwrap_or(i64::MAX)),
         own: in_process.map_or_else(OwnCameras::default, |server| server.own_cameras.clone()),
     };
     let mut counter = Counter::new(counting, resumed.last_event, resumed.totals);

@@ -114,6 +114,7 @@ impl Scene {
                 continue;
             };
             camera.last_report = before.last_report;
+            camera.floor = before.floor.clone();
             let is_same = before.definition.has_frames_of(&camera.definition);
             let kept = other.tracker.furniture(known).filter(|_| is_same);
             if let (Some(kept), Some(own)) = (kept, self.tracker.furniture_mut(index)) {
@@ -170,6 +171,16 @@ impl Scene {
         for (cell, milliseconds) in self.heat_map.take() {
             let key = (self.owner.clone(), day, cell);
             *sums.cells.entry(key).or_default() += milliseconds;
+        }
+        if let Some(after_ms) = time.floor_alert_after_ms {
+            let shown = |track: &&&Track| {
+                track.last_person().camera == camera && track.seen_s() >= seconds(time.at_ms)
+            };
+            let shown: Vec<&Track> = tracks.iter().filter(shown).copied().collect();
+            let SceneCamera {
+                floor, definition, ..
+            } = &mut self.cameras[camera];
+            floor.update(&shown, time.at_ms, after_ms, definition);
         }
         let tracked = tracks.len() as u64;
         let is_site = matches!(self.owner, Owner::Site(_));

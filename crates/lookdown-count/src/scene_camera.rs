@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     definition::CameraDefinition,
     definition_key::DefinitionKey,
+    floor::Floor,
     frame_rate::FrameRate,
     now::{LogPause, Now},
     presence::Presence,
@@ -40,6 +41,7 @@ pub(crate) struct SceneCamera {
     zones: ZoneCounter,
     pub(crate) presence: Presence,
     rate: FrameRate,
+    pub(crate) floor: Floor,
     /// Persons in each zone at the last report of this camera.
     zone_persons: Vec<u64>,
     /// The last report of this camera, counted or not.
@@ -61,6 +63,7 @@ pub(crate) struct CameraState {
     presence: Presence,
     zone_persons: Vec<u64>,
     last_report: Option<ReportKey>,
+    floor: Floor,
 }
 
 impl CameraState {
@@ -86,6 +89,7 @@ impl SceneCamera {
             zones: zone_counter(&definition, ZoneState::default()),
             presence: Presence::default(),
             rate: FrameRate::default(),
+            floor: Floor::default(),
             zone_persons: vec![0; definition.zones.len()],
             last_report: None,
             arrived: None,
@@ -105,6 +109,7 @@ impl SceneCamera {
             presence: state.presence,
             zone_persons,
             last_report: state.last_report,
+            floor: state.floor,
             ..Self::new(&state.name, definition)
         }
     }
@@ -119,6 +124,7 @@ impl SceneCamera {
             presence: self.presence,
             zone_persons: self.zone_persons.clone(),
             last_report: self.last_report,
+            floor: self.floor.clone(),
         }
     }
 
@@ -127,6 +133,7 @@ impl SceneCamera {
         *self = Self {
             presence: self.presence,
             rate: self.rate,
+            floor: std::mem::take(&mut self.floor),
             last_report: self.last_report,
             arrived: self.arrived,
             late_since: self.late_since,
@@ -276,7 +283,7 @@ fn zone_counter(definition: &CameraDefinition, state: ZoneState) -> ZoneCounter 
     })
 }
 
-fn milliseconds(seconds: f64) -> i64 {
+pub(crate) fn milliseconds(seconds: f64) -> i64 {
     #[expect(clippy::cast_possible_truncation, reason = "times of reports")]
     let milliseconds = (seconds * 1000.0).round() as i64;
     milliseconds

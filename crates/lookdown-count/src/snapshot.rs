@@ -2,6 +2,7 @@
 
 use crate::{
     counter::{Counter, MAX_AHEAD_MS},
+    floor::PersonDown,
     sums::{LineDirection, Owner, ZoneOf},
 };
 
@@ -29,10 +30,39 @@ pub struct CameraSnapshot {
     pub bar: Option<[u64; 2]>,
     /// Time since which its lines have too few frames, milliseconds since the Unix epoch.
     pub too_low_since_ms: Option<i64>,
+    /// The floor alerts, longest first; `None` without the setting.
+    pub floor_alerts: Option<Vec<FloorAlert>>,
     /// The directions of its lines.
     pub lines: Vec<LineSnapshot>,
     /// Its zones.
     pub zones: Vec<ZoneSnapshot>,
+}
+
+/// A person who has been on the floor for a while.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FloorAlert {
+    /// The identifier, unique per camera.
+    pub id: u64,
+    /// `lying`, `low` or `unknown`.
+    pub posture: &'static str,
+    /// Time since which the person is down, milliseconds since the Unix epoch.
+    pub since_ms: i64,
+    /// The zone that holds the person, or one nearby.
+    pub zone: Option<String>,
+    /// True once a user has acknowledged the alert.
+    pub is_acknowledged: bool,
+}
+
+impl From<&PersonDown> for FloorAlert {
+    fn from(person: &PersonDown) -> Self {
+        Self {
+            id: person.id,
+            posture: person.posture.name(),
+            since_ms: person.since_ms,
+            zone: person.zone.clone(),
+            is_acknowledged: person.is_acknowledged,
+        }
+    }
 }
 
 /// The crossings of a line in a direction.
@@ -154,6 +184,8 @@ impl Counter {
                         .rate()
                         .filter(|_| is_known)
                         .and_then(|rate| rate.too_low_since_ms),
+                    floor_alerts: (self.floor_alert_after_ms())
+                        .map(|_| camera.floor.alerts().map(FloorAlert::from).collect()),
                     lines: lines.collect(),
                     zones: zones.collect(),
                 });

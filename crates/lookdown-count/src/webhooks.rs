@@ -45,6 +45,7 @@ enum Occasion {
     Crossing,
     Occupancy,
     Silent,
+    FloorAlert,
 }
 
 /// A checked webhook.
@@ -70,6 +71,8 @@ pub(crate) enum Condition {
     Occupancy { zone: Option<String>, at_least: u64 },
     /// A camera has no report for this time.
     Silent { after: Duration },
+    /// Someone is on the floor of a camera (`counts.floor_alert`).
+    FloorAlert,
 }
 
 impl Webhook {
@@ -111,13 +114,18 @@ impl WebhookEntry {
         is_for(
             "image",
             self.image,
-            &[Occasion::Crossing, Occasion::Occupancy],
+            &[
+                Occasion::Crossing,
+                Occasion::Occupancy,
+                Occasion::FloorAlert,
+            ],
         )?;
         let condition = match self.on {
             Occasion::Crossing => Condition::Crossing {
                 line: self.line,
                 direction: self.direction,
             },
+            Occasion::FloorAlert => Condition::FloorAlert,
             Occasion::Occupancy => {
                 let at_least = self.at_least.unwrap_or(1);
                 if at_least == 0 {

@@ -20,6 +20,7 @@ pub mod panorama;
 pub mod person_height;
 pub mod pixels;
 pub mod polygon;
+pub mod posture;
 pub mod site_placement;
 #[cfg(test)]
 pub(crate) mod test_people;
@@ -37,6 +38,7 @@ pub use oriented_box::OrientedBox;
 pub use panorama::Panorama;
 pub use person_height::PersonHeight;
 pub use polygon::{Polygon, PolygonError};
+pub use posture::{BoxAngles, Posture, PostureBelief};
 pub use site_placement::SitePlacement;
 pub use view_plan::{FieldOfViewReading, ViewPlan};
 pub use virtual_view::VirtualView;

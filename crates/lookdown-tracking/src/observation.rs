@@ -1,5 +1,7 @@
 //! One person of one report, as the tracker sees it.
 
+use lookdown_lens::geometry::BoxAngles;
+
 /// One person of one report.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observation {
@@ -17,6 +19,8 @@ pub struct Observation {
     /// Middle of the oriented box's lower side in frame pixels (x, y): lines and zones in the frame
     /// count this point.
     pub foot_px: [f64; 2],
+    /// The same box in angles, which tell the posture; absent near the rim of the lens.
+    pub angles: Option<BoxAngles>,
     /// Probability that this is a person (0 to 1).
     pub score: f64,
     /// True for a person in the margin around the camera's areas, who continues tracks but does not

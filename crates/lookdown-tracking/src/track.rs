@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
+use lookdown_lens::geometry::{Posture, PostureBelief};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -30,9 +31,13 @@ pub struct Track {
     confirmed: bool,
     last_person: PersonOfReport,
     foot_px: [f64; 2],
+    center_px: [f64; 2],
+    /// The longer side of the last box.
+    length_px: f64,
     /// True while the last person was in the margin of an area.
     #[serde(default)]
     in_margin: bool,
+    posture: PostureBelief,
     /// The time of the last person of each camera that saw the track.
     pub(super) seen_by: BTreeMap<usize, f64>,
     tail: VecDeque<TailPoint>,
@@ -77,6 +82,8 @@ pub(super) struct Sighting<'a> {
     pub source: PersonOfReport,
     pub person: &'a Observation,
     pub measured: &'a Measurement,
+    /// Height of the camera above the floor, meters.
+    pub camera_m: Option<f64>,
 }
 
 impl Track {
@@ -96,7 +103,10 @@ impl Track {
             confirmed: false,
             last_person: seen.source,
             foot_px: seen.person.foot_px,
+            center_px: seen.person.center_px,
+            length_px: 0.0,
             in_margin: seen.person.is_in_margin,
+            posture: PostureBelief::new(seen.camera_m.is_some()),
             seen_by: BTreeMap::new(),
             tail: VecDeque::new(),
         };
@@ -123,9 +133,20 @@ impl Track {
 
     fn record(&mut self, seen: &Sighting) {
         self.missed = 0;
+        if let Some(angles) = &seen.person.angles {
+            let is_first = self.seen_by.is_empty();
+            let elapsed_s = if is_first {
+                f64::INFINITY
+            } else {
+                seen.at_s - self.seen_s
+            };
+            self.posture.add(angles, seen.camera_m, elapsed_s);
+        }
         self.seen_s = self.seen_s.max(seen.at_s);
         self.last_person = seen.source;
         self.foot_px = seen.person.foot_px;
+        self.center_px = seen.person.center_px;
+        self.length_px = seen.person.size_px[0].max(seen.person.size_px[1]);
         self.in_margin = seen.person.is_in_margin;
         self.seen_by.insert(seen.source.camera, seen.at_s);
         if self.tail.len() == MAX_TAIL_POINTS {
@@ -189,6 +210,31 @@ impl Track {
             Plane::FloorM => self.motion.on_floor().map(|state| state.place().into()),
             Plane::FramePx => Some(self.foot_px),
         }
+    }
+
+    /// Returns the center of the last box in the frame that showed it, pixels.
+    #[must_use]
+    pub fn center_px(&self) -> [f64; 2] {
+        self.center_px
+    }
+
+    /// Returns the longer side of that box, pixels.
+    #[must_use]
+    pub fn length_px(&self) -> f64 {
+        self.length_px
+    }
+
+    /// Returns the posture at the last observation, with its probability: the boxes before tell the
+    /// size of the person.
+    #[must_use]
+    pub fn posture(&self) -> (Posture, f64) {
+        self.posture.posture()
+    }
+
+    /// Returns the probability of a posture at the last observation.
+    #[must_use]
+    pub fn posture_probability(&self, posture: Posture) -> f64 {
+        self.posture.probability(posture)
     }
 
     /// Returns the velocity on the floor, meters per second; `None` without the camera's height.

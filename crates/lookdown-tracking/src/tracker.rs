@@ -157,6 +157,7 @@ impl Tracker {
             camera,
             at_s,
             interval_s: self.interval_s(camera, at_s),
+            camera_m: pose.height_m,
         };
         let observed_s = report.interval_s.min(elapsed_s);
         let seen: Vec<&Observation> = candidates.iter().map(|one| one.person).collect();
@@ -346,6 +347,7 @@ struct CurrentReport {
     camera: usize,
     at_s: f64,
     interval_s: f64,
+    camera_m: Option<f64>,
 }
 
 impl CurrentReport {
@@ -364,6 +366,7 @@ impl CurrentReport {
             },
             person: candidate.person,
             measured: &candidate.measured,
+            camera_m: self.camera_m,
         }
     }
 }

@@ -290,6 +290,7 @@ impl Camera {
                 off_axis_deg: seen.off_axis.to_degrees(),
                 center_px: [oriented.center.x, oriented.center.y],
                 size_px: [oriented.width, oriented.height],
+                angles: None,
                 foot_px: [foot.x, foot.y],
                 score,
                 is_in_margin: false,

@@ -122,6 +122,8 @@ fn to_person(person: &pipeline::Person) -> ReportPerson {
         floor: person.floor.map(floor),
         height_m: person.height.map(|height| meters(height.height_m)),
         height_sd_m: person.height.map(|height| meters(height.sd_m)),
+        posture: person.posture.0.name().into(),
+        posture_probability: share(person.posture.1),
         views: person.views,
         zones: person.zones.clone(),
     }

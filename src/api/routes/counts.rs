@@ -58,7 +58,7 @@ pub(in crate::api) fn router() -> Router<ApiState> {
         .fold(Router::new(), |router, path| router.route(path, get(read)));
     let thing = "/cameras/{camera}/furniture/{thing}";
     router
-        .route("/counts/{*path}", get(read).delete(change))
+        .route("/counts/{*path}", get(read).put(change).delete(change))
         .route("/cameras/{camera}/furniture", get(read))
         .route(thing, put(change).delete(change))
 }

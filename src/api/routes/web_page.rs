@@ -59,6 +59,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "panels.css",
         "zones.css",
         "icon.svg",
+        "floor_alerts.js",
         "furniture.js",
         "ignore_place.js",
         "reference_counts.js",

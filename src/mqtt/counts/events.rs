@@ -1,5 +1,5 @@
-//! Events of the counts: crossings, and the first person after none. They follow from two
-//! successive snapshots, so that only stored crossings are published.
+//! Events of the counts: crossings, the first person after none, and floor alerts. They follow from
+//! two successive snapshots, so that only stored crossings are published.
 
 use std::{collections::HashMap, time::Duration};
 
@@ -9,12 +9,16 @@ use lookdown_count::{CameraSnapshot, Snapshot, latest_image};
 use serde_json::{Value, json};
 use tokio::{sync::mpsc, time::Instant};
 
+use super::floor_alert;
+
 /// The type of a crossing of a line.
 const CROSSING: &str = "crossing";
 /// The type of the first person after none.
 const OCCUPANCY_REACHED: &str = "occupancy.reached";
+/// The type of a person who has been on the floor for a while.
+const FLOOR_ALERT: &str = "floor_alert";
 /// All types.
-pub(super) const TYPES: [&str; 2] = [CROSSING, OCCUPANCY_REACHED];
+pub(super) const TYPES: [&str; 3] = [CROSSING, OCCUPANCY_REACHED, FLOOR_ALERT];
 /// Most events of two snapshots, which are a second apart.
 const MAX_EVENTS: usize = 100;
 
@@ -34,6 +38,7 @@ pub(super) fn events(before: &Snapshot, now: &Snapshot) -> Vec<Event> {
         if let Some(earlier) = earlier {
             crossings(earlier, camera, &mut events);
             occupancy(earlier, camera, &mut events);
+            floor_alerts(earlier, camera, &mut events);
         }
     }
     events.truncate(MAX_EVENTS);
@@ -71,6 +76,18 @@ fn occupancy(before: &CameraSnapshot, now: &CameraSnapshot, events: &mut Vec<Eve
             events.push(event(now, OCCUPANCY_REACHED, &parts));
         }
     }
+}
+
+fn floor_alerts(before: &CameraSnapshot, now: &CameraSnapshot, events: &mut Vec<Event>) {
+    let earlier: Vec<u64> = before
+        .floor_alerts
+        .iter()
+        .flatten()
+        .map(|alert| alert.id)
+        .collect();
+    let alerts = now.floor_alerts.iter().flatten();
+    let new = alerts.filter(|alert| !earlier.contains(&alert.id));
+    events.extend(new.map(|alert| event(now, FLOOR_ALERT, &floor_alert(alert))));
 }
 
 fn event(camera: &CameraSnapshot, kind: &str, parts: &Value) -> Event {

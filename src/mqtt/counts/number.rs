@@ -1,5 +1,7 @@
 //! The numbers of a camera or a site: their topics, and the IDs of their entities.
 
+use crate::mqtt::entity::{BINARY_SENSOR, SENSOR};
+
 /// The topic below that of an owner with its availability.
 pub(super) const AVAILABILITY: &str = "availability";
 
@@ -53,10 +55,21 @@ impl<'a> Owner<'a> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Number<'a> {
     Persons,
-    Crossings { line: &'a str, direction: &'a str },
-    ZonePersons { zone: &'a str },
-    Entries { zone: &'a str },
-    DwellSeconds { zone: &'a str },
+    /// On or off: someone is on the floor of a camera.
+    FloorAlert,
+    Crossings {
+        line: &'a str,
+        direction: &'a str,
+    },
+    ZonePersons {
+        zone: &'a str,
+    },
+    Entries {
+        zone: &'a str,
+    },
+    DwellSeconds {
+        zone: &'a str,
+    },
 }
 
 impl<'a> Number<'a> {
@@ -65,6 +78,7 @@ impl<'a> Number<'a> {
         let levels: Vec<_> = topic.split('/').collect();
         match levels[..] {
             ["persons"] => Some(Self::Persons),
+            ["floor_alert"] => Some(Self::FloorAlert),
             ["lines", line, direction] => Some(Self::Crossings { line, direction }),
             ["zones", zone, "persons"] => Some(Self::ZonePersons { zone }),
             ["zones", zone, "entries"] => Some(Self::Entries { zone }),
@@ -76,7 +90,7 @@ impl<'a> Number<'a> {
     /// The numbers that exist only together with this one.
     pub(super) fn with_companions(self) -> Vec<Self> {
         match self {
-            Self::Persons | Self::Crossings { .. } => vec![self],
+            Self::Persons | Self::FloorAlert | Self::Crossings { .. } => vec![self],
             Self::ZonePersons { zone } | Self::Entries { zone } | Self::DwellSeconds { zone } => {
                 Self::for_zone(zone).to_vec()
             }
@@ -96,6 +110,7 @@ impl<'a> Number<'a> {
     pub(super) fn topic(self) -> String {
         match self {
             Self::Persons => "persons".to_owned(),
+            Self::FloorAlert => "floor_alert".to_owned(),
             Self::Crossings { line, direction } => format!("lines/{line}/{direction}"),
             Self::ZonePersons { zone } => format!("zones/{zone}/persons"),
             Self::Entries { zone } => format!("zones/{zone}/entries"),
@@ -103,10 +118,19 @@ impl<'a> Number<'a> {
         }
     }
 
+    /// The component of its entity.
+    pub(super) fn component(self) -> &'static str {
+        match self {
+            Self::FloorAlert => BINARY_SENSOR,
+            _ => SENSOR,
+        }
+    }
+
     /// The ID of its entity within the device of its owner.
     pub(super) fn entity(self) -> String {
         match self {
             Self::Persons => "count_tracked".to_owned(),
+            Self::FloorAlert => "count_floor_alert".to_owned(),
             Self::Crossings { line, direction } => format!("count_line_{line}_{direction}"),
             Self::ZonePersons { zone } => format!("count_tracked_in_{zone}"),
             Self::Entries { zone } => format!("count_entries_{zone}"),

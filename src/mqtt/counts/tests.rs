@@ -1,5 +1,5 @@
 use lookdown_common::ServerOptions;
-use lookdown_count::{CameraSnapshot, LineSnapshot, SiteSnapshot, ZoneSnapshot};
+use lookdown_count::{CameraSnapshot, FloorAlert, LineSnapshot, SiteSnapshot, ZoneSnapshot};
 
 use super::*;
 
@@ -32,6 +32,13 @@ fn snapshot(persons: Option<u64>) -> Snapshot {
             persons,
             bar: persons.map(|persons| [persons, persons + 1]),
             too_low_since_ms: Some(60_000),
+            floor_alerts: Some(vec![FloorAlert {
+                id: 1,
+                posture: "lying",
+                since_ms: 90_000,
+                zone: None,
+                is_acknowledged: false,
+            }]),
             lines: vec![LineSnapshot {
                 line: "door".to_owned(),
                 direction: "in".to_owned(),
@@ -60,8 +67,13 @@ fn totals_and_occupancy_are_published() {
         (format!("{base}/persons"), "3"),
         (
             format!("{base}/attributes"),
-            "{\"persons_high\":4,\"persons_low\":3,\"too_low_since\":\"1970-01-01T00:01:00Z\"}",
+            concat!(
+                r#"{"floor_alerts":[{"is_acknowledged":false,"posture":"lying","#,
+                r#""since":"1970-01-01T00:01:30Z","zone":null}],"#,
+                r#""persons_high":4,"persons_low":3,"too_low_since":"1970-01-01T00:01:00Z"}"#
+            ),
         ),
+        (format!("{base}/floor_alert"), "ON"),
         (format!("{base}/lines/door/in"), "12"),
         (format!("{base}/zones/till/persons"), "3"),
         (format!("{base}/zones/till/entries"), "7"),
@@ -82,6 +94,9 @@ fn totals_and_occupancy_are_published() {
         "lookdown/counts/cameras/hall/lines/door/in"
     );
     assert_eq!(config["device"]["identifiers"][0], "lookdown_hall");
+    let config = &retained["homeassistant/binary_sensor/lookdown_hall_count_floor_alert/config"];
+    let config: Value = serde_json::from_str(config).unwrap();
+    assert_eq!(config["device_class"], "safety");
 }
 
 #[test]

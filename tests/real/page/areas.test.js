@@ -13,7 +13,7 @@ const SQUARE = [[10, 10], [30, 10], [30, 30], [10, 30]];
 const FILE = {
   id: "lobby",
   image: { width: 100, height: 100 },
-  zones: [{ name: "till", frame_px: SQUARE }, { name: "door", floor_m: [[1, 1], [2, 1], [2, 2]] }],
+  zones: [{ name: "till", frame_px: SQUARE }, { name: "bed", floor_m: [[1, 1], [2, 1], [2, 2]], lying: "expected" }],
   lines: [{ name: "gate", frame_px: [[0, 50], [100, 50]], directions: ["enter", "leave"] }],
   masks: [{ frame_px: SQUARE }],
   areas: [{ floor_m: [[-3, -3], [3, -3], [3, 3]] }],
@@ -30,7 +30,7 @@ test("areas survive reading and writing, with the rest of the file", () => {
 test("a problem of the server names its area", () => {
   const areas = areasOf(FILE);
   const problem = problemOf('zones[1].name: another zone is called "a", too: rename one', areas);
-  assert.equal(titleOf(areas.find(({ key }) => key === problem.key), areas), "zone door");
+  assert.equal(titleOf(areas.find(({ key }) => key === problem.key), areas), "zone bed");
   assert.equal(problem.text, 'Another zone is called "a", too: rename one.');
   assert.equal(problemOf("lines[0].directions: both are \"in\": rename one", areas).key, areas[2].key);
   assert.equal(problemOf("masks[0].frame_px: it has 2 corners: give 3 to 64", areas).key, areas[3].key);

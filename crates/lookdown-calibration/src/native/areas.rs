@@ -15,6 +15,17 @@ pub struct NativeZone {
     /// Corners `[x, y]`, meters on the floor from the place below the camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub floor_m: Option<Vec<[f64; 2]>>,
+    /// `expected` for a bed, a sofa or a mat, where people who lie are no reason for a floor alert.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lying: Option<NativeLying>,
+}
+
+/// The meaning of people who lie in a zone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum NativeLying {
+    /// People may lie there.
+    Expected,
 }
 
 /// A named line, in pixels of the frame or in meters on the floor.

@@ -42,7 +42,7 @@ impl Places {
         let options = CountingOptions {
             longest_gap_ms: 10_000,
             max_cameras: 4,
-            own: OwnCameras::default(),
+            ..CountingOptions::default()
         };
         options.own.set([("hall".to_owned(), false)].into());
         Self {

@@ -13,6 +13,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::{
+    floor::PersonOnFloor,
     furniture::{Thing, things},
     shared::{Shared, check_known, now_ms, rounded},
 };
@@ -49,6 +50,9 @@ pub(super) struct Tracks {
     /// The things that stand in the frame of the camera, furniture and candidates.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     furniture: Vec<Thing>,
+    /// The people on the floor of the camera who are an alert.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    floor_alerts: Vec<PersonOnFloor>,
 }
 
 /// A line of a camera.
@@ -79,6 +83,10 @@ struct TrackRow {
     id: u64,
     first_seen: Timestamp,
     last_seen: Timestamp,
+    /// `upright`, `seated`, `low`, `lying` or `unknown`, from all boxes so far.
+    posture: &'static str,
+    /// Probability of the most likely posture; below 0.6 the posture is `unknown`.
+    posture_probability: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     floor_m: Option<[f64; 2]>,
@@ -163,6 +171,11 @@ fn tracks(counter: &Counter, scene: &Scene, camera: Option<&str>) -> Tracks {
         lines: of_camera.map_or_else(Vec::new, |(_, camera)| line_rows(camera, &lines)),
         zones: of_camera.map_or_else(Vec::new, |(_, camera)| zone_rows(camera, &zones)),
         furniture: camera.map_or_else(Vec::new, |camera| things(scene, camera)),
+        floor_alerts: of_camera
+            .filter(|_| counter.floor_alert_after_ms().is_some())
+            .map_or_else(Vec::new, |(_, camera)| {
+                camera.floor.alerts().map(PersonOnFloor::from).collect()
+            }),
     }
 }
 
@@ -176,6 +189,7 @@ impl Tracks {
             lines: Vec::new(),
             zones: Vec::new(),
             furniture: Vec::new(),
+            floor_alerts: Vec::new(),
         }
     }
 }
@@ -257,6 +271,8 @@ fn row(track: &Track, camera: Option<&SceneCamera>) -> TrackRow {
     });
     TrackRow {
         id: track.id().0,
+        posture: track.posture().0.name(),
+        posture_probability: (track.posture().1 * 100.0).round() / 100.0,
         first_seen: time(track.first_seen_s()),
         last_seen: time(track.seen_s()),
         floor_m: floor_m.map(rounded),

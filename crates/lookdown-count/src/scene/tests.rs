@@ -18,6 +18,7 @@ fn person(x: f64, y: f64) -> Observation {
         off_axis_deg: x.hypot(y).atan2(3.0).to_degrees(),
         center_px: px,
         size_px: [40.0, 80.0],
+        angles: None,
         foot_px: px,
         score: 0.95,
         is_in_margin: false,
@@ -53,6 +54,7 @@ fn time(at_ms: i64) -> ReportTime {
     ReportTime {
         at_ms,
         longest_gap_ms: 10_000,
+        floor_alert_after_ms: None,
         now: *START + Duration::from_millis(at_ms.unsigned_abs()),
     }
 }

@@ -134,7 +134,26 @@ impl Conditions {
                     self.is_changed |= changed.is_some();
                     messages.extend(changed.map(|name| message(id, webhook, name, at_ms, &data)));
                 }
-                Condition::Occupancy { .. } | Condition::Silent { .. } => {}
+                Condition::FloorAlert if is_of(camera) => {
+                    let Some((_, of)) = scene.camera(camera) else {
+                        continue;
+                    };
+                    let alerts = of.floor.alerts().map(|person| {
+                        json!({
+                            "posture": person.posture.name(), "since": time_of(person.since_ms),
+                            "zone": person.zone,
+                        })
+                    });
+                    let alerts: Vec<_> = alerts.collect();
+                    let holds = !alerts.is_empty();
+                    let data = json!({ "camera": camera, "persons": alerts });
+                    let names = ["floor_alert.began", "floor_alert.ended"];
+                    let id = format!("msg_{event}_{index}");
+                    let changed = change(&mut self.holding, (index, camera), holds, names);
+                    self.is_changed |= changed.is_some();
+                    messages.extend(changed.map(|name| message(id, webhook, name, at_ms, &data)));
+                }
+                Condition::Occupancy { .. } | Condition::Silent { .. } | Condition::FloorAlert => {}
             }
         }
         self.reports

@@ -1,7 +1,7 @@
 //! Merges boxes of views into persons of the frame.
 
 use lookdown_lens::geometry::{
-    BackProjection, Footprint, OrientedBox, PersonHeight,
+    BackProjection, BoxAngles, Footprint, OrientedBox, PersonHeight, Posture, PostureBelief,
     crop_placement::CropTarget,
     floor::{bearing, floor_position},
     oriented_box::vertical_in_frame,
@@ -254,8 +254,21 @@ pub(super) fn placed(
         floor,
         views,
         height: PersonHeight::new(&oriented_box, &geometry.lens, &geometry.mount),
+        posture: posture(&oriented_box, rig),
         zones: Person::zones_of(&geometry.areas.zones, foot, floor),
     }
+}
+
+/// Returns the posture that the box alone tells, with its probability.
+fn posture(person: &OrientedBox, rig: &CameraRig) -> (Posture, f64) {
+    let geometry = rig.geometry();
+    let camera_m = geometry.mount.height_m();
+    let mut belief = PostureBelief::new(camera_m.is_some());
+    if let Some(angles) = BoxAngles::new(person, &geometry.lens, &geometry.mount) {
+        belief.add(&angles, camera_m, f64::INFINITY);
+        return belief.posture();
+    }
+    (Posture::Unknown, 0.0)
 }
 
 #[cfg(test)]

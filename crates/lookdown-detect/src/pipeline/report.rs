@@ -5,7 +5,7 @@ use std::time::Duration;
 use jiff::Timestamp;
 use lookdown_calibration::warning::Warning;
 use lookdown_lens::geometry::{
-    OrientedBox, PersonHeight, Pixel, Zone,
+    OrientedBox, PersonHeight, Pixel, Posture, Zone,
     floor::{Bearing, FloorPosition},
 };
 
@@ -171,6 +171,8 @@ pub struct Person {
     pub floor: Option<FloorPosition>,
     /// The height of the person, where the boxes and the height of the camera give it.
     pub height: Option<PersonHeight>,
+    /// The posture that the box alone tells, and its probability.
+    pub posture: (Posture, f64),
     /// The number of supporting views.
     pub views: usize,
     /// The names of the zones that the person's foot is in; `None` when the calibration has none.

@@ -162,6 +162,7 @@ mod tests {
         .map(|(name, area)| Zone {
             name: name.to_owned(),
             area,
+            is_lying_expected: false,
         });
         sketch_areas(&mut frame, &zones, &[square(10.0, 50.0)], &lens, &mount);
         assert_eq!(frame.pixel(30, 30), [0; 3]);

@@ -15,6 +15,8 @@ pub struct Zone {
     pub name: String,
     /// Its area.
     pub area: ZoneArea,
+    /// True for a bed, a sofa or a mat: people may lie there.
+    pub is_lying_expected: bool,
 }
 
 /// The area of a zone.
@@ -40,6 +42,7 @@ impl Zone {
         Self {
             name: self.name.clone(),
             area: self.area.scaled(scale_x, scale_y),
+            ..*self
         }
     }
 
@@ -116,6 +119,7 @@ mod tests {
         let zone = |area| Zone {
             name: "door".to_owned(),
             area,
+            is_lying_expected: false,
         };
         let of_frame = zone(ZoneArea::Frame(square(100.0, 100.0, 50.0)));
         let of_floor = zone(ZoneArea::Floor(square(1.0, 1.0, 1.0)));
@@ -140,6 +144,7 @@ mod tests {
             let zone = Zone {
                 name: "door".to_owned(),
                 area: ZoneArea::Floor(square(0.5, -0.5, 2.0)),
+                is_lying_expected: false,
             };
             let outline = zone.outline(&lens, &mount, 8);
             assert_eq!(outline.len(), 33);

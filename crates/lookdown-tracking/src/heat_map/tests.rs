@@ -8,6 +8,7 @@ fn person(x: f64, y: f64) -> Observation {
         off_axis_deg: (x.hypot(y) / 2.8).atan().to_degrees(),
         center_px: [0.0, 0.0],
         size_px: [40.0, 80.0],
+        angles: None,
         foot_px: [0.0, 0.0],
         score: 0.9,
         is_in_margin: false,

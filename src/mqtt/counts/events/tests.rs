@@ -1,4 +1,4 @@
-use lookdown_count::{LineSnapshot, ZoneSnapshot};
+use lookdown_count::{FloorAlert, LineSnapshot, ZoneSnapshot};
 
 use super::*;
 
@@ -9,6 +9,7 @@ fn snapshot(crossings: u64, persons: Option<u64>) -> Snapshot {
             last_report_ms: 1_000,
             is_paused: false,
             too_low_since_ms: None,
+            floor_alerts: None,
             persons,
             bar: None,
             lines: vec![LineSnapshot {
@@ -53,4 +54,25 @@ fn the_first_person_after_none_is_an_event() {
     for (before, now) in [(Some(1), Some(2)), (None, Some(2)), (Some(0), None)] {
         assert!(events(&snapshot(0, before), &snapshot(0, now)).is_empty());
     }
+}
+
+#[test]
+fn new_floor_alert_is_an_event() {
+    let lying = |ids: std::ops::RangeInclusive<u64>| {
+        let alert = |id| FloorAlert {
+            id,
+            posture: "lying",
+            since_ms: 500,
+            zone: Some("till".to_owned()),
+            is_acknowledged: false,
+        };
+        let mut snapshot = snapshot(0, Some(1));
+        snapshot.cameras[0].floor_alerts = Some(ids.map(alert).collect());
+        snapshot
+    };
+    let found = events(&lying(1..=1), &lying(1..=2));
+    assert_eq!(found.len(), 1);
+    assert_eq!(found[0].body["event_type"], "floor_alert");
+    assert_eq!(found[0].body["since"], "1970-01-01T00:00:00.5Z");
+    assert!(events(&lying(1..=2), &lying(1..=1)).is_empty());
 }

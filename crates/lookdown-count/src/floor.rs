@@ -1,0 +1,202 @@
+//! People on the floor: who has been lying for a while, outside of zones where that is
+//! expected. Someone who is no longer detected there still lies there.
+
+use lookdown_lens::geometry::{Pixel, Posture, ZoneArea, floor::floor_position};
+use lookdown_tracking::{Track, TrackId};
+use nalgebra::Point2;
+use serde::{Deserialize, Serialize};
+
+use crate::definition::CameraDefinition;
+
+/// Most people of a camera.
+const MAX_PERSONS: usize = 64;
+/// A person is down from this probability of lying, and up from this one of standing or sitting.
+/// Between them nothing changes. People who are low do not begin an alert: their boxes are those of
+/// people who sit. docs/count.md has the misses and the false alerts.
+const DOWN: f64 = 0.9;
+const UP: f64 = 0.9;
+/// A person who is up for this long is up again, milliseconds.
+const UP_MS: i64 = 5_000;
+/// Someone without an alert is forgotten after this time without a detection, milliseconds.
+const UNSEEN_MS: i64 = 10_000;
+/// The same with an alert that was acknowledged, and with one that was not.
+const UNSEEN_ACKNOWLEDGED_MS: i64 = 10 * 60_000;
+const UNSEEN_ALERT_MS: i64 = 24 * 3_600_000;
+/// A zone is near a person within this distance: in widths of the frame, and in meters.
+const NEAR_FRAME: f64 = 0.1;
+const NEAR_M: f64 = 1.5;
+
+/// A person who is down.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct PersonDown {
+    pub(crate) id: u64,
+    track: TrackId,
+    pub(crate) posture: Posture,
+    /// Time since which the person is down, milliseconds since the Unix epoch.
+    pub(crate) since_ms: i64,
+    pub(crate) seen_ms: i64,
+    /// Center and longer side of the last box that showed the person down, frame pixels.
+    pub(crate) center_px: [f64; 2],
+    length_px: f64,
+    /// The zone that holds the person, or one nearby.
+    pub(crate) zone: Option<String>,
+    up_since_ms: Option<i64>,
+    /// True once the person has been down for the time of an alert.
+    pub(crate) is_alert: bool,
+    pub(crate) is_acknowledged: bool,
+}
+
+/// The people on the floor of a camera.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Floor {
+    persons: Vec<PersonDown>,
+    last_id: u64,
+}
+
+impl Floor {
+    /// Returns the people with an alert, longest first.
+    pub(crate) fn alerts(&self) -> impl Iterator<Item = &PersonDown> {
+        self.persons.iter().filter(|person| person.is_alert)
+    }
+
+    /// Returns everyone who is down, longest first.
+    pub(crate) fn persons(&self) -> &[PersonDown] {
+        &self.persons
+    }
+
+    /// Acknowledges an alert. Returns false for an unknown one.
+    pub(crate) fn acknowledge(&mut self, id: u64) -> bool {
+        let mut persons = self.persons.iter_mut();
+        let person = persons.find(|person| person.id == id && person.is_alert);
+        person.map(|person| person.is_acknowledged = true).is_some()
+    }
+
+    /// Takes the tracks that a report of the camera shows. An alert begins after `after_ms`.
+    pub(crate) fn update(
+        &mut self,
+        tracks: &[&Track],
+        at_ms: i64,
+        after_ms: i64,
+        definition: &CameraDefinition,
+    ) {
+        for track in tracks {
+            let is_expected = zone_of(track, definition, true).is_some();
+            let probability = |posture| track.posture_probability(posture);
+            let is_down = probability(Posture::Lying) >= DOWN && !is_expected;
+            let known = self.index_of(track, tracks);
+            if let Some(index) = known {
+                let up = probability(Posture::Upright) + probability(Posture::Seated);
+                let is_up = up >= UP || is_expected;
+                self.persons[index].see(track, at_ms, is_down, is_up, definition);
+            } else if is_down && self.persons.len() < MAX_PERSONS {
+                self.last_id += 1;
+                let mut person = PersonDown {
+                    id: self.last_id,
+                    track: track.id(),
+                    posture: Posture::Unknown,
+                    since_ms: at_ms,
+                    seen_ms: at_ms,
+                    center_px: track.center_px(),
+                    length_px: 0.0,
+                    zone: None,
+                    up_since_ms: None,
+                    is_alert: false,
+                    is_acknowledged: false,
+                };
+                person.see(track, at_ms, true, false, definition);
+                self.persons.push(person);
+            }
+        }
+        for person in &mut self.persons {
+            let is_down = person.up_since_ms.is_none() && person.seen_ms == at_ms;
+            person.is_alert |= is_down && at_ms - person.since_ms >= after_ms;
+        }
+        self.persons.retain(|person| !person.is_over(at_ms));
+    }
+
+    /// Returns the known person of a track: the same track, or one that began where someone was
+    /// lost.
+    fn index_of(&self, track: &Track, tracks: &[&Track]) -> Option<usize> {
+        let same = |person: &PersonDown| person.track == track.id();
+        let is_lost = |person: &PersonDown| {
+            let is_seen = tracks.iter().any(|track| track.id() == person.track);
+            let [x, y] = track.center_px();
+            let [own_x, own_y] = person.center_px;
+            let is_near = (x - own_x).hypot(y - own_y) <= person.length_px / 2.0;
+            let began_ms = crate::scene_camera::milliseconds(track.first_seen_s());
+            !is_seen && is_near && began_ms > person.since_ms
+        };
+        let mut persons = self.persons.iter();
+        let own = persons.position(same);
+        own.or_else(|| self.persons.iter().position(is_lost))
+    }
+}
+
+impl PersonDown {
+    fn see(
+        &mut self,
+        track: &Track,
+        at_ms: i64,
+        is_down: bool,
+        is_up: bool,
+        definition: &CameraDefinition,
+    ) {
+        self.track = track.id();
+        self.seen_ms = at_ms;
+        if is_up {
+            self.up_since_ms.get_or_insert(at_ms);
+            return;
+        }
+        if is_down {
+            self.up_since_ms = None;
+            let (posture, _) = track.posture();
+            if posture == Posture::Lying || self.posture != Posture::Lying {
+                self.posture = posture;
+            }
+            self.center_px = track.center_px();
+            self.length_px = track.length_px();
+            self.zone = zone_of(track, definition, false);
+        }
+    }
+
+    fn is_over(&self, at_ms: i64) -> bool {
+        let unseen_ms = match (self.is_alert, self.is_acknowledged) {
+            (false, _) => UNSEEN_MS,
+            (true, true) => UNSEEN_ACKNOWLEDGED_MS,
+            (true, false) => UNSEEN_ALERT_MS,
+        };
+        let is_up = self
+            .up_since_ms
+            .is_some_and(|since_ms| self.seen_ms - since_ms >= UP_MS);
+        is_up || at_ms - self.seen_ms > unseen_ms
+    }
+}
+
+/// Returns the name of the zone that holds a person's center: one where lying is expected, or any,
+/// then also one nearby.
+fn zone_of(track: &Track, definition: &CameraDefinition, is_expected: bool) -> Option<String> {
+    let camera = definition.geometry.as_ref()?;
+    let [x, y] = track.center_px();
+    let center = Pixel::new(x, y);
+    let floor = floor_position(center, &camera.lens, &camera.mount);
+    let near_px = NEAR_FRAME * f64::from(definition.key.width);
+    let zones = || {
+        camera
+            .areas
+            .zones
+            .iter()
+            .filter(|zone| zone.is_lying_expected || !is_expected)
+    };
+    let is_near = |area: &ZoneArea| match area {
+        ZoneArea::Frame(area) => area.holds_within(center, near_px),
+        ZoneArea::Floor(area) => {
+            floor.is_some_and(|floor| area.holds_within(Point2::new(floor.x_m, floor.y_m), NEAR_M))
+        }
+    };
+    let inside = zones().find(|zone| zone.holds(center, floor));
+    let near = || zones().find(|zone| !is_expected && is_near(&zone.area));
+    Some(inside.or_else(near)?.name.clone())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,369 @@
+//! The posture of a person, from the angles of the box alone.
+//!
+//! Bodies of spheres stand, sit, crouch and lie in eight directions below a camera. A box is
+//! compared with the boxes of all of them at its place, in several sizes, so that the size of a
+//! person and an unknown height of the camera are found as well. One box often fits several
+//! postures: a person who lies along the line of sight covers what a smaller person who stands
+//! would. So a [`PostureBelief`] keeps the size that earlier boxes showed.
+
+use std::sync::OnceLock;
+
+use serde::{Deserialize, Serialize};
+
+use super::{
+    Lens, Mount, OrientedBox, Pixel, Ray,
+    pixels::{PixelConvention, cross_half_pixel},
+};
+
+/// The posture of a person.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, strum::IntoStaticStr)]
+#[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
+pub enum Posture {
+    /// Standing or walking.
+    Upright,
+    /// On a chair.
+    Seated,
+    /// Crouching, kneeling, crawling, sitting or curled on the floor.
+    Low,
+    /// Lying stretched out.
+    Lying,
+    /// No posture is likely enough.
+    Unknown,
+}
+
+impl Posture {
+    /// Returns the name, as in reports.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        self.into()
+    }
+}
+
+/// Number of known postures.
+const POSTURES: usize = 4;
+/// A posture with a lower probability is [`Posture::Unknown`].
+const LEAST_PROBABILITY: f64 = 0.6;
+
+/// Sizes of people and their steps, relative to the bodies below, who are 1.7 m tall.
+const SIZES: usize = 13;
+const SMALLEST: f64 = 0.6;
+const STEP: f64 = 1.08;
+/// Standard deviations of the logarithm of the size: of adults, and with an unknown height of the
+/// camera, which is then 2.8 m. One person of ten is of any size: children, and wrong heights.
+const SIZE_SD: f64 = 0.09;
+const UNKNOWN_HEIGHT_SD: f64 = 0.2;
+const USUAL_CAMERA_M: f64 = 2.8;
+const ANY_SIZE: f64 = 0.02;
+
+/// Shares of people by posture where nothing else is known.
+const PRIOR: [f64; POSTURES] = [0.5, 0.35, 0.05, 0.1];
+/// Rate at which a person takes another posture, per second; shares as in [`PRIOR`], but more lie
+/// down or crouch than do so at a moment.
+const CHANGE_RATE: f64 = 0.2;
+const CHANGE_TO: [f64; POSTURES] = [0.35, 0.4, 0.08, 0.17];
+/// Errors of successive boxes are alike for about this time, seconds.
+const CORRELATION_S: f64 = 0.5;
+/// All boxes so far count as this many at most: some errors last as long as a posture does.
+const MOST_BOXES: f64 = 4.0;
+/// Standard deviation of the logarithm of an extent: boxes (.08 for found people of the rendered
+/// development set), clothes and limbs.
+const EXTENT_SD: f64 = 0.13;
+/// Share of boxes that fit no body.
+const OUTLIERS: f64 = 0.001;
+
+/// Steps of the table of bodies: angles from straight down, and sizes per height of the camera.
+const ANGLE_STEP: f64 = 5.0 * std::f64::consts::PI / 180.0;
+const ANGLES: usize = 17;
+const RATIOS: usize = 33;
+const SMALLEST_RATIO: f64 = 0.08;
+const DIRECTIONS: usize = 8;
+
+/// The center of a sphere outward, aside and up, and its radius, meters.
+type Sphere = [f64; 4];
+
+/// Bodies that face outward, with their postures. A mirrored body has the same extents.
+#[rustfmt::skip]
+const BODIES: [(Posture, &[Sphere]); 10] = {
+    use Posture::{Low, Lying, Seated, Upright};
+    [
+        // Standing, and walking.
+        (Upright, &[[0.0, 0.0, 1.58, 0.12], [0.0, 0.2, 1.38, 0.1], [0.0, -0.2, 1.38, 0.1], [0.0, 0.24, 0.9, 0.08],
+            [0.0, -0.24, 0.9, 0.08], [0.05, 0.1, 0.06, 0.1], [0.05, -0.1, 0.06, 0.1]]),
+        (Upright, &[[0.05, 0.0, 1.56, 0.12], [0.0, 0.2, 1.38, 0.1], [0.0, -0.2, 1.38, 0.1], [0.25, 0.24, 0.95, 0.08],
+            [-0.2, -0.24, 0.95, 0.08], [0.32, 0.1, 0.08, 0.1], [-0.3, -0.1, 0.1, 0.1]]),
+        (Seated, &[[0.03, 0.0, 1.22, 0.12], [0.0, 0.2, 1.0, 0.1], [0.0, -0.2, 1.0, 0.1], [-0.02, 0.0, 0.52, 0.18],
+            [0.42, 0.13, 0.5, 0.08], [0.42, -0.13, 0.5, 0.08], [0.5, 0.12, 0.06, 0.08], [0.5, -0.12, 0.06, 0.08]]),
+        // Crouching, sitting on the floor, kneeling, on hands and knees, and curled on the floor.
+        (Low, &[[0.15, 0.0, 0.85, 0.12], [0.05, 0.2, 0.68, 0.1], [0.05, -0.2, 0.68, 0.1], [-0.1, 0.0, 0.25, 0.18],
+            [0.3, 0.16, 0.42, 0.08], [0.3, -0.16, 0.42, 0.08], [0.1, 0.0, 0.06, 0.14]]),
+        (Low, &[[0.0, 0.0, 0.8, 0.12], [0.0, 0.2, 0.58, 0.1], [0.0, -0.2, 0.58, 0.1], [0.0, 0.0, 0.14, 0.18],
+            [0.42, 0.15, 0.3, 0.08], [0.42, -0.15, 0.3, 0.08], [0.8, 0.12, 0.08, 0.08], [0.8, -0.12, 0.08, 0.08]]),
+        (Low, &[[0.08, 0.0, 1.1, 0.12], [0.03, 0.2, 0.9, 0.1], [0.03, -0.2, 0.9, 0.1], [-0.05, 0.0, 0.42, 0.18],
+            [0.1, 0.0, 0.07, 0.16], [-0.4, 0.0, 0.07, 0.16]]),
+        (Low, &[[0.55, 0.0, 0.62, 0.12], [0.35, 0.2, 0.5, 0.1], [0.35, -0.2, 0.5, 0.1], [-0.25, 0.0, 0.48, 0.18],
+            [0.42, 0.0, 0.05, 0.2], [-0.7, 0.0, 0.07, 0.16]]),
+        (Low, &[[0.55, 0.05, 0.12, 0.12], [0.35, 0.0, 0.2, 0.15], [-0.25, -0.05, 0.17, 0.18], [0.05, 0.4, 0.12, 0.1],
+            [-0.4, 0.3, 0.1, 0.1]]),
+        // On the back or face down, and with an arm out.
+        (Lying, &[[0.8, 0.0, 0.12, 0.12], [0.55, 0.2, 0.12, 0.1], [0.55, -0.2, 0.12, 0.1], [0.0, 0.0, 0.12, 0.2],
+            [-0.82, 0.1, 0.08, 0.08], [-0.82, -0.1, 0.08, 0.08]]),
+        (Lying, &[[0.75, 0.0, 0.14, 0.12], [0.52, 0.1, 0.2, 0.12], [0.5, 0.7, 0.06, 0.07], [0.0, 0.0, 0.17, 0.18],
+            [-0.35, 0.2, 0.1, 0.08], [-0.75, 0.0, 0.1, 0.1]]),
+    ]
+};
+
+/// The logarithms of the two extents of each body in each direction.
+type Row = Vec<[f64; 2]>;
+
+/// The extents of all bodies, by size per height of the camera and by angle.
+static TABLE: [OnceLock<Vec<Row>>; RATIOS] = [const { OnceLock::new() }; RATIOS];
+
+/// Returns the part of the table for a size per height of the camera, by angle.
+fn rows(ratio: usize) -> Vec<Row> {
+    let camera = 1.0 / (SMALLEST_RATIO * STEP.powf(float(ratio)));
+    let row = |angle: usize| {
+        let angle = float(angle) * ANGLE_STEP;
+        let bodies = BODIES.iter().flat_map(|(_, body)| {
+            let turns = (0..DIRECTIONS).map(|turn| float(turn) * std::f64::consts::FRAC_PI_4);
+            turns.map(move |turn| extents(body, turn, angle, camera).map(f64::ln))
+        });
+        bodies.collect()
+    };
+    (0..ANGLES).map(row).collect()
+}
+
+/// A box as the camera sees it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct BoxAngles {
+    /// The angle of the box's middle from straight down, radians.
+    pub from_nadir: f64,
+    /// Extent along the projected vertical, radians.
+    pub along: f64,
+    /// Extent across it, radians.
+    pub across: f64,
+}
+
+impl BoxAngles {
+    /// Returns the angles of a box; `None` where a side is outside the lens image, or the floor is
+    /// too far away.
+    #[must_use]
+    pub fn new(person: &OrientedBox, lens: &Lens, mount: &Mount) -> Option<Self> {
+        let ray = |end: Pixel| lens.unproject(&cross_half_pixel(end, PixelConvention::PixelCenter));
+        let aside = nalgebra::Vector2::new(-person.up.y, person.up.x) * (person.width / 2.0);
+        let center = ray(person.center)?.normalize();
+        let [foot, head] = [
+            person.foot(),
+            person.center + person.up * (person.height / 2.0),
+        ]
+        .map(ray);
+        let [left, right] = [person.center - aside, person.center + aside].map(ray);
+        let (foot, head) = (foot?, head?);
+        let outward = head.normalize() - foot.normalize();
+        let outward = (outward - center * outward.dot(&center)).try_normalize(f64::EPSILON)?;
+        let sideward = center.cross(&outward);
+        let angle = |ray: Ray, axis: &Ray| ray.dot(axis).atan2(ray.dot(&center));
+        let [near, far] = [angle(foot, &outward), angle(head, &outward)];
+        let across = (angle(right?, &sideward) - angle(left?, &sideward)).abs();
+        let from_nadir = center.angle(&mount.nadir()) + f64::midpoint(near, far);
+        let is_usable = (0.0..=float(ANGLES - 1) * ANGLE_STEP).contains(&from_nadir)
+            && across > 0.0
+            && far > near;
+        is_usable.then_some(Self {
+            from_nadir,
+            along: far - near,
+            across,
+        })
+    }
+
+    /// Returns the likelihood of each posture and size below a camera of this height.
+    fn likelihoods(&self, camera_m: Option<f64>) -> [[f64; SIZES]; POSTURES] {
+        let measured = [self.along.ln(), self.across.ln()];
+        let angle = self.from_nadir / ANGLE_STEP;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "0 to ANGLES"
+        )]
+        let lower = (angle as usize).min(ANGLES - 2);
+        let share = angle - float(lower);
+        let first =
+            (SMALLEST / camera_m.unwrap_or(USUAL_CAMERA_M) / SMALLEST_RATIO).ln() / STEP.ln();
+        let mut likelihoods = [[0.0; SIZES]; POSTURES];
+        for size in 0..SIZES {
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "0 to RATIOS"
+            )]
+            let ratio = (first.round() + float(size)).clamp(0.0, float(RATIOS - 1)) as usize;
+            let rows = TABLE[ratio].get_or_init(|| rows(ratio));
+            let (near, far) = (&rows[lower], &rows[lower + 1]);
+            let mut counts = [0.0; POSTURES];
+            for (index, (near, far)) in near.iter().zip(far).enumerate() {
+                let posture = BODIES[index / DIRECTIONS].0 as usize;
+                let mut squares = 0.0;
+                for axis in 0..2 {
+                    let expected = near[axis] * (1.0 - share) + far[axis] * share;
+                    squares += ((measured[axis] - expected) / EXTENT_SD).powi(2);
+                }
+                likelihoods[posture][size] += (-squares / 2.0).exp();
+                counts[posture] += 1.0;
+            }
+            for (posture, count) in counts.iter().enumerate() {
+                likelihoods[posture][size] =
+                    OUTLIERS + (1.0 - OUTLIERS) * likelihoods[posture][size] / count;
+            }
+        }
+        likelihoods
+    }
+}
+
+/// Returns the extents of a body that faces `turn` away from outward, at the place where the middle
+/// of its box is at `angle` from straight down; `camera` is the height of the camera above the
+/// floor for a body of 1.7 m.
+fn extents(body: &[Sphere], turn: f64, angle: f64, camera: f64) -> [f64; 2] {
+    let (sin, cos) = turn.sin_cos();
+    let turned = body.iter().map(|[out, aside, up, radius]| {
+        [
+            out * cos - aside * sin,
+            out * sin + aside * cos,
+            (camera - up).max(2.0 * radius),
+            *radius,
+        ]
+    });
+    let spheres: Vec<Sphere> = turned.collect();
+    let range = |angles: &mut dyn Iterator<Item = [f64; 2]>| {
+        angles.fold(
+            [f64::INFINITY, f64::NEG_INFINITY],
+            |[low, high], [middle, half]| [low.min(middle - half), high.max(middle + half)],
+        )
+    };
+    let along = |place: f64| {
+        range(&mut spheres.iter().map(|[out, _, down, radius]| {
+            let out = out + place;
+            [
+                out.atan2(*down),
+                (radius / out.hypot(*down)).min(1.0).asin(),
+            ]
+        }))
+    };
+    // The tangent of the middle is nearly proportional to the place.
+    let height = (camera - 0.6).max(0.5);
+    let mut place = height * angle.tan();
+    for _ in 0..6 {
+        let [low, high] = along(place);
+        place += height * (angle.tan() - f64::midpoint(low, high).min(1.5).tan());
+    }
+    let [low, high] = along(place);
+    let (sin, cos) = angle.sin_cos();
+    let [left, right] = range(&mut spheres.iter().map(|[out, aside, down, radius]| {
+        let depth = (out + place) * sin + down * cos;
+        let distance = depth.hypot(*aside);
+        [aside.atan2(depth), (radius / distance).min(1.0).asin()]
+    }));
+    [high - low, right - left]
+}
+
+/// The evidence of all boxes of one person about the posture.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PostureBelief {
+    /// Probabilities by posture and size.
+    weights: [[f64; SIZES]; POSTURES],
+}
+
+impl PostureBelief {
+    /// Returns the belief about a person without a box. `has_height` is true if the height of the
+    /// camera is known.
+    #[must_use]
+    pub fn new(has_height: bool) -> Self {
+        let sizes = sizes(has_height);
+        Self {
+            weights: PRIOR.map(|share| sizes.map(|size| size * share)),
+        }
+    }
+
+    /// Adds a box that was seen `elapsed_s` after the last one; the first box counts fully with
+    /// infinity. `camera_m` is the height of the camera above the floor, meters.
+    pub fn add(&mut self, person: &BoxAngles, camera_m: Option<f64>, elapsed_s: f64) {
+        self.pass(elapsed_s);
+        // A box that resembles the last one adds little, and all boxes together no more than a few.
+        let news = -(-elapsed_s.max(0.0) / CORRELATION_S).exp_m1();
+        let kept = 1.0 - news / MOST_BOXES;
+        let likelihoods = person.likelihoods(camera_m);
+        let sizes = sizes(camera_m.is_some());
+        for (posture, weights) in self.weights.iter_mut().enumerate() {
+            for (size, weight) in weights.iter_mut().enumerate() {
+                let prior = PRIOR[posture] * sizes[size];
+                let likelihood = likelihoods[posture][size].powf(news);
+                *weight = weight.powf(kept) * prior.powf(1.0 - kept) * likelihood;
+            }
+        }
+        let sum: f64 = self.weights.iter().flatten().sum();
+        for weight in self.weights.iter_mut().flatten() {
+            *weight /= sum;
+        }
+    }
+
+    /// Lets time pass: people change their posture and keep their size.
+    fn pass(&mut self, elapsed_s: f64) {
+        if !elapsed_s.is_finite() {
+            return;
+        }
+        let share = -(-elapsed_s.max(0.0) * CHANGE_RATE).exp_m1();
+        for size in 0..SIZES {
+            let sum: f64 = self.weights.iter().map(|weights| weights[size]).sum();
+            for (weights, to) in self.weights.iter_mut().zip(CHANGE_TO) {
+                weights[size] = (1.0 - share) * weights[size] + share * to * sum;
+            }
+        }
+    }
+
+    /// Returns the probability of a posture; of any other for [`Posture::Unknown`], 0.
+    #[must_use]
+    pub fn probability(&self, posture: Posture) -> f64 {
+        self.weights
+            .get(posture as usize)
+            .map_or(0.0, |weights| weights.iter().sum())
+    }
+
+    /// Returns the most likely posture with its probability, [`Posture::Unknown`] below .6.
+    #[must_use]
+    pub fn posture(&self) -> (Posture, f64) {
+        use Posture::{Low, Lying, Seated, Unknown, Upright};
+        let likely =
+            [Upright, Seated, Low, Lying].map(|posture| (posture, self.probability(posture)));
+        let best = likely
+            .into_iter()
+            .max_by(|one, other| one.1.total_cmp(&other.1));
+        let (posture, probability) = best.unwrap_or((Unknown, 0.0));
+        if probability < LEAST_PROBABILITY {
+            return (Unknown, probability);
+        }
+        (posture, probability)
+    }
+}
+
+/// Returns the shares of people by size.
+fn sizes(has_height: bool) -> [f64; SIZES] {
+    let sd = if has_height {
+        SIZE_SD
+    } else {
+        UNKNOWN_HEIGHT_SD
+    };
+    let shares: [f64; SIZES] = std::array::from_fn(|size| {
+        let logarithm = (SMALLEST * STEP.powf(float(size))).ln();
+        (-(logarithm / sd).powi(2) / 2.0).exp()
+    });
+    let sum: f64 = shares.iter().sum();
+    shares.map(|share| (1.0 - ANY_SIZE) * share / sum + ANY_SIZE / float(SIZES))
+}
+
+fn float(number: usize) -> f64 {
+    #[expect(clippy::cast_precision_loss, reason = "small numbers")]
+    let number = number as f64;
+    number
+}
+
+#[cfg(test)]
+mod tests;
