@@ -147,6 +147,13 @@ def sofa(b, p, seats):
         b.box(0.4, 0.14, 0.38, float(p.rng.uniform(-0.4, 0.4)) * w, 0.2, 0.62, p.cloth2, bevel=0.06, rx=-0.3)
 
 
+def bed(b, p):
+    """A bed along +y with its pillow there; its top is at 0.47 m."""
+    b.box(0.95, 2.05, 0.3, 0, 0, 0.15, p.wood[0])
+    b.box(0.9, 2.0, 0.17, 0, 0, 0.385, p.white, bevel=0.04)
+    b.box(0.6, 0.35, 0.1, 0, 0.8, 0.46, p.cloth2, bevel=0.04)
+
+
 def shelf(b, p, width=None, height=None, y=0.18):
     """A shelf with books, boxes and folded clothes."""
     r, w, h = p.rng, width or float(p.rng.uniform(0.8, 1.6)), height or float(p.rng.uniform(1.2, 2.2))

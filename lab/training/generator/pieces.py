@@ -8,7 +8,7 @@ import math
 from . import furniture as f
 from .blender import Builder
 from .figures import add_figure, natural_seat
-from .pose import KINDS
+from .pose import KINDS, LOW, LYING
 from .wardrobe import random_person
 
 
@@ -23,6 +23,8 @@ class Maker:
     def person(self, kind, x=0.0, y=0.0, degrees=0.0, arms=None, seat_height=None, child=None):
         child = self.rng.random() < 0.14 if child is None else child
         who = random_person(self.rng, self.assets, self.split, child)
+        if kind in LYING or kind in LOW:
+            who["extras"] = []  # Bags, coats and skirts are made for upright persons.
         figure = add_figure(self.body, self.rng, who, kind, len(self.figures) + 1, x, y, degrees, arms, seat_height)
         self.figures.append(figure)
         return figure
@@ -124,10 +126,49 @@ def behind_counter(m):
     m.person("standing", 0, 0, float(m.rng.normal() * 20), str(m.rng.choice(["carry", "none", "table", "point"])))
 
 
+def _one_of(m, kinds):
+    return str(m.rng.choice(list(kinds), p=list(kinds.values())))
+
+
+def low(m):
+    m.person(_one_of(m, LOW))
+
+
+def lying(m):
+    """A person who lies on the floor, a mat, a bed or a sofa, sometimes under a blanket or a table, or with a helper."""
+    figure = m.person(_one_of(m, LYING))
+    low_end, high_end = (float(v) for v in (figure.vertices[:, 1].min(), figure.vertices[:, 1].max()))
+    middle, long = (low_end + high_end) / 2, high_end - low_end
+    place = str(m.rng.choice(["floor", "mat", "bed", "sofa", "table", "helper"], p=[0.45, 0.1, 0.12, 0.08, 0.1, 0.15]))
+    if place == "mat":
+        Builder(0, middle, 0).box(0.75, 1.95, 0.02, 0, 0, 0.01, m.palette.cloth2, bevel=0.008)
+        figure.lift(0.02)
+    elif place == "bed":
+        f.bed(Builder(0, middle, 0), m.palette)
+        figure.lift(0.47)
+    elif place == "sofa":
+        f.sofa(Builder(0.1, middle, 90), m.palette, 3)
+        figure.lift(0.455)
+    elif place == "table":
+        across = float(m.rng.uniform(0.6, 0.9))
+        f.table(Builder(0, low_end + 0.15 * long, 90), m.palette, across, 1.4, 0.74, things=2)
+    elif place == "helper":
+        side = float(m.rng.choice([-1, 1]))
+        kind = str(m.rng.choice(["kneeling", "crouching", "bending", "standing"]))
+        m.person(kind, 0.75 * side, high_end - 0.6, -90.0 * side, child=False)
+    if m.rng.random() < 0.25:
+        b = Builder(0, 0, 0)
+        top = float(figure.world_vertices()[:, 2].max())
+        cover = float(m.rng.uniform(0.35, 0.7)) * long
+        b.sphere(1.0, 0, low_end + cover / 2, top - 0.2, m.palette.cloth, scale=(0.42, cover / 2, 0.23), lower=0.0)
+
+
 MAKERS = {
-    single: 0.40,
-    seated: 0.12,
-    at_desk: 0.12,
+    single: 0.30,
+    lying: 0.09,
+    low: 0.05,
+    seated: 0.10,
+    at_desk: 0.10,
     table_group: 0.09,
     sofa_group: 0.05,
     pair: 0.12,

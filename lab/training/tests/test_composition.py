@@ -22,6 +22,7 @@ from generator.geometry import (
     theta_of,
 )
 from generator.placement import Placement
+from generator.pose import LOW, LYING, random_pose
 
 FOCAL, HEIGHT, SIDE = 100.0, 3.0, 401
 
@@ -75,6 +76,15 @@ def block(distance=4.0, depth=3.0, width=21, height=41):
     )
     about = dict(persons=[dict(index=1, kind="standing", x=0.0, y=0.0, child=False)], reach=0.5, seed=1, piece="block")
     return SimpleNamespace(views=[view], about=about, crop=lambda k: crop, cloud=lambda: np.zeros((4, 3), np.float32))
+
+
+class PoseTest(unittest.TestCase):
+    def test_lying_bodies_are_level_and_low_ones_are_not(self):
+        for kinds, is_level in ((LYING, True), (LOW, False)):
+            for kind in kinds:
+                pose, _ = random_pose(kind, np.random.default_rng(3))
+                rise = abs((pose["root"][1] @ (0, 1, 0))[1])
+                self.assertEqual(rise < 0.01, is_level, kind)
 
 
 class Lenses(unittest.TestCase):
