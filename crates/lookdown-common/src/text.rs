@@ -21,13 +21,13 @@ impl fmt::Display for Quoted<'_> {
 }
 
 /// Returns true for characters that a name must not have: control characters, and invisible ones
-/// that join, hide or reorder the others (Unicode category Cf), such as U+202E.
+/// that join, hide or reorder the others (Unicode category Cf), such as U+202E, and fillers.
 #[must_use]
 pub fn is_invisible(character: char) -> bool {
     character.is_control()
         || matches!(
             character,
-            '\u{ad}'
+            '\u{ad}' | '\u{34f}' | '\u{115f}' | '\u{1160}' | '\u{3164}' | '\u{ffa0}'
                 | '\u{600}'..='\u{605}'
                 | '\u{61c}'
                 | '\u{6dd}'
@@ -48,7 +48,8 @@ pub const MAX_CAMERA_CHARS: usize = 128;
 /// Returns true if a camera may have this name.
 #[must_use]
 pub fn is_camera_name(name: &str) -> bool {
-    (1..=MAX_CAMERA_CHARS).contains(&name.chars().count()) && !name.contains(is_invisible)
+    let is_shown = !name.trim().is_empty() && !name.contains(is_invisible);
+    is_shown && name.chars().count() <= MAX_CAMERA_CHARS
 }
 
 /// Formats a text as one line of at most 300 characters, so that it can neither forge nor fill log
@@ -95,6 +96,7 @@ mod tests {
         assert_eq!(one_line("a\u{202e}b\u{feff}c\nd"), "a b c d");
         assert!(!is_invisible('ä') && !is_invisible('走') && !is_invisible(' '));
         assert!(is_camera_name("Eingang, 2. OG") && !is_camera_name("\u{202e}llah"));
+        assert!(!is_camera_name("hall\u{3164}") && !is_camera_name(" "));
     }
 
     #[test]

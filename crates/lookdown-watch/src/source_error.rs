@@ -29,11 +29,11 @@ pub enum SourceError {
     /// The camera serves too many clients.
     #[error("the camera is busy (status {0}): reduce the number of its clients, or raise every")]
     Busy(u16),
-    /// Another status than 200.
+    /// Another status than 200, and the camera's words.
     #[error(
-        "the camera answered with the status {0}: check the path of the URL in the camera's manual"
+        "the camera answered with the status {0:?}: check the path of the URL in the camera's manual, the rights of its user, and the camera"
     )]
-    Status(u16),
+    Status(String),
     /// A redirection.
     #[error("the camera redirects to another URL: give that URL, which `curl -i` shows")]
     Redirect,
@@ -127,7 +127,7 @@ mod tests {
             SourceError::UnknownAuthentication,
             SourceError::BasicAfterDigest,
             SourceError::Busy(503),
-            SourceError::Status(404),
+            SourceError::Status(text()),
             SourceError::Redirect,
             SourceError::ContentType(text()),
             SourceError::TooLarge,

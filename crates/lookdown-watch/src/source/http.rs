@@ -1,7 +1,7 @@
 //! Cameras over HTTP: a snapshot that is requested at an interval, or a stream of JPEG files. The
 //! content type of the response decides.
 
-use std::convert::Infallible;
+use std::{convert::Infallible, time::Duration};
 
 use bytes::{Bytes, BytesMut};
 use lookdown_common::{
@@ -12,13 +12,15 @@ use reqwest::{
     Response, StatusCode, Url,
     header::{AUTHORIZATION, CONTENT_TYPE, ETAG, HeaderValue, IF_NONE_MATCH},
 };
-use tokio::time::{MissedTickBehavior, interval};
+use tokio::time::{MissedTickBehavior, interval, timeout};
 
 use super::{multipart::PartReader, sink::Sink};
 use crate::{Camera, MAX_FRAME_BYTES, SourceError, credentials::Login, memory_budget::Reservation};
 
 /// Most characters of a camera's text in an error.
 const SHOWN_CHARS: usize = 60;
+/// Longest wait for that text.
+const WORDS_TIMEOUT: Duration = Duration::from_secs(1);
 /// Bytes that show what a response is: the boundary of a part or the start of an image.
 const BEGIN_BYTES: usize = 4;
 /// Requests for one answer: the second one answers the challenge of the first.
@@ -43,15 +45,17 @@ pub(super) async fn run(
             continue;
         }
         let content_type = content_type(&response);
-        let is_stream = content_type.starts_with("multipart/");
+        let begin = begin(&mut response).await?;
+        let is_jpeg = begin.starts_with(JPEG_START);
+        let is_stream = content_type.starts_with("multipart/")
+            || (is_jpeg && content_type.starts_with("video/"));
         let is_unknown =
             content_type.is_empty() || content_type.starts_with("application/octet-stream");
-        if !is_stream && !is_unknown && !content_type.starts_with("image/") {
-            return Err(SourceError::ContentType(
-                shown(response, content_type).await,
-            ));
+        // An image is one whatever its label is.
+        if !is_stream && !is_unknown && !is_jpeg && !content_type.starts_with("image/") {
+            let shown = shown(response, begin, content_type).await;
+            return Err(SourceError::ContentType(shown));
         }
-        let begin = begin(&mut response).await?;
         // A part of a stream begins with a boundary, whatever the response is called.
         if is_stream || (is_unknown && begin.trim_ascii_start().starts_with(b"--")) {
             read_stream(response, begin, &content_type, sink).await?;
@@ -97,23 +101,36 @@ async fn get(
             status @ (StatusCode::SERVICE_UNAVAILABLE | StatusCode::TOO_MANY_REQUESTS) => {
                 return Err(SourceError::Busy(status.as_u16()));
             }
-            status => return Err(SourceError::Status(status.as_u16())),
+            status => {
+                let shown = shown(response, BytesMut::new(), status.as_u16().to_string()).await;
+                return Err(SourceError::Status(shown));
+            }
         }
     }
     let user = login.user().unwrap_or_default().to_owned();
     Err(SourceError::CredentialsRefused { user })
 }
 
-/// Describes a response without an image: its media type, and the first words of a text.
-async fn shown(mut response: Response, content_type: String) -> String {
-    let is_text = content_type.starts_with("text/") || content_type.contains("json");
-    let chunk = response.chunk().await.ok().flatten().filter(|_| is_text);
-    let text = String::from_utf8_lossy(&chunk.unwrap_or_default()).into_owned();
+/// Describes a response without an image: its media type or status, and the first words of a text.
+async fn shown(mut response: Response, begin: BytesMut, kind: String) -> String {
+    let media_type = content_type(&response);
+    let is_text = media_type.starts_with("text/") || media_type.contains("json");
+    let mut text = begin.freeze();
+    if is_text && text.is_empty() {
+        // A camera may keep the connection open after its answer.
+        let chunk = timeout(WORDS_TIMEOUT, response.chunk()).await;
+        text = chunk
+            .ok()
+            .and_then(Result::ok)
+            .flatten()
+            .unwrap_or_default();
+    }
+    let text = String::from_utf8_lossy(if is_text { &text[..] } else { b"" });
     let words: String = one_line(text.trim()).chars().take(SHOWN_CHARS).collect();
     if words.is_empty() {
-        return content_type;
+        return kind;
     }
-    format!("{content_type}: {words}")
+    format!("{kind}: {words}")
 }
 
 /// Reads the first bytes of a response, which show what it is.
@@ -191,8 +208,6 @@ fn unreachable(error: impl Into<HttpError>) -> SourceError {
 
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
-
     use tokio::{
         io::{AsyncBufReadExt, AsyncWriteExt, BufReader},
         net::TcpListener,
@@ -266,6 +281,7 @@ mod tests {
         let jpeg = b"\xff\xd8\xff\xda\x00\x02xyz\xff\xd9".to_vec();
         let part = [b"--b\r\nContent-Length: 11\r\n\r\n".as_slice(), &jpeg].concat();
         let multipart = "Content-Type: multipart/x-mixed-replace;boundary=b\r\n";
+        let motion_jpeg = "Content-Type: video/x-motion-jpeg\r\n";
         let without_boundary = "Content-Type: multipart/x-mixed-replace\r\n";
         for (headers, body) in [
             ("", &part),
@@ -273,10 +289,14 @@ mod tests {
             (without_boundary, &part),
             (multipart, &part),
             (multipart, &jpeg),
+            (motion_jpeg, &jpeg),
+            (motion_jpeg, &[&jpeg[..], &jpeg[..]].concat()),
         ] {
             let image = first_frame_of(headers, body.clone()).await;
             assert_eq!(image.unwrap(), jpeg, "{headers}");
         }
+        let label = "Content-Type: text/html\r\nContent-Length: 11\r\n";
+        assert_eq!(first_frame_of(label, jpeg.clone()).await.unwrap(), jpeg);
     }
 
     #[tokio::test]
@@ -287,10 +307,17 @@ mod tests {
                 .to_string()
                 .starts_with("the camera is busy (status 503)")
         );
-        let text = "HTTP/1.1 200 OK\r\nContent-Length: 20\r\n\r\nplease\nlogin first!!";
-        let response = answer(Box::leak(Box::new([text]))).await.unwrap();
-        let shown = shown(response, "text/html".to_owned()).await;
-        assert!(shown.starts_with("text/html: please"), "{shown}");
-        assert!(shown.ends_with("login first!!"), "{shown}");
+        let page = "Content-Type: text/html\r\n";
+        let other = first_frame_of(page, b"please\nlogin first!!".to_vec()).await;
+        let other = other.unwrap_err().to_string();
+        assert!(other.contains("text/html: please login first!!"), "{other}");
+        let locked =
+            "HTTP/1.1 403 No\r\nContent-Type: text/plain\r\nContent-Length: 6\r\n\r\nlocked";
+        let locked = answer(Box::leak(Box::new([locked]))).await.unwrap_err();
+        let locked = locked.to_string();
+        assert!(
+            locked.contains("the status \"403: locked\": check"),
+            "{locked}"
+        );
     }
 }

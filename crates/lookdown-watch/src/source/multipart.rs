@@ -103,9 +103,13 @@ impl PartReader {
             match self.state {
                 State::Boundary => {
                     let Some(end) = self.end_of_boundary_line() else {
+                        // An image before any boundary: it has another one than is declared.
+                        let image = memmem::find(&self.buffer, JPEG_START);
+                        let is_whole = image.is_some_and(|at| {
+                            at == 0 || memmem::find(&self.buffer[at..], JPEG_END).is_some()
+                        });
                         let has_none = self.buffer.len() > MAX_BYTES_BETWEEN;
-                        let is_image = self.buffer.starts_with(JPEG_START);
-                        return Ok(if has_none || is_image {
+                        return Ok(if has_none || is_whole {
                             self.split()
                         } else {
                             None
@@ -180,10 +184,19 @@ impl PartReader {
     }
 
     fn body_of_length(&mut self, length: usize) -> Result<Option<Bytes>, PartError> {
-        if length > self.max_part_bytes {
-            return Err(PartError::TooLarge);
-        }
         let is_jpeg = self.buffer.starts_with(&JPEG_START[..2]);
+        if length > self.max_part_bytes && is_jpeg {
+            self.state = State::Body(None);
+            return self.body_up_to_boundary();
+        }
+        if length > self.max_part_bytes {
+            let has_begun = self.buffer.len() >= 2;
+            return if has_begun {
+                Err(PartError::TooLarge)
+            } else {
+                Ok(None)
+            };
+        }
         if !is_jpeg || ends_jpeg(self.buffer.get(..length).unwrap_or_default()) {
             let is_whole = self.buffer.len() >= length;
             return Ok(is_whole.then(|| self.consume(length, State::Boundary)));
@@ -316,7 +329,7 @@ mod tests {
 
     #[test]
     fn large_parts_and_endless_headers_are_refused() {
-        let declared = b"--frame\r\nContent-Length: 101\r\n\r\n";
+        let declared = b"--frame\r\nContent-Length: 101\r\n\r\nxx";
         assert_eq!(parts(TYPE, declared, 1), Err(PartError::TooLarge));
         let endless = [b"--frame\r\n\r\n".as_slice(), &[b'x'; 500]].concat();
         assert_eq!(parts(TYPE, &endless, 10), Err(PartError::TooLarge));
@@ -353,13 +366,16 @@ mod tests {
                 assert_eq!(found, [JPEG, JPEG], "{content_type}");
             }
         }
+        // Another boundary than is declared, with little before the image.
+        let other = stream("A: b");
+        assert_eq!(parts("a/b; boundary=x", &other, 1).unwrap(), [JPEG, JPEG]);
         // A snapshot with the label of a stream.
         assert_eq!(parts(TYPE, JPEG, 4).unwrap(), [JPEG]);
     }
 
     #[test]
     fn wrong_lengths_of_images_are_corrected() {
-        for length in [0, 3, 9, 12, 15, 40, 90] {
+        for length in [0, 3, 9, 12, 15, 40, 90, 999] {
             let stream = stream(&format!("Content-Length: {length}"));
             for chunk in [1, 7, 1000] {
                 let found = parts(TYPE, &stream, chunk).unwrap();
