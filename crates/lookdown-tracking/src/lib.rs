@@ -20,6 +20,7 @@ mod motion;
 mod observation;
 mod place;
 mod plane;
+mod reappearance;
 mod relative_pose;
 mod settings;
 mod site;

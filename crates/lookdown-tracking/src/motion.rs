@@ -4,7 +4,7 @@
 //! update the tangent plane moves along the great circle to the new direction (parallel transport),
 //! which leaves velocity and covariance as they are.
 
-use nalgebra::{Matrix3, Rotation3, Unit, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix3, Rotation3, Unit, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -13,6 +13,9 @@ use crate::{
     place::Place,
     settings::PlaneSettings,
 };
+
+/// Meters on the floor for a radian around the camera, at usual heights.
+const METERS_PER_RADIAN: f64 = 2.75;
 
 /// The columns of a rotation.
 type Tangent = [[f64; 3]; 3];
@@ -78,6 +81,31 @@ impl Motion {
             residual,
             covariance,
         })
+    }
+
+    /// Returns the offset to the place of another track from where the person of this track is
+    /// expected after some seconds without being seen, meters. The person walks on for a second. In
+    /// bearing space a radian counts as [`METERS_PER_RADIAN`].
+    pub fn absence(&self, other: &Self, seconds: f64, drift: f64) -> Innovation {
+        let scale = if self.tangent.is_some() {
+            METERS_PER_RADIAN
+        } else {
+            1.0
+        };
+        let place = match (self.tangent, other.direction()) {
+            (Some(tangent), Some(direction)) => {
+                logarithm(&(rotation(tangent).inverse() * direction))
+            }
+            _ => other.kalman.place(),
+        };
+        let velocity = self.kalman.velocity();
+        let walked = velocity * seconds.min(1.0);
+        let drift = (drift + (scale * velocity).norm_squared()) * seconds;
+        let known = self.kalman.place_covariance() + other.kalman.place_covariance();
+        Innovation {
+            residual: (place - self.kalman.place() - walked) * scale,
+            covariance: known * scale.powi(2) + Matrix2::identity() * drift,
+        }
     }
 
     /// Returns the innovation of a measurement, by the filter at its time.

@@ -25,6 +25,13 @@ pub struct TrackerSettings {
     pub max_missed: u32,
     /// A track ends after this many seconds without a person, whatever the cameras report.
     pub max_silent_s: f64,
+    /// A person who comes back within this many seconds continues the track that ended, where that
+    /// is likelier than a new person.
+    pub max_absent_s: f64,
+    /// Growth of the variance of the place of such a person who stood: square meters per second.
+    pub absent_drift: f64,
+    /// Density of new persons in such a time, number per square meter.
+    pub arrival_density: f64,
     /// A report may be this many seconds older than the newest one of the site.
     pub max_lateness_s: f64,
     /// Most tracks at any time; persons beyond them start none.
@@ -113,6 +120,9 @@ impl Default for TrackerSettings {
             max_unseen_s: 2.0,
             max_missed: 3,
             max_silent_s: 10.0,
+            max_absent_s: 120.0,
+            absent_drift: 0.02,
+            arrival_density: 0.01,
             max_lateness_s: 2.0,
             max_tracks: 512,
             score_share: 0.4,

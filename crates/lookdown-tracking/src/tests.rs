@@ -45,6 +45,21 @@ fn a_track_survives_a_second_without_its_person() {
 }
 
 #[test]
+fn person_who_sits_keeps_the_track_after_a_minute() {
+    for (x, id) in [(2.2, 1), (-3.0, 2)] {
+        let mut tracker = floor_tracker();
+        for second in 0..80 {
+            let place = if second < 10 { 2.0 } else { x };
+            let persons = [person(place, 1.0)];
+            let is_missed = (10..70).contains(&second);
+            let shown = if is_missed { &[] } else { &persons[..] };
+            tracker.update(0, f64::from(second), shown).unwrap();
+        }
+        assert_eq!(ids(&tracker), [id], "{x}");
+    }
+}
+
+#[test]
 fn a_track_ends_when_its_person_is_gone() {
     let mut tracker = floor_tracker();
     walk(&mut tracker, 0..10, |_| true);
@@ -390,17 +405,21 @@ proptest! {
     }
 
     #[test]
-    fn identifiers_are_never_used_twice(
+    fn identifiers_are_unique_and_end_with_the_absence(
         places in prop::collection::vec((-5.0..5.0_f64, -5.0..5.0_f64), 1..60),
+        max_absent_s in prop::sample::select(vec![0.0, 120.0]),
     ) {
-        let mut tracker = floor_tracker();
+        let settings = TrackerSettings { max_absent_s, ..TrackerSettings::default() };
+        let mut tracker = Tracker::new(&[CameraPose::alone(Some(CAMERA_M))], settings).unwrap();
         let mut ended = std::collections::BTreeSet::new();
         for (frame, (x, y)) in (0_u32..).zip(places) {
             let persons = [person(x, y)];
             for track in tracker.update(0, f64::from(frame), &persons).unwrap() {
-                prop_assert!(ended.insert(track.id()));
+                ended.insert(track.id().0);
             }
-            prop_assert!(tracker.tracks().all(|track| !ended.contains(&track.id())));
+            let present = ids(&tracker);
+            prop_assert!(present.windows(2).all(|pair| pair[0] < pair[1]));
+            prop_assert!(max_absent_s > 0.0 || present.iter().all(|id| !ended.contains(id)));
         }
     }
 }

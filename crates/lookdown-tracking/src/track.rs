@@ -131,6 +131,20 @@ impl Track {
         self.record(seen);
     }
 
+    /// Continues a track that was last seen before this one began: takes its identifier, and comes
+    /// from its last place.
+    pub(super) fn continue_from(&mut self, earlier: &Self) {
+        self.id = earlier.id;
+        self.first_seen_s = earlier.first_seen_s;
+        self.has_moved |= earlier.has_moved;
+        if let (Some(first), Some(last)) = (self.tail.front(), earlier.tail.back()) {
+            // Just before, so that lines and zones do not count the time between.
+            let at_s = last.at_s.max(first.at_s - 1e-3);
+            self.tail.push_front(TailPoint { at_s, ..*last });
+            self.tail.truncate(MAX_TAIL_POINTS);
+        }
+    }
+
     fn record(&mut self, seen: &Sighting) {
         self.missed = 0;
         if let Some(angles) = &seen.person.angles {

@@ -16,6 +16,7 @@ use crate::{
     furniture::Furniture,
     kalman::Innovation,
     measurement::Measurement,
+    reappearance::{continue_lost, keep_lost},
     track::{PersonOfReport, Sighting},
 };
 
@@ -33,6 +34,9 @@ pub struct Tracker {
     cameras: Vec<Camera>,
     on_floor: bool,
     tracks: Vec<Track>,
+    /// Confirmed tracks that ended, whose persons may come back.
+    #[serde(default)]
+    lost: Vec<Track>,
     next_id: u64,
     newest_report_s: Option<f64>,
 }
@@ -93,6 +97,7 @@ impl Tracker {
             cameras: poses.iter().map(camera).collect(),
             on_floor: without_height.is_none(),
             tracks: Vec::new(),
+            lost: Vec::new(),
             next_id: 1,
             newest_report_s: None,
         })
@@ -167,7 +172,12 @@ impl Tracker {
             furniture,
             unknown,
         } = separate(candidates, &shown);
+        let possible = self.tracks.iter().filter(|track| !track.is_confirmed());
+        let possible: Vec<TrackId> = possible.map(Track::id).collect();
         let used = self.associate(&report, &candidates);
+        for id in possible {
+            continue_lost(&mut self.tracks, &mut self.lost, id, &self.settings);
+        }
         self.start_tracks(&report, (&candidates, &furniture), &used);
         self.start_things(&report, persons, &unknown);
         self.count_misses(&report);
@@ -175,6 +185,7 @@ impl Tracker {
         let now_s = self.newest_report_s.map_or(at_s, |newest| newest.max(at_s));
         self.newest_report_s = Some(now_s);
         let mut ended = self.end_unseen(now_s);
+        keep_lost(&mut self.lost, &ended, now_s, self.settings.max_absent_s);
         if self.cameras.len() > 1 {
             ended.extend(end_duplicates(&mut self.tracks, now_s));
         }

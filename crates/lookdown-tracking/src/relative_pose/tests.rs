@@ -73,6 +73,57 @@ proptest! {
 }
 
 #[test]
+fn exchanged_cameras_give_the_inverse_pose() {
+    let chance = &mut Chance(11);
+    let walks = walks(20, chance);
+    let pose = CameraPose {
+        position_m: [5.0, 2.0],
+        yaw_deg: 70.0,
+        height_m: Some(3.0),
+    };
+    let first = seen(&walks, &CameraPose::alone(Some(3.0)), 0.2, chance);
+    let second = seen(&walks, &pose, 0.2, chance);
+    let there = relative_pose(&first, &second).unwrap();
+    let back = relative_pose(&second, &first).unwrap();
+    let found = CameraPose {
+        position_m: there.position_m,
+        yaw_deg: there.yaw_deg,
+        height_m: None,
+    };
+    let [x, y] = found.to_site(back.position_m);
+    assert!(x.hypot(y) < 1e-6, "{x} {y}");
+    assert!((there.yaw_deg + back.yaw_deg).abs() < 1e-6);
+    assert!((there.scale * back.scale - 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn lasting_errors_of_a_crowd_are_in_the_deviations() {
+    let chance = &mut Chance(13);
+    let walks = walks(20, chance);
+    let pose = CameraPose {
+        position_m: [5.0, 2.0],
+        yaw_deg: 70.0,
+        height_m: Some(3.0),
+    };
+    let first = seen(&walks, &CameraPose::alone(Some(3.0)), 0.2, chance);
+    let mut second = seen(&walks, &pose, 0.2, chance);
+    for walk in &mut second {
+        // Hidden legs: the place is farther away by a share of the distance.
+        let share = 1.0 + 0.15 * chance.next().abs();
+        for (_, place) in walk {
+            *place = place.map(|value| share * value);
+        }
+    }
+    let found = relative_pose(&first, &second).unwrap();
+    let error = (found.position_m[0] - 5.0).hypot(found.position_m[1] - 2.0);
+    assert!(error < 2.0 * found.position_sd_m, "{error} {found:?}");
+    assert!(
+        (found.yaw_deg - 70.0).abs() < 2.0 * found.yaw_sd_deg,
+        "{found:?}"
+    );
+}
+
+#[test]
 fn walks_of_other_people_tell_no_pose() {
     let chance = &mut Chance(7);
     let (first, second) = (walks(20, chance), walks(20, chance));
