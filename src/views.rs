@@ -33,7 +33,7 @@ const MAX_CAMERAS: usize = 64;
 /// Most views of a camera.
 const MAX_VIEWS: usize = 16;
 /// The time after the last preview for which the frames of a camera without views are kept.
-const PREVIEW: Duration = Duration::from_secs(60);
+const PREVIEW: Duration = Duration::from_mins(1);
 
 /// Views by name.
 pub type StoredViews = BTreeMap<String, View>;

@@ -143,6 +143,7 @@ fn seen(person: &OrientedBox, camera: &CameraGeometry) -> Option<Seen> {
 mod tests {
     use std::f64::consts::FRAC_PI_2;
 
+    use lookdown_calibration::Areas;
     use lookdown_lens::geometry::{Lens, Mount};
 
     use super::*;
@@ -152,7 +153,7 @@ mod tests {
         CameraGeometry {
             lens: Lens::equidistant_circle(839.5, 839.5, 840.0, FRAC_PI_2).unwrap(),
             mount: Mount::default(),
-            areas: Default::default(),
+            areas: Areas::default(),
         }
     }
 

@@ -3,7 +3,10 @@
 
 use std::{
     hash::{DefaultHasher, Hash, Hasher},
-    sync::Arc,
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    },
     time::{Duration, Instant},
 };
 
@@ -85,7 +88,9 @@ pub struct Rendering {
 pub struct LiveFrame {
     /// The time at which it was captured.
     pub captured_at: Timestamp,
-    shown_at: Timestamp,
+    shown: Instant,
+    /// Its number, within those of the camera.
+    number: u64,
     image: JobImage,
     scene: Arc<Scene>,
     /// The people that are concealed, frame pixels.
@@ -98,14 +103,19 @@ pub struct LiveFrame {
     rendered: Mutex<Vec<(Rendering, Arc<OnceCell<Bytes>>)>>,
 }
 
+/// The camera and the people of a report.
+type LastReport = (Arc<Scene>, Arc<Vec<OrientedBox>>);
+
 /// The newest frame of a camera.
 pub struct LiveCamera {
     newest: watch::Sender<Option<Arc<LiveFrame>>>,
     /// The camera and the people of its last report.
-    last: Mutex<Option<(Arc<Scene>, Arc<Vec<OrientedBox>>)>>,
+    last: Mutex<Option<LastReport>>,
     /// The time of the last frame without a report of its own.
     fed_at: Mutex<Option<Instant>>,
     follower: Mutex<Follower>,
+    /// The number of frames so far.
+    count: AtomicU64,
     workers: Arc<Semaphore>,
     limits: DecodeLimits,
 }
@@ -117,6 +127,7 @@ impl LiveCamera {
             last: Mutex::default(),
             fed_at: Mutex::default(),
             follower: Mutex::default(),
+            count: AtomicU64::default(),
             workers,
             limits,
         }
@@ -153,7 +164,7 @@ impl LiveCamera {
         let known = last.as_ref().map(|(scene, _)| scene);
         let known =
             known.filter(|scene| scene.calibration == report.calibration && scene.size == size);
-        let scene = known.map(Arc::clone).unwrap_or_else(|| {
+        let new = || {
             Arc::new(Scene {
                 calibration: report.calibration.clone(),
                 size,
@@ -161,7 +172,8 @@ impl LiveCamera {
                 camera: camera.clone(),
                 tables: Mutex::default(),
             })
-        });
+        };
+        let scene = known.map_or_else(new, Arc::clone);
         *last = Some((Arc::clone(&scene), Arc::clone(&persons)));
         self.follower.lock().update(&persons, camera);
         drop(last);
@@ -172,7 +184,8 @@ impl LiveCamera {
         let concealed = concealment.map(|_| marks_to_conceal(detected));
         self.show(LiveFrame {
             captured_at: report.captured_at.unwrap_or(report.received_at),
-            shown_at: Timestamp::now(),
+            shown: Instant::now(),
+            number: self.count.fetch_add(1, Ordering::Relaxed),
             image: copied(image),
             scene,
             concealed: concealed.unwrap_or_default(),
@@ -193,7 +206,8 @@ impl LiveCamera {
         *self.fed_at.lock() = Some(Instant::now());
         self.show(LiveFrame {
             captured_at,
-            shown_at: Timestamp::now(),
+            shown: Instant::now(),
+            number: self.count.fetch_add(1, Ordering::Relaxed),
             image: JobImage::Encoded(image),
             scene,
             concealed: Vec::new(),
@@ -280,14 +294,24 @@ impl LiveCamera {
 }
 
 impl LiveFrame {
+    /// The time since the frame came.
+    #[must_use]
+    pub fn age(&self) -> Duration {
+        self.shown.elapsed()
+    }
+
     /// The entity tag of a view of this frame.
     #[must_use]
     pub fn tag(&self, rendering: &Rendering) -> String {
         let mut hasher = DefaultHasher::new();
         format!("{rendering:?}").hash(&mut hasher);
         let calibration = &self.scene.calibration;
-        (&calibration.id, &calibration.revision).hash(&mut hasher);
-        format!("{:x}-{:x}", self.shown_at.as_nanosecond(), hasher.finish())
+        (&calibration.id, &calibration.revision, self.number).hash(&mut hasher);
+        format!(
+            "{:x}-{:x}",
+            self.captured_at.as_nanosecond(),
+            hasher.finish()
+        )
     }
 
     /// The direction of a view in this frame.

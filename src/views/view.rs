@@ -130,7 +130,7 @@ impl View {
                 format!("{width} × {height} are more than {MAX_PIXELS} pixels: lower one");
             return Err(ParameterError::bad_value("width", problem));
         }
-        if !(self.azimuth_deg.abs() <= 360.0) {
+        if self.azimuth_deg.abs() > 360.0 {
             let range = -360.0..=360.0;
             return Err(out_of_range(
                 "azimuth_deg",

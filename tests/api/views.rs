@@ -275,8 +275,8 @@ async fn a_key_of_the_scope_view_opens_images_alone_in_any_place() {
         let answer = service.respond(request("GET", path, &headers)).await;
         assert_eq!(answer.status(), status, "{path} {headers:?}");
     }
-    let challenged = service.respond(Request::get(JPEG)).await;
-    let challenges = challenged.headers().get_all("www-authenticate").iter();
+    let refused = service.respond(Request::get(JPEG)).await;
+    let challenges = refused.headers().get_all("www-authenticate").iter();
     assert!(challenges.eq(["Bearer", "Basic realm=\"Lookdown\""].iter()));
     assert!(!log.text().contains(VIEWER), "{}", log.text());
 }

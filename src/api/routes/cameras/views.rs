@@ -15,7 +15,6 @@ use axum::{
 };
 use bytes::{BufMut, Bytes, BytesMut};
 use futures_util::stream::unfold;
-use jiff::Timestamp;
 use lookdown_common::text::Quoted;
 use lookdown_detect::parameters::{ParameterError, whole_number};
 use lookdown_http::entity_tags::{entity_tag, is_unmodified};
@@ -474,7 +473,7 @@ impl Viewer {
         loop {
             tokio::select! {
                 changed = timeout(KEEP_ALIVE, self.frames.changed()) => {
-                    return changed.map_or(Some(()), |changed| changed.ok());
+                    return changed.map_or(Some(()), Result::ok);
                 }
                 report = self.listening.next() => drop(report?),
             }
@@ -507,10 +506,7 @@ async fn newest(
     let wait = deadline.within(Some(FIRST_FRAME), "");
     let frame = timeout_at(wait.at(), frames.wait_for(Option::is_some)).await;
     let frame = frame.ok().and_then(|frame| frame.ok()?.clone());
-    let is_kept = |frame: &Arc<LiveFrame>| {
-        let age = Timestamp::now().duration_since(frame.captured_at);
-        age.as_secs() < i64::try_from(state.options.image_age.as_secs()).unwrap_or(i64::MAX)
-    };
+    let is_kept = |frame: &Arc<LiveFrame>| frame.age() < state.options.image_age;
     frame.filter(is_kept).ok_or_else(|| {
         let camera = Quoted(camera);
         let detail = format!(
