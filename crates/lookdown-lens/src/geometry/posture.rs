@@ -177,6 +177,10 @@ impl BoxAngles {
     }
 
     /// Returns the likelihood of each posture and size below a camera of this height.
+    #[expect(
+        clippy::needless_range_loop,
+        reason = "sizes and postures are two axes"
+    )]
     fn likelihoods(&self, camera_m: Option<f64>) -> [[f64; SIZES]; POSTURES] {
         let measured = [self.along.ln(), self.across.ln()];
         let angle = self.from_nadir / ANGLE_STEP;
