@@ -100,6 +100,11 @@ impl ResultStore for MemoryResults {
         Ok(is_deleted)
     }
 
+    async fn delete_image(&self, camera: &str) -> Result<(), Unreachable> {
+        self.kept().delete_image(camera);
+        Ok(())
+    }
+
     fn expire(&self) {
         drop(self.kept());
     }

@@ -134,6 +134,11 @@ impl ResultStore for RedisResults {
         Ok(is_deleted)
     }
 
+    async fn delete_image(&self, camera: &str) -> Result<(), Unreachable> {
+        self.ask(async |mut reader| reader.delete_image(camera).await)
+            .await
+    }
+
     async fn since(
         &self,
         cameras: &Cameras,

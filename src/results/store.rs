@@ -43,6 +43,12 @@ pub trait ResultStore: Send + Sync {
     /// [`Unreachable`].
     async fn delete(&self, camera: &str) -> Result<bool, Unreachable>;
 
+    /// Deletes the image of a camera.
+    ///
+    /// # Errors
+    /// [`Unreachable`].
+    async fn delete_image(&self, camera: &str) -> Result<(), Unreachable>;
+
     /// Removes the reports that are too old from the memory of this process. A store elsewhere
     /// does that itself.
     fn expire(&self) {}

@@ -8,11 +8,14 @@ use std::{
     time::Duration,
 };
 
-use axum::{Router, http::StatusCode};
+use axum::{
+    Router,
+    http::{StatusCode, Uri},
+};
 use lookdown::{api::Companions, cameras::Cameras};
 use lookdown_watch::Metrics;
 use tokio::{
-    sync::Mutex,
+    sync::{Mutex, mpsc},
     task::JoinSet,
     time::{sleep, timeout},
 };
@@ -165,12 +168,40 @@ async fn an_image_is_kept_after_it_is_switched_on() {
         let body = format!(r#"{{ "keep_image": {change} }}"#);
         let changed = service.patch("/cameras/hall", &body).await;
         assert_eq!(changed.status, StatusCode::NO_CONTENT, "{}", changed.text());
+        let image = service.get("/results/hall/latest.jpg").await;
+        assert_eq!(image.status, StatusCode::NOT_FOUND, "{change}");
         service.post_raw("camera=hall", frame()).await;
         let image = service.get("/results/hall/latest.jpg").await;
         assert_eq!(image.status, status, "{change}");
         let row = service.get("/cameras/hall").await.json();
         assert_eq!(row["keep_image"].to_string(), change);
     }
+}
+
+#[tokio::test]
+async fn the_counts_follow_an_own_camera_without_reports() {
+    let companions = Companions::default();
+    companions
+        .own_cameras()
+        .set([("hall".to_owned(), true)].into());
+    let (sender, mut asked) = mpsc::unbounded_channel();
+    let counts = Router::new().fallback(move |uri: Uri| {
+        drop(sender.send(uri.to_string()));
+        async {}
+    });
+    companions.set_counts(counts, |_| None);
+    let service = Service::within(&Bounds {
+        companions,
+        ..Bounds::default()
+    });
+    for camera in ["hall", "gate"] {
+        let deleted = service
+            .ask("DELETE", &format!("/results/{camera}"), &[])
+            .await;
+        assert_eq!(deleted.status, StatusCode::NO_CONTENT, "{camera}");
+    }
+    let asked: Vec<_> = std::iter::from_fn(|| asked.try_recv().ok()).collect();
+    assert_eq!(asked, ["/counts/gate?keep_history=true"]);
 }
 
 #[tokio::test]

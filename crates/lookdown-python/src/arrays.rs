@@ -7,6 +7,9 @@ use pyo3::PyResult;
 
 use crate::error::python_error;
 
+/// Most rows of an array, so that their copies have at most 2 GiB each.
+const MAX_ROWS: usize = 1 << 26;
+
 /// Copies the rows of an array with `N` columns, so that they can be read without the interpreter.
 pub(crate) fn rows<const N: usize>(
     name: &str,
@@ -17,6 +20,13 @@ pub(crate) fn rows<const N: usize>(
         let (rows, columns) = array.dim();
         return Err(python_error(format!(
             "{name}: the shape is ({rows}, {columns}); give an array of shape (N, {N})"
+        )));
+    }
+    // An array without memory of its own, such as a broadcast one, may have any number of rows.
+    if array.nrows() > MAX_ROWS {
+        return Err(python_error(format!(
+            "{name}: it has {} rows: give at most {MAX_ROWS} at a time",
+            array.nrows()
         )));
     }
     let row = |row: ArrayView1<'_, f64>| std::array::from_fn(|column| row[column]);

@@ -216,11 +216,14 @@ pub(in crate::api) async fn put(
     CameraBody(camera): CameraBody<NewCamera>,
 ) -> Result<StatusCode, Problem> {
     let (camera, password) = camera.separate();
-    let stored_name = name.clone();
+    let (stored_name, keep_image) = (name.clone(), camera.keep_image);
     let is_new = using_files(&state, deadline, move |cameras| {
         cameras.put(&stored_name, camera, password.as_ref())
     });
     let is_new = is_new.await?;
+    if !(is_new || keep_image) {
+        state.results.delete_image(&name).await?;
+    }
     tracing::info!(camera = name, "the camera was stored");
     Ok(if is_new {
         StatusCode::CREATED
@@ -231,8 +234,8 @@ pub(in crate::api) async fn put(
 
 /// Change a camera
 ///
-/// Pauses or resumes it, and switches whether its latest image is kept. It stays so after a
-/// restart. This change applies to cameras of the settings, too.
+/// Pauses or resumes it, and switches whether its latest image is kept: `false` deletes the
+/// stored one. It stays so after a restart. This change applies to cameras of the settings, too.
 #[utoipa::path(
     patch, path = "/cameras/{camera}", tag = "cameras", operation_id = "change_camera",
     params(("camera" = String, Path, description = "The name of the camera.", example = "hall")),
@@ -253,6 +256,9 @@ pub(in crate::api) async fn patch(
     });
     if !is_known.await? {
         return Err(unknown());
+    }
+    if keep_image == Some(false) {
+        state.results.delete_image(&name).await?;
     }
     tracing::info!(camera = name, paused, keep_image, "the camera was changed");
     Ok(StatusCode::NO_CONTENT)

@@ -105,6 +105,10 @@ impl BoundedReports {
         is_known
     }
 
+    pub(super) fn delete_image(&mut self, camera: &str) {
+        self.images.forget(camera);
+    }
+
     /// The names of the cameras.
     pub(super) fn cameras(&self) -> Vec<String> {
         self.cameras.keys().cloned().collect()

@@ -46,9 +46,12 @@ impl Reader<'_> {
         last.arg(self.keys.cameras())
             .arg(format!("-{most}"))
             .arg(-1);
-        let mut cameras: Vec<String> = last.query_async(&mut self.connection).await?;
-        cameras.retain(|camera| is_camera_name(camera));
-        Ok(cameras)
+        // The bytes of another program may be no text.
+        let cameras: Vec<Vec<u8>> = last.query_async(&mut self.connection).await?;
+        let names = cameras
+            .into_iter()
+            .filter_map(|name| String::from_utf8(name).ok());
+        Ok(names.filter(|name| is_camera_name(name)).collect())
     }
 
     /// Deletes all reports of a camera. Returns false if it had none.
@@ -60,6 +63,13 @@ impl Reader<'_> {
         call.arg(keys.prefix_of_cameras());
         call.arg(keys.prefix_of_images()).arg(camera);
         call.invoke_async(&mut self.connection).await
+    }
+
+    pub(super) async fn delete_image(&mut self, camera: &str) -> RedisResult<()> {
+        let mut both = atomic();
+        both.cmd("DEL").arg(self.keys.image(camera));
+        both.cmd("ZREM").arg(self.keys.images()).arg(camera);
+        both.ignore().query_async(&mut self.connection).await
     }
 
     pub(super) async fn latest_of_all(
@@ -124,14 +134,24 @@ impl Reader<'_> {
             first.arg("LIMIT").arg(0).arg(most.get()).arg("WITHSCORES");
         }
         let sets = both.query_async(&mut self.connection);
-        let [earlier, latest]: [Vec<(String, u64)>; 2] = sets.await?;
-        let earlier = earlier.into_iter().filter_map(|(element, micros)| {
+        let [earlier, latest]: [Vec<(Vec<u8>, f64)>; 2] = sets.await?;
+        // Whole microseconds are exact; the scores of another program may be any number.
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "saturates"
+        )]
+        let place = |(element, score): (Vec<u8>, f64)| {
+            let element = String::from_utf8(element).ok()?;
+            Some((ReportId::from_micros(score as u64), element))
+        };
+        let earlier = earlier.into_iter().filter_map(place);
+        let earlier = earlier.filter_map(|(id, element)| {
             // The ID, the size and the camera.
             let camera = element.splitn(3, ':').nth(2)?.to_owned();
-            Some((ReportId::from_micros(micros), camera))
+            Some((id, camera))
         });
-        let latest = latest.into_iter();
-        let latest = latest.map(|(camera, micros)| (ReportId::from_micros(micros), camera));
+        let latest = latest.into_iter().filter_map(place);
         let mut places: Vec<Place> = earlier.chain(latest).collect();
         places.sort_unstable();
         places.truncate(most.get());
@@ -183,12 +203,14 @@ impl Reader<'_> {
         counts.cmd("HGET").arg(self.keys.totals()).arg("bytes");
         counts.cmd("ZCARD").arg(self.keys.images());
         let counts = counts.query_async(&mut self.connection);
-        let (cameras, earlier, bytes, images): (usize, usize, Option<usize>, usize) =
+        let (cameras, earlier, bytes, images): (usize, usize, Option<String>, usize) =
             counts.await?;
         Ok(ResultUse {
             cameras,
             reports: cameras + earlier,
-            bytes: bytes.unwrap_or_default(),
+            bytes: bytes
+                .and_then(|bytes| bytes.parse().ok())
+                .unwrap_or_default(),
             images,
         })
     }

@@ -173,7 +173,12 @@ async fn cameras_with_names_that_are_refused_are_skipped() {
     let long = "n".repeat(129);
     let names = ["hall", "", "\u{202e}llah", "a\nb", &long];
     let reply = names.map(|name| format!("${}\r\n{name}\r\n", name.len()));
-    let redis = EvilRedis::start(Evil::once(&format!("*5\r\n{}", reply.concat())));
+    let mut reply = format!("*6\r\n{}", reply.concat()).into_bytes();
+    reply.extend_from_slice(b"$2\r\n\xff\xfe\r\n");
+    let redis = EvilRedis::start(Evil {
+        reply,
+        ..Evil::once("")
+    });
     assert_eq!(redis.store().await.cameras().await.unwrap(), ["hall"]);
 }
 

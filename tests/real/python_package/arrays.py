@@ -44,4 +44,8 @@ for unusable, reason in ((huge, "8192"), ("/dev/zero", "cannot be read"), ("pipe
         assert reason in str(refusal), refusal
     else:
         raise AssertionError(f"{reason}: accepted")
+try:
+    lens.project(np.broadcast_to(1.0, (2**40, 3)))
+except lookdown.LookdownError as refusal:
+    assert "rows" in str(refusal), refusal
 print("equal" if persons[0] == persons[1] == persons[2] else persons)
