@@ -1,4 +1,4 @@
-//! HOTA, IDF1 and MOTA as TrackEval defines them, and the protocol of published figures.
+//! HOTA, IDF1 and MOTA as `TrackEval` defines them, and the protocol of published figures.
 
 use std::collections::BTreeMap;
 
