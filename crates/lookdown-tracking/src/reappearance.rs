@@ -1,9 +1,9 @@
 //! Persons who come back: a new track that continues a lost one.
 //!
 //! A person who sits at the rim is missed for a minute, and a person who walks is hidden for some
-//! seconds. Such a track ends, as it must no longer count, and is kept for a while. When a new track
-//! is confirmed, it may be the same person. The likelihood of its place, which spreads with the
-//! time, is compared with the density of new persons.
+//! seconds. Such a track ends, as it must no longer count, and is kept for a while. When a new
+//! track is confirmed, it may be the same person. The likelihood of its place, which spreads with
+//! the time, is compared with the density of new persons.
 
 use crate::{Track, TrackId, TrackerSettings};
 

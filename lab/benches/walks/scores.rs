@@ -1,4 +1,4 @@
-//! HOTA, IDF1 and MOTA as TrackEval defines them, and the protocol of published figures.
+//! HOTA, IDF1 and MOTA as `TrackEval` defines them, and the protocol of published figures.
 
 use std::collections::BTreeMap;
 
@@ -24,7 +24,7 @@ pub struct Step {
 pub struct Sums {
     truth: f64,
     tracks: f64,
-    /// Of each threshold: matches, and the sum of their association scores.
+    /// The matches of each threshold, and the sum of their association scores.
     hota: [(f64, f64); THRESHOLDS],
     matched: f64,
     switches: f64,
