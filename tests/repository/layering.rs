@@ -9,7 +9,7 @@ use std::{collections::BTreeSet, fs};
 use source_scan::{CRATES, all_sources, code, names_crate, sources, without_test_files};
 
 /// Crates for external systems, and the only crates and modules that may use them.
-const MAY_USE_CRATE: [(&str, &[&str]); 25] = [
+const MAY_USE_CRATE: [(&str, &[&str]); 24] = [
     ("ort", &["inference"]),
     ("image", &["lookdown-imaging"]),
     (
@@ -99,7 +99,6 @@ const MAY_USE_CRATE: [(&str, &[&str]); 25] = [
         ],
     ),
     ("tokio_rustls", &["rtsp_relay", "tls"]),
-    ("x509_cert", &["tls"]),
     (
         "reqwest",
         &[
