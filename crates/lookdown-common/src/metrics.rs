@@ -10,6 +10,9 @@ const DURATION_BUCKETS: [f64; 15] = [
     0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0, 60.0,
 ];
 
+/// Upper bounds of counts: up to the greatest batch of views.
+const COUNT_BUCKETS: [f64; 8] = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0];
+
 /// Declares a struct of metrics with a constructor `registered_with`, which registers each metric
 /// by its name and takes the values of the struct's other fields. The doc comment of a field is its
 /// help text, and the visibility of the struct is that of its metrics. The crate needs
@@ -94,10 +97,15 @@ impl Kind for IntGaugeVec {
     }
 }
 
-/// A histogram of durations, in seconds.
+/// A histogram of durations if the name ends in `_seconds`, else of counts.
 impl Kind for HistogramVec {
     fn create(name: &str, help: &str, labels: &[&str]) -> Result<Self, Error> {
-        let options = HistogramOpts::new(name, help).buckets(DURATION_BUCKETS.to_vec());
+        let buckets: &[f64] = if name.ends_with("_seconds") {
+            &DURATION_BUCKETS
+        } else {
+            &COUNT_BUCKETS
+        };
+        let options = HistogramOpts::new(name, help).buckets(buckets.to_vec());
         Self::new(options, labels)
     }
 }

@@ -2,8 +2,8 @@
 //! counts its own events in the struct, which its owner registers.
 
 use lookdown_common::metric_set;
+use prometheus::{HistogramVec, IntCounterVec, IntGaugeVec, Registry};
 pub use prometheus::{IntCounter, IntGauge};
-use prometheus::{IntCounterVec, IntGaugeVec, Registry};
 
 metric_set! {
     /// The metrics of one engine and its models.
@@ -29,6 +29,10 @@ metric_set! {
     rig_cache_builds: IntCounter = "rig_cache_builds_total" [];
     /// Remap tables evicted from memory.
     rig_cache_evictions: IntCounter = "rig_cache_evictions_total" [];
+    /// Views in a batch for the network.
+    batch_size: HistogramVec = "batch_size" [];
+    /// Time from the queueing of the first view of a batch to its start.
+    batch_wait: HistogramVec = "batch_wait_seconds" [];
     /// Frames, by the origin of their persons: `full`, `followed` or `unchanged`.
     frame_searches: IntCounterVec = "frame_searches_total" ["search"];
 }

@@ -10,11 +10,14 @@ use lookdown_lens::geometry::{
 };
 
 use super::{
-    mosaic::{Grid, Mosaic},
+    mosaic::Mosaics,
     outline::{crop_outline, view_outline},
     visible_views::{Hidden, LeftOut, Visible},
 };
-use crate::detection::{BBox, FramePixels, ViewPixels};
+use crate::{
+    detection::{BBox, FramePixels, ViewPixels},
+    inference::ViewDetection,
+};
 use lookdown_imaging::{Frame, Letterbox, NetworkInput, RemapTable};
 
 /// Distance to the view's border, as a share of the view's width, below which a box is considered
@@ -39,9 +42,7 @@ enum Views {
     /// Virtual perspective views.
     Virtual(Vec<(VirtualView, RemapTable)>),
     /// Upright crops of the frame.
-    Crops(Vec<(FrameCrop, RemapTable)>),
-    /// Small crops of the frame, several in one input of the network.
-    Mosaics(Vec<Mosaic>),
+    Crops(Mosaics),
     /// The whole frame, letterboxed.
     Direct(Letterbox),
 }
@@ -107,9 +108,11 @@ impl CameraRig {
         })
     }
 
-    /// Returns a rig of the same camera with crops of the frame instead of views.
+    /// Returns a rig of the same camera with crops of the frame instead of views. Small ones share
+    /// a square of `side` pixels in the input of the network.
     pub(super) fn with_crops(
         &self,
+        side: u32,
         crops: &[FrameCrop],
         frame_width: u32,
         frame_height: u32,
@@ -123,25 +126,9 @@ impl CameraRig {
             frame: BBox::for_frame(frame_width, frame_height),
             hidden: self.hidden.clone(),
             left_out: visible.left_out,
-            views: Views::Crops(visible.views),
+            views: Views::Crops(Mosaics::new(side, visible.views)),
             details: Vec::new(),
         }
-    }
-
-    /// Returns a rig of the same camera with small crops of the frame instead of views, several in
-    /// each input of the network.
-    pub(super) fn with_mosaics(
-        &self,
-        grid: Grid,
-        crops: &[FrameCrop],
-        frame_width: u32,
-        frame_height: u32,
-    ) -> Self {
-        let mut rig = self.with_crops(crops, frame_width, frame_height);
-        if let Views::Crops(crops) = rig.views {
-            rig.views = Views::Mosaics(Mosaic::for_crops(grid, &crops));
-        }
-        rig
     }
 
     /// Blanks the masked areas of the frame. Must run before any other use of the frame.
@@ -173,18 +160,25 @@ impl CameraRig {
     pub(super) fn virtual_views(&self) -> impl Iterator<Item = &VirtualView> {
         let views = match &self.views {
             Views::Virtual(views) => views.as_slice(),
-            Views::Crops(_) | Views::Mosaics(_) | Views::Direct(_) => &[],
+            Views::Crops(_) | Views::Direct(_) => &[],
         };
         views.iter().map(|(view, _)| view)
     }
 
-    /// Returns the number of views that the network processes.
+    /// Returns the number of inputs that the network processes: views, or mosaics of crops.
     pub(super) fn view_count(&self) -> usize {
         match &self.views {
             Views::Virtual(views) => views.len(),
-            Views::Crops(crops) => crops.len(),
-            Views::Mosaics(mosaics) => mosaics.len(),
+            Views::Crops(mosaics) => mosaics.inputs().len(),
             Views::Direct(_) => 1,
+        }
+    }
+
+    /// Divides the detections in each input of the network into those of each view or crop.
+    pub(super) fn per_view(&self, per_input: Vec<Vec<ViewDetection>>) -> Vec<Vec<ViewDetection>> {
+        match &self.views {
+            Views::Crops(mosaics) => mosaics.per_crop(per_input),
+            Views::Virtual(_) | Views::Direct(_) => per_input,
         }
     }
 
@@ -215,7 +209,7 @@ impl CameraRig {
                 let outlines = outlines.map(|(view, _)| view_outline(view, &self.geometry.lens));
                 outlines.collect()
             }
-            Views::Crops(_) | Views::Mosaics(_) => self.crops().map(crop_outline).collect(),
+            Views::Crops(_) => self.crops().map(crop_outline).collect(),
             Views::Direct(_) => Vec::new(),
         }
     }
@@ -227,8 +221,9 @@ impl CameraRig {
                 let views = views.iter().chain(&self.details);
                 RemapTable::bytes(views.map(|(_, table)| table))
             }
-            Views::Crops(crops) => RemapTable::bytes(crops.iter().map(|(_, table)| table)),
-            Views::Mosaics(mosaics) => RemapTable::bytes(mosaics.iter().flat_map(Mosaic::tables)),
+            Views::Crops(mosaics) => {
+                RemapTable::bytes(mosaics.crops().iter().map(|(_, table)| table))
+            }
             Views::Direct(_) => 0,
         };
         let reach = self.hidden.reach.as_ref().map_or(0, |reach| reach.bytes());
@@ -247,8 +242,7 @@ impl CameraRig {
         match &self.views {
             Views::Direct(letterbox) => letterbox.render(frame, input, slot),
             Views::Virtual(views) => views[view].1.render(frame, input, slot),
-            Views::Crops(crops) => crops[view].1.render(frame, input, slot),
-            Views::Mosaics(mosaics) => mosaics[view].render(frame, input, slot),
+            Views::Crops(mosaics) => mosaics.render(view, frame, input, slot),
         }
     }
 
@@ -267,12 +261,9 @@ impl CameraRig {
                 &self.geometry.lens,
                 &self.geometry.mount,
             ),
-            Views::Crops(crops) => {
-                Footprint::from_crop_box(bbox.corners(), &crops[view].0, &self.geometry.lens)
-            }
-            Views::Mosaics(mosaics) => {
-                let (crop, corners) = mosaics[view].tile_of(bbox)?;
-                Footprint::from_crop_box(corners, crop, &self.geometry.lens)
+            Views::Crops(mosaics) => {
+                let crop = &mosaics.crops()[view].0;
+                Footprint::from_crop_box(bbox.corners(), crop, &self.geometry.lens)
             }
             Views::Direct(letterbox) => Some(Footprint::from_frame_box(
                 bbox.corners().map(|side| letterbox.frame_from_input(side)),
@@ -282,48 +273,56 @@ impl CameraRig {
 
     /// Returns the crops; empty for a rig without crops.
     pub(super) fn crops(&self) -> impl Iterator<Item = &FrameCrop> {
-        let (crops, mosaics) = match &self.views {
-            Views::Crops(crops) => (crops.as_slice(), [].as_slice()),
-            Views::Mosaics(mosaics) => ([].as_slice(), mosaics.as_slice()),
-            Views::Virtual(_) | Views::Direct(_) => Default::default(),
-        };
-        let crops = crops.iter().map(|(crop, _)| crop);
-        crops.chain(mosaics.iter().flat_map(Mosaic::crops))
+        self.placed_crops().iter().map(|(crop, _)| crop)
+    }
+
+    fn placed_crops(&self) -> &[(FrameCrop, RemapTable)] {
+        match &self.views {
+            Views::Crops(mosaics) => mosaics.crops(),
+            Views::Virtual(_) | Views::Direct(_) => &[],
+        }
+    }
+
+    /// Returns the crops of each input of the network; empty for a rig without crops.
+    pub(super) fn crops_of_inputs(&self) -> Vec<Vec<FrameCrop>> {
+        match &self.views {
+            Views::Crops(mosaics) => mosaics
+                .inputs()
+                .map(|crops| crops.iter().map(|(crop, _)| *crop).collect())
+                .collect(),
+            Views::Virtual(_) | Views::Direct(_) => Vec::new(),
+        }
     }
 
     /// Returns the view whose vote a view shares: a mirrored crop shares that of its original,
     /// which comes before it, and any other view has its own.
     pub(super) fn voter(&self, view: usize) -> usize {
-        let Views::Crops(crops) = &self.views else {
+        let crops = self.placed_crops();
+        let Some((crop, _)) = crops.get(view) else {
             return view;
         };
-        let crop = crops[view].0;
         let original = crops[..view].iter();
         let mut original = original.map(|(other, _)| other);
         let original = original.position(|other| crop.is_mirrored && *other == crop.mirrored());
         original.unwrap_or(view)
     }
 
-    /// Returns true if a box of a view touches the border of the view, or of its tile.
+    /// Returns true if a box of a view touches the border of the view.
     pub(super) fn cuts_off(
         &self,
         view: usize,
         bbox: &BBox<ViewPixels>,
         input: &NetworkInput,
     ) -> bool {
-        let tile = match &self.views {
-            Views::Mosaics(mosaics) => mosaics[view].tile_of(bbox),
-            _ => None,
-        };
-        match tile {
-            Some((crop, corners)) => touches_border(corners, crop.width, crop.height),
+        match self.placed_crops().get(view) {
+            Some((crop, _)) => touches_border(bbox.corners(), crop.width, crop.height),
             None => touches_border(bbox.corners(), input.width, input.height),
         }
     }
 
     /// Returns true if boxes of the views are exact in the frame, as the boxes of crops are.
     pub(super) fn is_exact(&self) -> bool {
-        matches!(self.views, Views::Crops(_) | Views::Mosaics(_))
+        matches!(self.views, Views::Crops(_))
     }
 
     /// Returns the number of views with a vote of their own ([`voter`](Self::voter)) that show the
@@ -335,7 +334,7 @@ impl CameraRig {
                 let holds = |view: &VirtualView| outline.iter().all(|ray| view.holds(ray));
                 views.iter().filter(|(view, _)| holds(view)).count()
             }
-            Views::Crops(_) | Views::Mosaics(_) => {
+            Views::Crops(_) => {
                 let [x_min, y_min, x_max, y_max] = footprint.bounds();
                 let corners = [Pixel::new(x_min, y_min), Pixel::new(x_max, y_max)];
                 let holds = |crop: &&FrameCrop| corners.iter().all(|corner| crop.holds(corner));

@@ -127,7 +127,12 @@ impl Engine {
         start_at_zero(&metrics.frame_searches, Search::VARIANTS);
         Ok(Self {
             models,
-            inference: InferenceThreads::start(options.sessions, options.batches, &remappers)?,
+            inference: InferenceThreads::start(
+                options.sessions,
+                options.batches,
+                &remappers,
+                &metrics,
+            )?,
             remappers,
             calibrations,
             rigs: RigCache::new(options.rig_cache_bytes, Arc::clone(&metrics)),

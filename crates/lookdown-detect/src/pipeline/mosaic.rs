@@ -1,68 +1,72 @@
 //! Mosaics: several small crops of a frame in one input of the network.
 
+use std::ops::Range;
+
 use lookdown_lens::geometry::FrameCrop;
 
-use crate::detection::{BBox, ViewPixels};
+use crate::{detection::BBox, inference::ViewDetection};
 use lookdown_imaging::{Frame, NetworkInput, RemapTable};
 
-/// The number of tiles along each side of a mosaic.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Grid {
-    /// Four tiles.
-    Two = 2,
-    /// Nine tiles.
-    Three = 3,
-}
-
-impl Grid {
-    /// Returns the number of tiles along each side.
-    pub(super) fn per_side(self) -> u32 {
-        self as u32
-    }
-
-    /// Returns the number of tiles.
-    pub(super) fn tiles(self) -> usize {
-        let per_side = self as usize;
-        per_side * per_side
-    }
-}
-
-/// Crops side by side, row by row, at most as many as its grid has tiles.
+/// Crops in as few inputs of the network as possible: one that fills an input, or several side by
+/// side, row by row.
 #[derive(Debug)]
-pub(super) struct Mosaic {
-    grid: Grid,
-    tiles: Vec<(FrameCrop, RemapTable)>,
+pub(super) struct Mosaics {
+    crops: Vec<(FrameCrop, RemapTable)>,
+    /// The crops of each input.
+    inputs: Vec<Range<usize>>,
+    /// The side of the square that the crops of an input share, pixels.
+    side: u32,
 }
 
-impl Mosaic {
-    /// Distributes crops, whose sides are those of the grid's tiles, to as few inputs as possible.
-    pub(super) fn for_crops(grid: Grid, crops: &[(FrameCrop, RemapTable)]) -> Vec<Self> {
-        let chunks = crops.chunks(grid.tiles());
-        let mosaics = chunks.map(|tiles| Self {
-            grid,
-            tiles: tiles.to_vec(),
-        });
-        mosaics.collect()
+impl Mosaics {
+    /// Distributes crops to squares of `side` pixels. Only neighbors of the same size share one.
+    pub(super) fn new(side: u32, crops: Vec<(FrameCrop, RemapTable)>) -> Self {
+        let mut inputs = Vec::new();
+        let mut first = 0;
+        for alike in crops.chunk_by(|(one, _), (other, _)| one.width == other.width) {
+            let per_side = (side / alike[0].0.width).max(1) as usize;
+            for tiles in alike.chunks(per_side * per_side) {
+                inputs.push(first..first + tiles.len());
+                first += tiles.len();
+            }
+        }
+        Self {
+            crops,
+            inputs,
+            side,
+        }
     }
 
     /// Returns the crops.
-    pub(super) fn crops(&self) -> impl Iterator<Item = &FrameCrop> {
-        self.tiles.iter().map(|(crop, _)| crop)
+    pub(super) fn crops(&self) -> &[(FrameCrop, RemapTable)] {
+        &self.crops
     }
 
-    /// Returns the remap tables.
-    pub(super) fn tables(&self) -> impl Iterator<Item = &RemapTable> {
-        self.tiles.iter().map(|(_, table)| table)
+    /// Returns the crops of each input.
+    pub(super) fn inputs(&self) -> impl ExactSizeIterator<Item = &[(FrameCrop, RemapTable)]> {
+        self.inputs.iter().map(|tiles| &self.crops[tiles.clone()])
     }
 
-    /// Renders the tiles into the slot `[3, height, width]` of the network's input. Places without
-    /// a tile are black.
-    pub(super) fn render(&self, frame: &Frame, input: &NetworkInput, slot: &mut [f32]) {
+    /// Renders the tiles of an input into its slot `[3, height, width]`. Places without a tile are
+    /// black.
+    pub(super) fn render(
+        &self,
+        number: usize,
+        frame: &Frame,
+        input: &NetworkInput,
+        slot: &mut [f32],
+    ) {
+        let tiles = &self.crops[self.inputs[number].clone()];
+        if let [(crop, table)] = tiles
+            && (crop.width, crop.height) == (input.width, input.height)
+        {
+            return table.render(frame, input, slot);
+        }
         for (plane, offset) in slot.chunks_exact_mut(input.plane_len()).zip(input.offset) {
             plane.fill(offset);
         }
         let mut pixels = Vec::new();
-        for (index, (crop, table)) in self.tiles.iter().enumerate() {
+        for (index, (crop, table)) in tiles.iter().enumerate() {
             let tile = NetworkInput {
                 width: crop.width,
                 height: crop.height,
@@ -82,39 +86,45 @@ impl Mosaic {
         }
     }
 
-    /// Returns the crop whose tile holds the middle of a box, and the corners of the box within
-    /// that tile. `None` where there is no tile.
-    pub(super) fn tile_of(&self, bbox: &BBox<ViewPixels>) -> Option<(&FrameCrop, [f64; 4])> {
-        let [x, y] = bbox.center();
-        self.tiles
-            .iter()
-            .enumerate()
-            .find_map(|(index, (crop, _))| {
-                let [left, top] = self.corner(index, crop).map(f64::from);
-                let (width, height) = (f64::from(crop.width), f64::from(crop.height));
-                let is_within =
-                    (left..left + width).contains(&x) && (top..top + height).contains(&y);
-                let [x_min, y_min, x_max, y_max] = bbox.corners();
-                let local = [
-                    (x_min - left).max(0.0),
-                    (y_min - top).max(0.0),
-                    (x_max - left).min(width),
-                    (y_max - top).min(height),
-                ];
-                is_within.then_some((crop, local))
-            })
+    /// Divides the detections in each input into those of each crop, in pixels of the crop. A tile
+    /// has the boxes whose middle it holds, cut off at its border.
+    pub(super) fn per_crop(&self, per_input: Vec<Vec<ViewDetection>>) -> Vec<Vec<ViewDetection>> {
+        let mut per_crop = Vec::with_capacity(self.crops.len());
+        for (tiles, found) in self.inputs().zip(per_input) {
+            for (index, (crop, _)) in tiles.iter().enumerate() {
+                let corner = self.corner(index, crop).map(f64::from);
+                let inside = found.iter().filter_map(|found| within(found, crop, corner));
+                per_crop.push(inside.collect());
+            }
+        }
+        per_crop
     }
 
-    /// Returns the left upper corner of a tile in the input, pixels.
+    /// Returns the left upper corner of a tile in its input, pixels.
     fn corner(&self, index: usize, crop: &FrameCrop) -> [u32; 2] {
         // There are nine tiles at most.
         let index = u32::try_from(index).unwrap_or_default();
-        let per_side = self.grid.per_side();
+        let per_side = (self.side / crop.width).max(1);
         [
             index % per_side * crop.width,
             index / per_side * crop.height,
         ]
     }
+}
+
+/// Returns a detection in an input as one in the tile at `corner`; `None` if its middle is
+/// elsewhere.
+fn within(found: &ViewDetection, crop: &FrameCrop, corner: [f64; 2]) -> Option<ViewDetection> {
+    let size = [crop.width, crop.height].map(f64::from);
+    let center = found.bbox.center();
+    let is_within = [0, 1].map(|axis| (0.0..size[axis]).contains(&(center[axis] - corner[axis])));
+    let corners = found.bbox.corners();
+    let local = [0, 1, 2, 3].map(|side| {
+        let axis = side % 2;
+        (corners[side] - corner[axis]).clamp(0.0, size[axis])
+    });
+    let bbox = BBox::new(local).ok()?;
+    (is_within == [true, true]).then_some(ViewDetection { bbox, ..*found })
 }
 
 #[cfg(test)]
@@ -150,26 +160,30 @@ mod tests {
         let crops = crops.map(|[x, y]| crop(x, y));
         let tables = crops.map(|crop| RemapTable::for_crop(&crop, 200, 200));
         let crops: Vec<_> = crops.into_iter().zip(tables).collect();
-        let mosaics = Mosaic::for_crops(Grid::Two, &crops);
-        assert_eq!(mosaics.len(), 2);
+        let mosaics = Mosaics::new(80, crops.clone());
+        assert_eq!(mosaics.inputs().len(), 2);
         let input = NetworkInput::plain(80, 80);
         let mut slot = vec![0.0; input.view_len()];
-        mosaics[0].render(&frame, &input, &mut slot);
-        for (left, top) in [(5_u32, 5_u32), (45, 5), (5, 45), (45, 45)] {
-            let corners = [left, top, left + 20, top + 20].map(f64::from);
-            let bbox = BBox::new(corners).unwrap();
-            let (crop, local) = mosaics[0].tile_of(&bbox).unwrap();
-            let [x, y, ..] = crop.frame_box(local);
+        mosaics.render(0, &frame, &input, &mut slot);
+        let corners = [(5_u32, 5_u32), (45, 5), (5, 45), (45, 45)];
+        let found = |(left, top): (u32, u32)| ViewDetection {
+            bbox: BBox::new([left, top, left + 20, top + 20].map(f64::from)).unwrap(),
+            score: 0.5,
+        };
+        // No tile is at the last one.
+        let found = vec![corners.map(found).to_vec(), vec![found((45, 5))]];
+        let per_crop = mosaics.per_crop(found);
+        for (number, (left, top)) in corners.into_iter().enumerate() {
+            let [local] = per_crop[number][..] else {
+                panic!("{per_crop:?}");
+            };
+            let [x, y, ..] = mosaics.crops()[number].0.frame_box(local.bbox.corners());
             let index = top as usize * 80 + left as usize;
             let shown = [slot[index], slot[input.plane_len() + index]].map(f64::from);
             assert!((shown[0] - x).abs() < 0.6 && (shown[1] - y).abs() < 0.6);
         }
-        let wide = Mosaic::for_crops(Grid::Three, &crops);
-        assert_eq!(wide.len(), 1);
-        let last = BBox::new([45.0, 45.0, 65.0, 65.0]).unwrap();
-        let (crop, _) = wide[0].tile_of(&last).unwrap();
-        assert_eq!(crop.center, Pixel::new(40.0, 40.0));
-        let beside = BBox::new([50.0, 50.0, 60.0, 60.0]).unwrap();
-        assert!(mosaics[1].tile_of(&beside).is_none());
+        assert_eq!(per_crop[4], []);
+        assert_eq!(Mosaics::new(120, crops.clone()).inputs().len(), 1);
+        assert_eq!(Mosaics::new(40, crops).inputs().len(), 5);
     }
 }

@@ -27,7 +27,7 @@ struct CachedCamera {
     /// The detail views of the last frame.
     details: ChangingViews<VirtualView>,
     /// The crops of the last frame.
-    crops: ChangingViews<FrameCrop>,
+    crops: ChangingViews<Vec<FrameCrop>>,
 }
 
 /// The views of a pass that are other ones in each frame.
@@ -93,9 +93,8 @@ impl MotionCache {
         rig: &Arc<CameraRig>,
         model: &Arc<Model>,
     ) -> Option<Arc<CameraViews>> {
-        let crops = rig.crops().copied().collect();
         let known = self.0.get(camera)?;
-        Some(known.crops.replace(crops, rig, model))
+        Some(known.crops.replace(rig.crops_of_inputs(), rig, model))
     }
 }
 

@@ -29,7 +29,7 @@ use super::{
     error::{PipelineError, from_inference, internal},
     motion_cache::CameraViews,
 };
-use crate::inference::Model;
+use crate::{inference::Model, metrics::DetectMetrics};
 use lookdown_imaging::{Frame, ViewBatch};
 
 pub(super) use batch_cost::BatchCost;
@@ -48,6 +48,7 @@ impl InferenceThreads {
         sessions: NonZeroUsize,
         options: BatchOptions,
         remappers: &Arc<ThreadPool>,
+        metrics: &Arc<DetectMetrics>,
     ) -> std::io::Result<Self> {
         let mut inference = Self {
             queue: Arc::new(ViewQueue::new(options)),
@@ -55,9 +56,10 @@ impl InferenceThreads {
         };
         for session in 0..sessions.get() {
             let (queue, remappers) = (Arc::clone(&inference.queue), Arc::clone(remappers));
+            let metrics = Arc::clone(metrics);
             let thread = std::thread::Builder::new()
                 .name(format!("network-{session}"))
-                .spawn(move || serve(&queue, session, &remappers))?;
+                .spawn(move || serve(&queue, session, &remappers, &metrics))?;
             inference.threads.push(thread);
         }
         Ok(inference)
@@ -90,9 +92,10 @@ impl Drop for InferenceThreads {
 }
 
 /// Processes batches on an inference thread until the queue is closed.
-fn serve(queue: &ViewQueue, session: usize, remappers: &ThreadPool) {
+fn serve(queue: &ViewQueue, session: usize, remappers: &ThreadPool, metrics: &DetectMetrics) {
     let mut batch = ViewBatch::default();
     while let Some(claims) = queue.next_batch() {
+        record(metrics, &claims);
         // Log lines of a shared batch are attributed to the frame of the first claim.
         let _in_request = claims[0].task.request.enter();
         let run = || run::execute(&claims, session, remappers, &mut batch);
@@ -104,6 +107,20 @@ fn serve(queue: &ViewQueue, session: usize, remappers: &ThreadPool) {
             }),
         }
     }
+}
+
+/// Records the size of a batch that starts now, and how long its first view has waited.
+#[expect(clippy::cast_precision_loss, reason = "far below 2^52 views")]
+fn record(metrics: &DetectMetrics, claims: &[Claim]) {
+    let views: usize = claims.iter().map(|claim| claim.views.len()).sum();
+    let waits = claims.iter().map(|claim| claim.task.queued.elapsed());
+    let wait = waits.max().unwrap_or_default();
+    let no_labels: [&str; 0] = [];
+    let (size, waited) = (&metrics.batch_size, &metrics.batch_wait);
+    size.with_label_values(&no_labels).observe(views as f64);
+    waited
+        .with_label_values(&no_labels)
+        .observe(wait.as_secs_f64());
 }
 
 fn fail(claims: &[Claim], error: impl Fn() -> PipelineError) {

@@ -62,3 +62,45 @@ pub(super) fn views_holding(passes: &[Pass], footprint: &Footprint) -> usize {
     let holding = passes.iter().map(|pass| pass.rig.views_holding(footprint));
     holding.sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use lookdown_calibration::{Areas, CameraGeometry};
+    use lookdown_lens::geometry::{FrameCrop, Lens, Mount, Pixel, QuarterTurn};
+
+    use super::*;
+    use crate::{detection::BBox, pipeline::test_support::BlobDetector};
+
+    #[test]
+    fn each_tile_of_a_mosaic_has_a_vote_of_its_own() {
+        let geometry = CameraGeometry {
+            lens: Lens::equidistant_circle(99.5, 99.5, 100.0, 1.57).unwrap(),
+            mount: Mount::default(),
+            areas: Areas::default(),
+        };
+        let input = BlobDetector::default().input;
+        let tile = |x: f64| FrameCrop {
+            turn: QuarterTurn::None,
+            is_mirrored: false,
+            center: Pixel::new(x, 100.0),
+            scale: 1.0,
+            width: 48,
+            height: 48,
+        };
+        let rig = CameraRig::new(geometry, 200, 200, None, &input);
+        let rig = rig.with_crops(96, &[tile(90.0), tile(100.0)], 200, 200);
+        let found = |left: f64| ViewDetection {
+            bbox: BBox::new([left, 10.0, left + 20.0, 40.0]).unwrap(),
+            score: 0.9,
+        };
+        // The same person in both tiles of one input.
+        let per_view = rig.per_view(vec![vec![found(20.0), found(58.0)]]);
+        let pass = Pass {
+            rig: Arc::new(rig),
+            model: Arc::new(Model::new(Box::new(BlobDetector::default()))),
+            per_view,
+        };
+        let votes: Vec<_> = detections(&[pass]).map(|found| found.vote).collect();
+        assert_eq!(votes, [0, 1]);
+    }
+}

@@ -57,7 +57,7 @@ impl Engine {
         let rig = &observation.camera.rig;
         let rig = self
             .remappers
-            .install(|| rig.with_crops(&crops, width, height));
+            .install(|| rig.with_crops(side, &crops, width, height));
         (rig.view_count() > 0).then_some((rig, model))
     }
 

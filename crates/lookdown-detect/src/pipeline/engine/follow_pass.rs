@@ -5,7 +5,7 @@ use std::{sync::Arc, time::Instant};
 use lookdown_lens::geometry::crop_placement::place_crops;
 
 use super::{Engine, Observation, first_pass::FirstPass};
-use crate::pipeline::{DetectJob, Stage, follow::FollowOrigin, mosaic::Grid, pass::Pass};
+use crate::pipeline::{DetectJob, Stage, follow::FollowOrigin, pass::Pass};
 
 impl Engine {
     /// Queues crops around followed persons, unless the frame must be searched.
@@ -44,21 +44,17 @@ impl Engine {
         let side = model.input().width.min(model.input().height);
         let (width, height) = (frame.width(), frame.height());
         let fill = observation.tuning.crop_fill;
-        let tiles = |grid: Grid| {
+        let tiles = |per_side: u32| {
             // Persons in tiles fill the same share, so that they are smaller with more tiles.
-            let fill = fill * f64::from(Grid::Two.per_side());
-            place_crops(&targets, targets.len(), fill, side / grid.per_side())
+            let fill = fill * f64::from(per_side.min(2));
+            place_crops(&targets, targets.len(), fill, side / per_side)
         };
         let crops = self.remappers.install(|| {
-            if targets.len() == 1 {
-                let crops = place_crops(&targets, 1, fill, side);
-                return rig.with_crops(&crops, width, height);
+            let mut crops = tiles(if targets.len() == 1 { 1 } else { 2 });
+            if crops.len() > 4 {
+                crops = tiles(3);
             }
-            let (mut grid, mut crops) = (Grid::Two, tiles(Grid::Two));
-            if crops.len() > grid.tiles() {
-                (grid, crops) = (Grid::Three, tiles(Grid::Three));
-            }
-            rig.with_mosaics(grid, &crops, width, height)
+            rig.with_crops(side, &crops, width, height)
         });
         if crops.view_count() == 0 {
             return FirstPass::Nothing;

@@ -107,7 +107,7 @@ impl Observation {
         self.passes.push(Pass {
             rig: Arc::clone(&task.rig),
             model: Arc::clone(&task.model),
-            per_view: output.per_view,
+            per_view: task.rig.per_view(output.per_view),
         });
         self.batch_count += cost.runs;
         self.unchanged_views += cost.still_views;

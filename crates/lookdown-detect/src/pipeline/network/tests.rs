@@ -52,6 +52,7 @@ struct Bench {
     rig: Arc<CameraRig>,
     begins: Receiver<(usize, f32)>,
     go: SyncSender<()>,
+    metrics: Arc<DetectMetrics>,
 }
 
 /// `sessions` inference threads with four views per frame.
@@ -87,13 +88,14 @@ fn bench(sessions: usize, max_views: usize, max_delay: Duration) -> Bench {
         max_delay,
     };
     let sessions = NonZeroUsize::new(sessions).unwrap();
+    let (remappers, metrics) = (Arc::new(remappers.unwrap()), Arc::default());
     Bench {
-        inference: InferenceThreads::start(sessions, options, &Arc::new(remappers.unwrap()))
-            .unwrap(),
+        inference: InferenceThreads::start(sessions, options, &remappers, &metrics).unwrap(),
         model: Arc::new(Model::from_boxed(first, gated)),
         rig: Arc::new(rig),
         begins,
         go,
+        metrics,
     }
 }
 
@@ -116,6 +118,19 @@ impl Bench {
             self.go.send(()).unwrap();
         }
     }
+}
+
+#[test]
+fn histograms_have_the_size_and_the_wait_of_batches() {
+    let bench = bench(1, 3, Duration::ZERO);
+    bench.let_go(2);
+    bench.submit(1, Ticket::default()).wait().unwrap();
+    let no_labels: [&str; 0] = [];
+    let [size, wait] = [&bench.metrics.batch_size, &bench.metrics.batch_wait]
+        .map(|all| all.with_label_values(&no_labels));
+    assert_eq!((size.get_sample_count(), size.get_sample_sum()), (2, 4.0));
+    assert_eq!(wait.get_sample_count(), 2);
+    assert!(wait.get_sample_sum() > 0.0);
 }
 
 #[test]
