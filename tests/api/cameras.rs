@@ -184,9 +184,9 @@ async fn the_counts_follow_an_own_camera_without_reports() {
     companions
         .own_cameras()
         .set([("hall".to_owned(), true)].into());
-    let (sender, mut asked) = mpsc::unbounded_channel();
+    let (sender, mut asked) = mpsc::channel(9);
     let counts = Router::new().fallback(move |uri: Uri| {
-        drop(sender.send(uri.to_string()));
+        drop(sender.try_send(uri.to_string()));
         async {}
     });
     companions.set_counts(counts, |_| None);

@@ -7,7 +7,7 @@
 //! * **Bar.** Jackknife+ (Barber et al., "Predictive inference with the jackknife+", 2021), with
 //!   errors in units of the square root of the number. Frames close in time are left out together.
 //!
-//! `cargo run -p lookdown-tracking --example taught -- DATA` measures both.
+//! `cargo run -p lookdown-simulate --bin taught < SEQUENCES` measures both.
 
 /// Candidates with a lower score are not needed: with the lowest thresholds, most boxes are none.
 pub const LEAST_SCORE: f64 = 0.02;

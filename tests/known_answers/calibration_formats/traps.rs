@@ -289,6 +289,7 @@ fn a_file_without_a_calibration_is_refused_in_a_sentence() {
     assert_refused(doctype, "not a calibration file: ");
 }
 
+#[expect(clippy::too_many_lines, reason = "a table")]
 #[test]
 fn files_of_other_kinds_are_named_with_the_one_to_take() {
     let text = |text: &str| text.as_bytes().to_vec();

@@ -66,12 +66,11 @@ fn main() -> Result<(), Box<dyn Error>> {
                     .collect();
                 let taught = TaughtNumber::new(&drawn);
                 for frame in scored.iter().step_by(scored.len().div_ceil(SCORED)) {
-                    let found = match &taught {
-                        Some(taught) => taught.number(&frame.scores),
-                        None => {
-                            let boxes = frame.scores.iter().filter(|score| **score >= 0.3);
-                            NumberWithBar::untaught(boxes.count())
-                        }
+                    let found = if let Some(taught) = &taught {
+                        taught.number(&frame.scores)
+                    } else {
+                        let boxes = frame.scores.iter().filter(|score| **score >= 0.3);
+                        NumberWithBar::untaught(boxes.count())
                     };
                     sums.add(frame.persons, found);
                 }
