@@ -15,7 +15,7 @@ use std::{
 
 use jiff::Timestamp;
 use lookdown_common::ServerClient;
-use lookdown_count::{FloorAlert, Snapshot};
+use lookdown_count::Snapshot;
 use rumqttc::Publish;
 use serde_json::{Value, json};
 use tokio::{
@@ -35,7 +35,7 @@ use super::{
 };
 use crate::tls::TlsError;
 use event_entities::{announcements, config_topics, event_topic, image_topic};
-use events::{EventImage, events, request_images};
+use events::{EventImage, events, floor_alert, request_images};
 use number::{AVAILABILITY, Number, Owner};
 
 /// Most images of events that wait. Further ones are not requested.
@@ -399,15 +399,6 @@ impl<'a> Device<'a> {
             device.announcement(topics, number.component(), &entity, availability, config);
         self.retained.extend(announcement);
     }
-}
-
-/// Returns a floor alert as attributes and events have it.
-fn floor_alert(alert: &FloorAlert) -> Value {
-    let since = Timestamp::from_millisecond(alert.since_ms).ok();
-    json!({
-        "posture": alert.posture, "since": since.map(|time| time.to_string()), "zone": alert.zone,
-        "is_acknowledged": alert.is_acknowledged,
-    })
 }
 
 /// Returns the messages that turn the published state into the wanted one.

@@ -14,10 +14,11 @@ use crate::{
 
 const METHODS: [&str; 5] = ["GET", "POST", "PUT", "DELETE", "PATCH"];
 /// The values of the parameters in paths.
-const PARAMETERS: [(&str, &str); 9] = [
+const PARAMETERS: [(&str, &str); 10] = [
     ("{calibration}", "lobby"),
     ("{camera}", "lobby"),
     ("{id}", "lobby"),
+    ("{person}", "1"),
     ("{report}", "1"),
     ("{site}", "ground"),
     ("{thing}", "1"),

@@ -9,7 +9,7 @@ mod detect;
 #[test]
 fn the_example_in_rust_finds_the_persons_of_a_sample() {
     let office = include_bytes!("../../samples/office.jpg");
-    let server = Server::start("", &[NO_GRACE]);
+    let server = Server::start("unset LOOKDOWN__MODEL__PATH", &[NO_GRACE]);
     let persons = detect::persons(office, &server.address()).unwrap();
     assert!(persons.len() > 3, "{persons:?}");
     let refused = detect::persons(b"no image", &server.address()).unwrap_err();

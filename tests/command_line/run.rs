@@ -259,7 +259,8 @@ fn paused_and_removed_cameras_leave_results_and_metrics() {
     let metrics = running.ask("GET /metrics", "");
     assert!(metrics.contains(counted), "{metrics}");
     running.ask("PATCH /cameras/hall", r#"{"paused": true}"#);
-    let paused = r#""persons":null,"persons_source":"paused""#;
+    let paused =
+        r#""persons":null,"persons_low":null,"persons_high":null,"persons_source":"paused""#;
     running.until("/results", "", paused, || {});
     let metrics = running.ask("GET /metrics", "");
     assert!(!metrics.contains(counted), "{metrics}");
@@ -394,16 +395,21 @@ fn a_server_forwards_counts_with_the_key_of_the_other_host() {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let url = format!("http://{}", listener.local_addr().unwrap());
     let answering = move || {
-        let (mut connection, _) = listener.accept().unwrap();
-        let lines = BufReader::new(connection.try_clone().unwrap()).lines();
-        let head: Vec<_> = lines
-            .map(Result::unwrap)
-            .take_while(|line| !line.is_empty())
-            .collect();
-        let answer =
-            "HTTP/1.1 200 OK\r\ncontent-type: text/csv\r\ncontent-length: 5\r\n\r\na,b\r\n";
-        connection.write_all(answer.as_bytes()).unwrap();
-        head.join("\n")
+        loop {
+            let (mut connection, _) = listener.accept().unwrap();
+            let lines = BufReader::new(connection.try_clone().unwrap()).lines();
+            let head: Vec<_> = lines
+                .map(Result::unwrap)
+                .take_while(|line| !line.is_empty())
+                .collect();
+            let answer = "HTTP/1.1 200 OK\r\ncontent-type: text/csv\r\ncontent-length: 5\r\n\
+                connection: close\r\n\r\na,b\r\n";
+            connection.write_all(answer.as_bytes()).unwrap();
+            // The server asks for the numbers of persons, too.
+            if head[0].starts_with("GET /counts/hall") {
+                return head.join("\n");
+            }
+        }
     };
     let other = thread::Builder::new().name("other".to_owned());
     let other = other.spawn(answering).unwrap();

@@ -37,7 +37,7 @@ fn counts_of_each_version_are_continued() {
         let mut rows = csv.lines().skip(1);
         let row = rows.next().unwrap();
         assert!(
-            row.starts_with("2026-11-22T09:00:00Z,2026-11-22T09:01:00Z,5.8,0,5.724,6"),
+            row.starts_with("2026-11-22T09:00:00Z,2026-11-22T09:01:00Z,5.8,0,5.724,3.131,8.317,6"),
             "{row}"
         );
     }

@@ -47,6 +47,9 @@ class Counts(CountedCamera):
     """Examples that use counts."""
 
     def test_counts_are_a_table_and_the_queries_name_their_metrics(self) -> None:
+        settings = self.settings.read_text(encoding="utf-8")
+        settings = settings.replace("[counts]", "[counts]\nfloor_alert = true")
+        self.settings.write_text(settings, encoding="utf-8")
         with self.counting() as count:
             wait_until(lambda: count.get("/counts") is not None, "lookdown count answers")
             self.send_frames()

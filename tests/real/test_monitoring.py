@@ -156,7 +156,11 @@ class Monitoring(unittest.TestCase):
         """The metrics of `lookdown run` that has counted a frame of a camera."""
         frames = self.folder / "frames"
         frames.mkdir()
-        settings = {"COUNTS__PATH": self.folder / "counts.sqlite", "STATE__PATH": self.folder / "state"}
+        settings = {
+            "COUNTS__PATH": self.folder / "counts.sqlite",
+            "COUNTS__FLOOR_ALERT": "true",
+            "STATE__PATH": self.folder / "state",
+        }
         command = ["run", frames, "--calibration", "office", "--profile", "fast"]
         with lookdown(settings, calibrations=self.calibrations, command=command) as server:
             shutil.copy(SAMPLES / "office.jpg", frames)

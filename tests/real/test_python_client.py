@@ -27,7 +27,9 @@ class GeneratedClient(unittest.TestCase):
         config = self.folder / "config.yml"
         # As in docs/python-client.md. The hooks would format the generated code.
         config.write_text(
-            "content_type_overrides: {image/jpeg: application/octet-stream}\npost_hooks: []\n", encoding="utf-8"
+            "content_type_overrides: {image/jpeg: application/octet-stream, "
+            "multipart/x-mixed-replace: application/octet-stream}\npost_hooks: []\n",
+            encoding="utf-8",
         )
         command = ["generate", "--fail-on-warning", "--config", config, "--output-path", self.folder / "client"]
         document = ROOT / "openapi" / "openapi.json"

@@ -15,7 +15,6 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from harness.places import LOOKDOWN, ROOT
-from harness.places import WORK as LOGS
 from harness.processes import Server, free_ports, running
 from redis_server import RedisServer
 from state import PATIENCE_SECONDS, metric, wait_until
@@ -33,7 +32,7 @@ MOST_IMAGES = 2
 def replica(
     name: str, url: str, host: str = "127.0.0.1", inside: Sequence[str] = (), **settings: str
 ) -> Iterator[Server]:
-    """A server of that name with that Redis; its log is `{name}.log`.
+    """A server of that name with that Redis.
 
     `host` is its address, and the command `inside` starts a program on the host with that address.
     """
@@ -55,9 +54,9 @@ def replica(
         yield server
 
 
-def log_of(name: str) -> str:
-    """The log of a replica."""
-    return (LOGS / f"{name}.log").read_text(encoding="utf-8")
+def log_of(server: Server) -> str:
+    """What a replica has logged so far."""
+    return server.log.read_text(encoding="utf-8")
 
 
 def get(server: Server, path: str, **headers: str) -> Answer:
@@ -312,7 +311,7 @@ class Away(unittest.TestCase):
             stored = [row["report"]["request_id"] for row in get(server, "/results/hall/history").json()]
             self.assertEqual(len(set(stored)), len(stored))
             stream.close()
-        told = log_of("redis-left")
+            told = log_of(server)
         self.assertEqual(told.count("does not answer"), 2, told)
         self.assertEqual(told.count("answers again"), 2, told)
 
@@ -325,7 +324,7 @@ class Away(unittest.TestCase):
             self.assertEqual(get(server, "/results").status, 503)
             with redis:
                 wait_until(lambda: get(server, "/results/hall/latest").body == sent.body, "the report is the latest")
-                told = log_of("redis-unreachable")
+                told = log_of(server)
         self.assertEqual((told.count("does not answer"), told.count("answers again")), (1, 1), told)
 
     def test_the_last_reports_are_stored_before_the_server_ends(self) -> None:
@@ -346,22 +345,20 @@ class Secrets(unittest.TestCase):
             with replica("redis-password", redis.url) as server:
                 sent = detect(server, "hall").body
                 wait_until(lambda: get(server, "/results/hall/latest").body == sent, "the report is the latest")
-                ready = get(server, "/readyz").body
+                shown = log_of(server) + get(server, "/readyz").body.decode()
             wrong = redis.url.replace("right", "wrong")
             with replica("redis-unreachable-wrong", wrong) as server:
                 wait_until(
-                    lambda: (
-                        "WRONGPASS" in log_of("redis-unreachable-wrong")
-                        or "assword" in log_of("redis-unreachable-wrong")
-                    ),
+                    lambda: "WRONGPASS" in log_of(server) or "assword" in log_of(server),
                     "the wrong password is logged",
                 )
-                ready += get(server, "/readyz").body
+                shown += get(server, "/readyz").body.decode()
                 redis.ask("CONFIG", "SET", "requirepass", "s3cret-wrong")
                 redis.password = "s3cret-wrong"
                 sent = detect(server, "hall").body
                 wait_until(lambda: get(server, "/results/hall/latest").body == sent, "the report is the latest")
-        self.assertNotIn("s3cret", log_of("redis-password") + log_of("redis-unreachable-wrong") + ready.decode())
+                shown += log_of(server)
+        self.assertNotIn("s3cret", shown)
 
     @unittest.skipUnless(shutil.which("openssl"), "needs openssl")
     def test_redis_with_tls_is_supported(self) -> None:

@@ -43,7 +43,7 @@ const MAY_USE_CRATE: [(&str, &[&str]); 24] = [
             "clock_simulation",
             "follower",
             "geometry",
-            "hand_back",
+            "bars",
             "http_client",
             "inference",
             "lookdown-eval",

@@ -206,9 +206,12 @@ fn counts_need_the_scope_read_and_decisions_admin() {
     for (path, operation) in operations(&document) {
         let expected = match operation["operationId"].as_str() {
             _ if path == "/livez" => serde_json::json!([{}]),
-            Some("confirm_furniture" | "take_back_furniture" | "delete_camera_counts") => {
-                key("admin")
-            }
+            Some(
+                "confirm_furniture"
+                | "take_back_furniture"
+                | "delete_camera_counts"
+                | "acknowledge_floor_alert",
+            ) => key("admin"),
             _ => key("read"),
         };
         assert_eq!(operation["security"], expected, "{path}");

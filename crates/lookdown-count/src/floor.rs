@@ -6,7 +6,7 @@ use lookdown_tracking::{Track, TrackId};
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 
-use crate::definition::CameraDefinition;
+use crate::{definition::CameraDefinition, now::milliseconds};
 
 /// Most people of a camera.
 const MAX_PERSONS: usize = 64;
@@ -123,7 +123,7 @@ impl Floor {
             let [x, y] = track.center_px();
             let [own_x, own_y] = person.center_px;
             let is_near = (x - own_x).hypot(y - own_y) <= person.length_px / 2.0;
-            let began_ms = crate::scene_camera::milliseconds(track.first_seen_s());
+            let began_ms = milliseconds(track.first_seen_s());
             !is_seen && is_near && began_ms > person.since_ms
         };
         let mut persons = self.persons.iter();

@@ -23,6 +23,13 @@ impl Now {
     }
 }
 
+/// Returns the milliseconds of a time in seconds.
+pub(crate) fn milliseconds(seconds: f64) -> i64 {
+    #[expect(clippy::cast_possible_truncation, reason = "times of reports")]
+    let milliseconds = (seconds * 1000.0).round() as i64;
+    milliseconds
+}
+
 /// Returns the time of milliseconds since the Unix epoch, or the nearest one that can be written.
 pub(crate) fn time_of(milliseconds: i64) -> Timestamp {
     let nearest = if milliseconds < 0 {

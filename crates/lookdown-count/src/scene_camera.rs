@@ -18,7 +18,7 @@ use crate::{
     definition_key::DefinitionKey,
     floor::Floor,
     frame_rate::FrameRate,
-    now::{LogPause, Now},
+    now::{LogPause, Now, milliseconds},
     presence::Presence,
     report::ReportKey,
     report_time::ReportTime,
@@ -281,10 +281,4 @@ fn zone_counter(definition: &CameraDefinition, state: ZoneState) -> ZoneCounter 
         tracing::warn!("the zones of {:?} are not counted: {error}", definition.key);
         ZoneCounter::default()
     })
-}
-
-pub(crate) fn milliseconds(seconds: f64) -> i64 {
-    #[expect(clippy::cast_possible_truncation, reason = "times of reports")]
-    let milliseconds = (seconds * 1000.0).round() as i64;
-    milliseconds
 }

@@ -296,6 +296,8 @@ async fn tracks_are_current_and_anonymous() {
             "frame_px",
             "id",
             "last_seen",
+            "posture",
+            "posture_probability",
             "tail",
             "tail_px",
             "velocity_m_s",

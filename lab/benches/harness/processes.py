@@ -123,7 +123,7 @@ def running(
             yield Server(address, process, time.monotonic() - started, log)
         finally:
             _stop(process)
-    log.unlink()
+    log.unlink(missing_ok=True)
 
 
 def _wait(process: subprocess.Popen, url: str, name: str, log: Path, seconds: float = 90.0) -> None:

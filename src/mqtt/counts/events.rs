@@ -5,11 +5,9 @@ use std::{collections::HashMap, time::Duration};
 
 use jiff::Timestamp;
 use lookdown_common::ServerClient;
-use lookdown_count::{CameraSnapshot, Snapshot, latest_image};
+use lookdown_count::{CameraSnapshot, FloorAlert, Snapshot, latest_image};
 use serde_json::{Value, json};
 use tokio::{sync::mpsc, time::Instant};
-
-use super::floor_alert;
 
 /// The type of a crossing of a line.
 const CROSSING: &str = "crossing";
@@ -76,6 +74,15 @@ fn occupancy(before: &CameraSnapshot, now: &CameraSnapshot, events: &mut Vec<Eve
             events.push(event(now, OCCUPANCY_REACHED, &parts));
         }
     }
+}
+
+/// Returns a floor alert as attributes and events have it.
+pub(super) fn floor_alert(alert: &FloorAlert) -> Value {
+    let since = Timestamp::from_millisecond(alert.since_ms).ok();
+    json!({
+        "posture": alert.posture, "since": since.map(|time| time.to_string()), "zone": alert.zone,
+        "is_acknowledged": alert.is_acknowledged,
+    })
 }
 
 fn floor_alerts(before: &CameraSnapshot, now: &CameraSnapshot, events: &mut Vec<Event>) {

@@ -189,11 +189,9 @@ fn furniture_is_forgotten_with_frames_of_another_size() {
         larger.image.height = 2000;
         hall.definition = definition(&larger, mount);
         hall.follow(10, Duration::from_secs(1));
-        assert_eq!(
-            (hall.states(), hall.persons()),
-            (vec![], Some(1)),
-            "{mount}"
-        );
+        // Its track may go on, and then it is a candidate.
+        let is_remembered = hall.states().contains(&ThingState::Remembered);
+        assert_eq!((is_remembered, hall.persons()), (false, Some(1)), "{mount}");
     }
 }
 
