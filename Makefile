@@ -53,8 +53,9 @@ test: ## set up, then check formatting, lints, tests and documentation; needs on
 	@# cargo fmt does not find modules that a macro declares.
 	rustfmt --check --edition 2024 crates/lookdown-lens/src/geometry/lens/models/*.rs
 	cargo clippy --workspace --all-targets --locked -- -D warnings
-	@# Checks that the lock file of the fuzzers is current.
+	@# Workspaces of their own: the lock file of the fuzzers, the bench of the tracker.
 	cargo tree --quiet --locked --manifest-path lab/fuzz/Cargo.toml > /dev/null
+	cargo clippy --locked --manifest-path lab/benches/walks/Cargo.toml --target-dir target -- -D warnings
 	$(CARGO_DENY) bans licenses sources
 	PATH="$(CURDIR)/$(CHECKERS):$$PATH" cargo shear --deny-warnings
 	$(CHECKERS)/ruff check

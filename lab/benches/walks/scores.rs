@@ -187,9 +187,10 @@ impl Sums {
             let weight = |row: usize, column: usize| {
                 let overlap = similarity[row][column];
                 let continues = before.get(&a[row]) == Some(&b[column]);
-                match overlap >= THRESHOLD - f64::EPSILON {
-                    true => overlap + if continues { 1000.0 } else { 0.0 },
-                    false => 0.0,
+                if overlap >= THRESHOLD - f64::EPSILON {
+                    overlap + if continues { 1000.0 } else { 0.0 }
+                } else {
+                    0.0
                 }
             };
             let mut now = BTreeMap::new();

@@ -101,6 +101,7 @@ impl View {
             foot_px: foot.into(),
             score,
             is_in_margin: false,
+            angles: None,
         })
     }
 }
