@@ -2,7 +2,7 @@
 
 Each test starts the binary of the profile that the variable `PROFILE` names (default: release) and the other software,
 uses them like a user, and stops them. Exits with 1 if a test fails. All parts are run by default. Most parts wait most of the time, so
-several parts run at the same time, each in its own process; those of `ALONE` measure times and run after them.
+several parts run at the same time, each in its own process; those of `ALONE` run after them.
 """
 
 import concurrent.futures
@@ -15,8 +15,8 @@ import unittest
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-ALONE = ("walks", "number", "page", "count", "camera_hashing")
-"""Parts whose frames must be on time."""
+ALONE = ("walks", "number", "page", "count", "camera_hashing", "deb")
+"""Parts whose frames must be on time, and one that packs the files of the image."""
 for folder in (HERE, HERE.parent / "reliability", HERE.parents[1] / "lab/benches"):
     sys.path.insert(0, str(folder))
 
