@@ -6,7 +6,7 @@ use super::{Frame, buffer_pool::zeros};
 /// Most mean difference between the color channels of a frame without color, levels. The least of
 /// a colored frame in both development sets is 8.7.
 const MAX_COLOR_LEVELS: u64 = 3;
-/// Distance of the rows and columns that are read to find color, pixels.
+/// Distance of the rows and columns that are read to find color, pixels. Of rows for noise, too.
 const COLOR_STEP: usize = 16;
 /// Pixels up to this level are surround, masks or unlit, and count for no mean.
 const DARK_LEVEL: u8 = 8;
@@ -20,10 +20,15 @@ const CELLS: u32 = 64;
 const SIGMA_CELLS: f32 = 8.0;
 /// Least share of lit pixels around a cell for a local mean.
 const MIN_LIT_SHARE: f32 = 0.05;
-/// A Gaussian of .8 pixels against the noise of the sensor, in 256ths.
+/// A Gaussian of .8 pixels against the noise of the sensor, sum 256.
 const BLUR: [u32; 5] = [6, 58, 128, 58, 6];
+/// The kernel for frames without noise, which lose by a blur.
+const NO_BLUR: [u32; 5] = [0, 0, 256, 0, 0];
+/// Least median of the second differences of neighbors in a noisy frame, levels. Infrared-like
+/// copies of the development sets have 8 and more. Other gray copies have 4 and less, but for one.
+const MIN_NOISE_LEVELS: u16 = 6;
 
-/// Returns the frame in even light and with less noise, or `None` for a frame with color, which
+/// Returns the frame in even light, and with less noise if it is noisy, or `None` for a frame with color, which
 /// stays as it is.
 #[must_use]
 pub fn with_even_light(frame: &Frame) -> Option<Frame> {
@@ -64,6 +69,11 @@ fn evened(frame: &Frame) -> Frame {
     let across = width.div_ceil(cell);
     let gains = gains(&gray, width, cell);
     let last = gains.len() / across - 1;
+    let blur = if is_noisy(&gray, width) {
+        BLUR
+    } else {
+        NO_BLUR
+    };
     // The two nearest cells of a row or column, and the weight of the second.
     let nearest = |at: usize, last: usize| {
         let position = ((at as f32 + 0.5) / cell as f32 - 0.5).clamp(0.0, last as f32);
@@ -76,7 +86,7 @@ fn evened(frame: &Frame) -> Frame {
     let mut row_gains = vec![0.0; across];
     for (y, line) in pixels.chunks_exact_mut(3 * width).enumerate() {
         sums.fill(0);
-        for (weight, offset) in BLUR.iter().zip(0..) {
+        for (weight, offset) in blur.iter().zip(0..) {
             let row = (y + offset).saturating_sub(BLUR.len() / 2).min(height - 1) * width;
             for (sum, level) in sums[BLUR.len() / 2..]
                 .iter_mut()
@@ -98,7 +108,7 @@ fn evened(frame: &Frame) -> Frame {
         for (pixel, (sums, (left, right, share))) in line.chunks_exact_mut(3).zip(levels) {
             let sum: u32 = sums
                 .iter()
-                .zip(BLUR)
+                .zip(blur)
                 .map(|(sum, weight)| sum * weight)
                 .sum();
             let gain = row_gains[*left] + (row_gains[*right] - row_gains[*left]) * share;
@@ -107,6 +117,19 @@ fn evened(frame: &Frame) -> Frame {
     }
     // The length of the buffer matches the size.
     Frame::new(frame.width(), frame.height(), pixels).unwrap_or_else(|_| frame.clone())
+}
+
+/// Returns true if neighbors in half of the lit places differ by noise.
+fn is_noisy(gray: &[u8], width: usize) -> bool {
+    let (mut noisy, mut lit) = (0, 0);
+    for row in gray.chunks_exact(width).step_by(COLOR_STEP) {
+        for levels in row.windows(3).filter(|levels| levels[1] > DARK_LEVEL) {
+            let [left, middle, right] = [0, 1, 2].map(|at| u16::from(levels[at]));
+            noisy += usize::from((left + right).abs_diff(2 * middle) >= MIN_NOISE_LEVELS);
+            lit += 1;
+        }
+    }
+    2 * noisy > lit
 }
 
 /// Returns the factor of each cell of `cell` pixels, row by row.
