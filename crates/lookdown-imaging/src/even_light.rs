@@ -28,8 +28,8 @@ const NO_BLUR: [u32; 5] = [0, 0, 256, 0, 0];
 /// copies of the development sets have 8 and more. Other gray copies have 4 and less, but for one.
 const MIN_NOISE_LEVELS: u16 = 6;
 
-/// Returns the frame in even light, and with less noise if it is noisy, or `None` for a frame with color, which
-/// stays as it is.
+/// Returns the frame in even light, and with less noise if it is noisy. Returns `None` for a frame
+/// with color, which stays as it is.
 #[must_use]
 pub fn with_even_light(frame: &Frame) -> Option<Frame> {
     (!has_color(frame)).then(|| evened(frame))
