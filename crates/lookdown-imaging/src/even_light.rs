@@ -17,7 +17,7 @@ const EVENNESS: f32 = 0.7;
 const CELLS: u32 = 64;
 /// Standard deviation of the Gaussian of the local means, in cells: an eighth of the longer side,
 /// several people wide.
-const SIGMA_CELLS: f32 = 8.0;
+const SIGMA_CELLS: u8 = 8;
 /// Least share of lit pixels around a cell for a local mean.
 const MIN_LIT_SHARE: f32 = 0.05;
 /// A Gaussian of .8 pixels against the noise of the sensor, sum 256.
@@ -169,9 +169,9 @@ fn gains(gray: &[u8], width: usize, cell: usize) -> Vec<f32> {
 /// Returns the values with a Gaussian along each row, columns as rows.
 #[expect(clippy::cast_precision_loss, reason = "a few cells")]
 fn blurred_and_turned(values: &[f32], across: usize) -> Vec<f32> {
-    let radius = 3 * SIGMA_CELLS as usize;
+    let radius = 3 * usize::from(SIGMA_CELLS);
     let weights: Vec<f32> = (0..=2 * radius)
-        .map(|at| (-0.5 * ((at as f32 - radius as f32) / SIGMA_CELLS).powi(2)).exp())
+        .map(|at| (-0.5 * ((at as f32 - radius as f32) / f32::from(SIGMA_CELLS)).powi(2)).exp())
         .collect();
     let mut turned = Vec::with_capacity(values.len());
     for x in 0..across {
