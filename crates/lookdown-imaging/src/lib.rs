@@ -6,6 +6,7 @@ mod buffer_pool;
 mod cell_motion;
 pub mod decode;
 pub mod edge_curves;
+mod even_light;
 pub mod frame;
 mod frame_signature;
 pub mod lens_circle;
@@ -18,6 +19,7 @@ mod thumbnail;
 mod view_signature;
 
 pub use cell_motion::{MovedCell, NEW_LEVELS, is_noise};
+pub use even_light::with_even_light;
 pub use frame::{Frame, FrameError};
 pub use frame_signature::FrameSignature;
 pub use letterbox::Letterbox;

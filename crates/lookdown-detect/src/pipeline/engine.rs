@@ -41,6 +41,7 @@ use crate::{
 use lookdown_imaging::{
     Frame,
     decode::{DecodeLimits, decode},
+    with_even_light,
 };
 
 /// The smallest frame side that can hold a lens image, pixels.
@@ -259,6 +260,7 @@ impl Engine {
         if !camera.rig.has_no_masks() {
             camera.rig.blank(Arc::make_mut(&mut frame));
         }
+        let even = with_even_light(&frame).map(Arc::new);
         let mut observation = Observation {
             profile: job.parameters.profile,
             tuning: job.parameters.profile.tuning(),
@@ -269,6 +271,7 @@ impl Engine {
             batch_count: 0,
             non_finite: 0,
             timeline: timeline.clone(),
+            network_frame: even.unwrap_or_else(|| Arc::clone(&frame)),
             frame,
             camera,
             model,
@@ -292,7 +295,7 @@ impl Engine {
         let first = self.inference.queue_pass(
             Arc::clone(&observation.camera.rig),
             Arc::clone(&observation.model),
-            Arc::clone(&observation.frame),
+            Arc::clone(&observation.network_frame),
             job.ticket.clone(),
             self.cached_views(job, &observation),
         );

@@ -24,8 +24,10 @@ impl Engine {
             parameters.motion,
         );
         let at = parameters.captured_at.unwrap_or(job.received_at);
-        let frame = Arc::clone(&observation.frame);
-        let follow = self.follow_cache.compare(camera, origin, &frame, at);
+        let frame = Arc::clone(&observation.network_frame);
+        let follow = self
+            .follow_cache
+            .compare(camera, origin, &observation.frame, at);
         let targets = follow.targets(&rig);
         observation.follow = Some(follow);
         let Some(targets) = targets else {

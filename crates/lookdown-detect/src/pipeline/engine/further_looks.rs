@@ -44,7 +44,7 @@ impl Engine {
         cached_views: Option<Arc<CameraViews>>,
     ) -> Arc<PassTask> {
         job.ticket.timeline.enter(Stage::Queue, Instant::now());
-        let frame = Arc::clone(&observation.frame);
+        let frame = Arc::clone(&observation.network_frame);
         let ticket = job.ticket.clone();
         self.inference
             .queue_pass(rig, model, frame, ticket, cached_views)

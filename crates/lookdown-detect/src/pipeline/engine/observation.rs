@@ -20,6 +20,8 @@ use lookdown_imaging::Frame;
 pub struct Observation {
     /// The decoded frame, EXIF orientation applied.
     pub frame: Arc<Frame>,
+    /// The frame that views and crops show: in even light if it has no color, else the same.
+    pub(super) network_frame: Arc<Frame>,
     pub(super) camera: FrameCamera,
     pub(super) model: Arc<Model>,
     pub(super) profile: Profile,
