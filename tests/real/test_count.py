@@ -147,7 +147,7 @@ class Counts(CountedCamera):
             tracks = wait_until(lambda: (count.get("/counts/office/tracks") or {}).get("tracks"), "there are tracks")
             self.assertLessEqual(abs(len(tracks) - persons), 2)
             self.assertEqual(
-                {"frame_px", "id", "first_seen", "last_seen", "tail", "tail_px"},
+                {"frame_px", "id", "first_seen", "last_seen", "posture", "posture_probability", "tail", "tail_px"},
                 set(tracks[0]) - {"floor_m", "velocity_m_s"},
             )
             wait_until(

@@ -37,7 +37,7 @@ pub const MAX_REPORT_BYTES: u64 = 8 << 20;
         },
         "bearing": {"azimuth_deg": 349.87, "off_axis_deg": 41.71},
         "floor": {"x_m": 1.873, "y_m": -0.334},
-        "height_m": 1.74, "height_sd_m": 0.21,
+        "height_m": 1.74, "height_sd_m": 0.21, "posture": "upright", "posture_probability": 0.97,
         "views": 3,
         "zones": ["entrance"]
     }],
