@@ -53,6 +53,10 @@ pub enum ViewKind {
 #[serde(deny_unknown_fields, default)]
 #[schema(example = json!({ "azimuth_deg": 90, "tilt_deg": 50, "field_of_view_deg": 80 }))]
 pub struct View {
+    /// The name, in lists; in a body it is ignored.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(example = "door")]
+    pub name: Option<String>,
     /// The kind.
     pub kind: ViewKind,
     /// Direction of the middle of the view, or of its first quarter: 0 toward image right,
@@ -60,11 +64,11 @@ pub struct View {
     pub azimuth_deg: f64,
     /// Angle of the axis from straight down, degrees; 45 by default, 50 for `quarters`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 0, maximum = 90, nullable = false)]
+    #[schema(minimum = 0, maximum = 90)]
     pub tilt_deg: Option<f64>,
     /// Horizontal field of view, degrees; 90 by default. `follow` adapts it to the person.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 10, maximum = 150, nullable = false)]
+    #[schema(minimum = 10, maximum = 150)]
     pub field_of_view_deg: Option<f64>,
     /// Width, pixels.
     #[schema(minimum = 64, maximum = 4096)]
@@ -77,6 +81,7 @@ pub struct View {
 impl Default for View {
     fn default() -> Self {
         Self {
+            name: None,
             kind: ViewKind::Fixed,
             azimuth_deg: 0.0,
             tilt_deg: None,

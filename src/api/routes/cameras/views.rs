@@ -19,10 +19,9 @@ use lookdown_common::text::Quoted;
 use lookdown_detect::parameters::{ParameterError, whole_number};
 use lookdown_http::entity_tags::{entity_tag, is_unmodified};
 use lookdown_watch::Viewing;
-use serde::Serialize;
 use serde_json::Value;
 use tokio::time::{timeout, timeout_at};
-use utoipa::{IntoParams, OpenApi, ToSchema};
+use utoipa::{IntoParams, OpenApi};
 
 use super::{CameraBody, refused};
 use crate::{
@@ -49,16 +48,6 @@ const BOUNDARY: &str = "frame";
 const QUALITY: u8 = 80;
 /// Longest wait of a request for the first frame of a camera.
 const FIRST_FRAME: Duration = Duration::from_secs(5);
-
-/// A view with its name.
-#[derive(Serialize, ToSchema)]
-pub(in crate::api) struct NamedView {
-    /// The name.
-    #[schema(example = "door")]
-    name: String,
-    #[serde(flatten)]
-    view: View,
-}
 
 /// The query parameters of an image of a view.
 #[derive(IntoParams)]
@@ -100,7 +89,7 @@ pub(in crate::api) struct ImageRoutes;
     get, path = "/cameras/{camera}/views", tag = "cameras", operation_id = "list_camera_views",
     params(("camera" = String, Path, description = "The name of the camera.", example = "hall")),
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
-    responses((status = OK, description = "By name.", body = Vec<NamedView>))
+    responses((status = OK, description = "By name.", body = Vec<View>))
 )]
 pub(in crate::api) async fn list(
     State(state): State<ApiState>,
@@ -108,7 +97,11 @@ pub(in crate::api) async fn list(
     Path(camera): Path<String>,
 ) -> impl IntoResponse {
     let views = state.options.views.list(&camera).into_iter();
-    let views: Vec<_> = views.map(|(name, view)| NamedView { name, view }).collect();
+    let named = |(name, view)| View {
+        name: Some(name),
+        ..view
+    };
+    let views: Vec<View> = views.map(named).collect();
     ([(CACHE_CONTROL, "no-store")], Json(views))
 }
 
@@ -171,8 +164,9 @@ pub(in crate::api) async fn put(
     _admin: RequireAdmin,
     deadline: Deadline,
     Path((camera, name)): Path<(String, String)>,
-    CameraBody(view): CameraBody<View>,
+    CameraBody(mut view): CameraBody<View>,
 ) -> Result<StatusCode, Problem> {
+    view.name = None;
     view.check()?;
     if let Some(live) = state.options.views.live(&camera) {
         live.check(&view)?;
