@@ -28,7 +28,8 @@ def prove(effort: Effort) -> list[Row]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name) / "calibrations"
         shutil.copytree(SAMPLES / "calibrations", folder)
-        with lookdown(TINY, calibrations=folder) as server:
+        settings = TINY | {"STATE__PATH": str(Path(name) / "state")}
+        with lookdown(settings, calibrations=folder) as server:
             code, said = _schemathesis(f"http://{server.address}/openapi.json", effort, Path(name))
             alive = server.process.poll() is None
     WORK.mkdir(parents=True, exist_ok=True)
