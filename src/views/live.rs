@@ -93,9 +93,8 @@ pub struct LiveFrame {
     number: u64,
     image: JobImage,
     scene: Arc<Scene>,
-    /// The people that are concealed, frame pixels.
-    concealed: Vec<Mark>,
-    concealment: Option<Concealment>,
+    /// How people are concealed, and where, frame pixels.
+    concealed: Option<(Concealment, Vec<Mark>)>,
     persons: Arc<Vec<OrientedBox>>,
     /// The axis of views that follow a person.
     followed: Option<Direction>,
@@ -181,45 +180,40 @@ impl LiveCamera {
         if fed_at.is_some_and(|at| at.elapsed() < FED) {
             return;
         }
-        let concealed = concealment.map(|_| marks_to_conceal(detected));
-        self.show(LiveFrame {
-            captured_at: report.captured_at.unwrap_or(report.received_at),
-            shown: Instant::now(),
-            number: self.count.fetch_add(1, Ordering::Relaxed),
-            image: copied(image),
-            scene,
-            concealed: concealed.unwrap_or_default(),
-            concealment,
-            persons,
-            followed: self.follower.lock().advance(),
-            decoded: OnceCell::new(),
-            rendered: Mutex::default(),
-        });
+        let concealed = concealment.map(|concealment| (concealment, marks_to_conceal(detected)));
+        let captured_at = report.captured_at.unwrap_or(report.received_at);
+        self.show(copied(image), captured_at, (scene, persons), concealed);
     }
 
     /// Shows a frame of the camera without a report of its own. Before the first report nothing is
     /// known about the camera, and the frame is dropped.
     pub(super) fn offer(&self, image: Bytes, captured_at: Timestamp) {
-        let Some((scene, persons)) = self.last.lock().clone() else {
+        let Some(last) = self.last.lock().clone() else {
             return;
         };
         *self.fed_at.lock() = Some(Instant::now());
-        self.show(LiveFrame {
+        self.show(JobImage::Encoded(image), captured_at, last, None);
+    }
+
+    fn show(
+        &self,
+        image: JobImage,
+        captured_at: Timestamp,
+        (scene, persons): LastReport,
+        concealed: Option<(Concealment, Vec<Mark>)>,
+    ) {
+        let frame = LiveFrame {
             captured_at,
             shown: Instant::now(),
             number: self.count.fetch_add(1, Ordering::Relaxed),
-            image: JobImage::Encoded(image),
+            image,
             scene,
-            concealed: Vec::new(),
-            concealment: None,
+            concealed,
             persons,
             followed: self.follower.lock().advance(),
             decoded: OnceCell::new(),
             rendered: Mutex::default(),
-        });
-    }
-
-    fn show(&self, frame: LiveFrame) {
+        };
         self.newest.send_replace(Some(Arc::new(frame)));
     }
 
@@ -356,10 +350,10 @@ impl LiveFrame {
         if !self.scene.masked.is_empty() {
             self.scene.masked.blank(Arc::make_mut(&mut frame));
         }
-        if let Some(concealment) = self.concealment {
+        if let Some((concealment, marks)) = &self.concealed {
             let frame = Arc::make_mut(&mut frame);
             // Never cancelled: each viewer waits for it.
-            let _ = conceal(frame, &self.concealed, concealment, &|| false);
+            let _ = conceal(frame, marks, *concealment, &|| false);
         }
         Ok(frame)
     }
