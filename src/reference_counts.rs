@@ -5,22 +5,21 @@
 
 use std::{
     collections::BTreeMap,
-    convert::identity,
-    fs,
-    io::{self, Write},
-    os::unix::fs::DirBuilderExt,
+    fs, io,
     path::{Path, PathBuf},
     sync::Arc,
 };
 
 use jiff::{SignedDuration, Timestamp};
 use lookdown_calibration::revision::revision_of;
-use lookdown_common::{Replacement, files};
+use lookdown_common::files;
 use lookdown_tracking::taught::{
     MAX_FRAMES, MIN_FRAMES, NumberWithBar, ReferenceFrame, TaughtNumber,
 };
 use parking_lot::{Mutex, RwLock};
 use serde::{Deserialize, Serialize};
+
+use crate::cameras::{CameraError, StateFolder};
 
 /// The folder of the files in the state folder.
 const FOLDER: &str = "reference-counts";
@@ -58,13 +57,8 @@ pub enum ReferenceError {
     #[error("{MAX_CAMERAS} cameras have reference counts: delete those of another camera first")]
     Full,
     /// The file cannot be written.
-    #[error("state.path: {}: {error}: make it writable for the server", path.display())]
-    Unwritable {
-        /// The file.
-        path: PathBuf,
-        /// The reason.
-        error: io::Error,
-    },
+    #[error(transparent)]
+    Unwritable(#[from] CameraError),
 }
 
 /// The reference counts of one camera, oldest first, and the number that they teach.
@@ -86,7 +80,7 @@ struct Content {
 #[derive(Debug, Default)]
 pub struct ReferenceCounts {
     /// `None`: nothing is stored.
-    folder: Option<PathBuf>,
+    folder: Option<StateFolder>,
     cameras: RwLock<BTreeMap<String, Taught>>,
     /// Locked while a file is changed.
     changing: Mutex<()>,
@@ -117,7 +111,7 @@ impl ReferenceCounts {
             }
         }
         Self {
-            folder: Some(folder),
+            folder: Some(StateFolder::new(state.to_owned())),
             cameras: RwLock::new(cameras),
             changing: Mutex::default(),
         }
@@ -209,30 +203,16 @@ impl ReferenceCounts {
         now: Timestamp,
     ) -> Result<(), ReferenceError> {
         if let Some(folder) = &self.folder {
-            let path = folder.join(format!("{}.json", revision_of(camera.as_bytes())));
-            let written = if counts.is_empty() {
-                fs::remove_file(&path)
+            let path = folder.file(&format!("{FOLDER}/{}.json", revision_of(camera.as_bytes())));
+            if counts.is_empty() {
+                StateFolder::remove(&path)?;
             } else {
                 let content = Content {
                     version: VERSION,
                     camera: camera.to_owned(),
                     counts: counts.clone(),
                 };
-                let json = serde_json::to_vec(&content).map_err(io::Error::from);
-                let folder = fs::DirBuilder::new()
-                    .recursive(true)
-                    .mode(0o700)
-                    .create(folder);
-                folder.and_then(|()| {
-                    let json = json?;
-                    Replacement::for_secret(&path).fill(identity, |file| file.write_all(&json))
-                })
-            };
-            match written {
-                Err(error) if error.kind() != io::ErrorKind::NotFound => {
-                    return Err(ReferenceError::Unwritable { path, error });
-                }
-                _ => {}
+                folder.write(&path, &serde_json::to_string(&content).unwrap_or_default())?;
             }
         }
         let mut cameras = self.cameras.write();

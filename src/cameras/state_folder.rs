@@ -16,6 +16,7 @@ use super::error::CameraError;
 const PASSWORDS: &str = "passwords";
 
 /// The state folder, which may be missing.
+#[derive(Debug)]
 pub(crate) struct StateFolder(PathBuf);
 
 impl StateFolder {
@@ -71,7 +72,7 @@ impl StateFolder {
         fs::DirBuilder::new()
             .recursive(true)
             .mode(0o700)
-            .create(self.0.join(PASSWORDS))
+            .create(path.parent().unwrap_or(&self.0))
             .map_err(unwritable)?;
         Replacement::for_secret(path).fill(unwritable, |file| {
             writeln!(file, "{content}").map_err(unwritable)
