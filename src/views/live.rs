@@ -93,7 +93,7 @@ pub struct LiveFrame {
     number: u64,
     image: JobImage,
     scene: Arc<Scene>,
-    /// How people are concealed, and where, frame pixels.
+    /// The concealment of people, and their places in frame pixels.
     concealed: Option<(Concealment, Vec<Mark>)>,
     persons: Arc<Vec<OrientedBox>>,
     /// The axis of views that follow a person.
