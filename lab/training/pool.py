@@ -14,7 +14,6 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-
 from samples import EmptyFrames, Frames, Mixed
 
 CHUNK = 100

@@ -14,13 +14,12 @@ import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 
+from cameras import Handler, empty_frame, http_camera, office_calibration, serving
 from harness.places import LOOKDOWN, ROOT, SAMPLES
 from harness.processes import free_ports
 from mosquitto import PASSWORD, USER, broker
 from state import metric, wait_until
 from support.lookdown import lookdown
-
-from cameras import Handler, empty_frame, http_camera, office_calibration, serving
 
 HERE = Path(__file__).resolve().parent
 VERIFIER = ROOT / ".setup" / "real" / "webhooks" / "bin" / "python"

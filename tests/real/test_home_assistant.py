@@ -11,13 +11,12 @@ import unittest
 from collections.abc import Iterator
 from pathlib import Path
 
+from cameras import empty_frame, http_camera, office_calibration
 from harness.places import ROOT, SAMPLES
 from mosquitto import PASSWORD, USER, Broker, broker
 from state import wait_until
 from support.lookdown import lookdown
 from test_count import CountedCamera
-
-from cameras import empty_frame, http_camera, office_calibration
 
 HERE = Path(__file__).resolve().parent
 PYTHON = ROOT / ".setup" / "real" / "home_assistant" / "bin" / "python"

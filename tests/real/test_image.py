@@ -13,13 +13,12 @@ import unittest
 from fnmatch import fnmatch
 from pathlib import Path
 
+from cameras import rtsp_camera
 from compose_file import environment, services
 from harness.places import LOOKDOWN, ROOT, SAMPLES
 from harness.processes import free_ports, running
 from image.build import build, remove
 from state import wait_until
-
-from cameras import rtsp_camera
 
 LARGEST_BYTES = {"serve": 80_000_000, "run": 380_000_000}
 """Without the binary, which takes 37 MB, and 65 MB with the profile `quick`."""

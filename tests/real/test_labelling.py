@@ -11,13 +11,12 @@ import unittest
 from pathlib import Path
 from urllib.request import Request, urlopen
 
+from cameras import Handler, serving
 from commands import run
 from harness.places import LOOKDOWN, ROOT, SAMPLES
 from harness.processes import free_ports
 from state import wait_until
 from support.lookdown import lookdown
-
-from cameras import Handler, serving
 
 HERE = Path(__file__).resolve().parent
 PYTHON = ROOT / ".setup" / "real" / "labelling" / "bin" / "python"

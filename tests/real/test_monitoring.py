@@ -9,14 +9,13 @@ import tempfile
 import unittest
 from pathlib import Path
 
+from cameras import office_calibration
 from commands import run
 from harness.places import LOOKDOWN, ROOT, SAMPLES, model
 from harness.processes import free_ports, running
 from kubernetes.tools import kustomized, manifests, only, read_yaml
 from state import wait_until
 from support.lookdown import lookdown
-
-from cameras import office_calibration
 
 MONITORING = ROOT / "k8s" / "monitoring"
 DASHBOARDS = ("dashboard.json", "occupancy.json", "counts.json")

@@ -8,13 +8,12 @@ import tempfile
 import unittest
 from pathlib import Path
 
+from cameras import office_calibration
 from commands import run
 from harness.places import SAMPLES
 from mosquitto import PASSWORD, PASSWORD_IN_URL, broker
 from state import metric, wait_until
 from support.lookdown import TINY, lookdown
-
-from cameras import office_calibration
 
 OFFICE = (SAMPLES / "office.jpg").read_bytes()
 DETECT = "/detect?calibration=office&profile=fast"

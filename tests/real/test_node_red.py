@@ -10,13 +10,12 @@ import unittest
 from collections.abc import Iterator
 from pathlib import Path
 
+from cameras import Handler, serving
 from commands import run
 from harness.places import ROOT, SAMPLES
 from harness.processes import free_ports
 from state import wait_until
 from support.lookdown import lookdown
-
-from cameras import Handler, serving
 
 HERE = Path(__file__).resolve().parent / "node_red"
 RECIPE = ROOT / "docs" / "examples" / "node-red.json"

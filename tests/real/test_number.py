@@ -18,13 +18,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 from statistics import mean, pstdev
 
+from cameras import rtsp_camera
 from harness.places import ROOT, model
 from harness.processes import Server, free_ports, running
 from state import wait_until
 from support.control_group import cpu_share
 from support.lookdown import lookdown
-
-from cameras import rtsp_camera
 
 HERE = Path(__file__).resolve().parent
 CAMERA = "hall"

@@ -17,14 +17,13 @@ import unittest
 from collections.abc import Iterator
 from pathlib import Path
 
+from cameras import Handler, serving
 from harness.processes import free_ports
 from rendered_room import rendered_room
 from support.exchange import ask
 from support.lookdown import lookdown
 from support.places import FIXTURES, ROOT, SAMPLES
 from test_count import Count
-
-from cameras import Handler, serving
 
 HERE = Path(__file__).resolve().parent / "page"
 KEY = "a key that only this test knows"

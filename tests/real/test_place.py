@@ -10,12 +10,11 @@ import unittest
 import urllib.error
 from pathlib import Path
 
+from cameras import http_camera
 from harness.places import LOOKDOWN
 from harness.processes import Server
 from state import wait_until
 from support.lookdown import lookdown
-
-from cameras import http_camera
 
 CLIP = Path(__file__).resolve().parent / "walks"
 CAMERAS = {"hall": "null", "lobby": "transpose=1"}

@@ -18,6 +18,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from cameras import rtsp_camera
 from harness.places import LOOKDOWN
 from harness.processes import Server, free_ports
 from harness.usage import usage_of
@@ -25,8 +26,6 @@ from state import wait_until
 from support.lookdown import lookdown
 from test_count import Count
 from test_watch import Watch
-
-from cameras import rtsp_camera
 
 CLIP = Path(__file__).resolve().parent / "walks"
 TRUTH = json.loads((CLIP / "truth.json").read_text(encoding="utf-8"))

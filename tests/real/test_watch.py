@@ -17,12 +17,11 @@ from datetime import datetime
 from pathlib import Path
 from statistics import median
 
+from cameras import CLOCK_BITS, PASSWORD, USER, http_camera, proxy, rtsp_camera, rtsp_clock, shown_milliseconds
 from harness.places import LOOKDOWN, SAMPLES
 from harness.processes import free_ports
 from state import wait_until
 from support.lookdown import TINY, lookdown
-
-from cameras import CLOCK_BITS, PASSWORD, USER, http_camera, proxy, rtsp_camera, rtsp_clock, shown_milliseconds
 
 SECONDS = float(os.environ.get("WATCH_SECONDS", "60"))
 """The duration of the test of faults."""

@@ -9,7 +9,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 from generator.boxes import axis_box
-
 from samples import EmptyFrames, Mixed, cut, frame_maps, kept, outward_angles, turned, view_rays
 
 LENS = {"model": "equidistant", "focal": 60.0, "cx": 99.5, "cy": 99.5, "max_theta": 1.5}
