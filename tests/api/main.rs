@@ -27,7 +27,6 @@ mod operation;
 mod peers;
 mod problems;
 mod rate_limit;
-mod readiness;
 mod reference_counts;
 mod refusals;
 mod remote;

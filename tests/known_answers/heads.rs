@@ -1,6 +1,11 @@
 //! Output heads against a reference implementation in another language
 //! (`tests/fixtures/heads/make_head_vectors.py`).
 
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::LazyLock,
+};
+
 use lookdown_detect::inference::heads::{Head, OutputShape, TensorView};
 use lookdown_imaging::NetworkInput;
 use serde::Deserialize;
@@ -31,16 +36,17 @@ struct Output {
     values: Vec<Option<f32>>,
 }
 
-fn load(name: &str) -> Fixture {
-    let path = format!(
-        "{}/tests/fixtures/heads/{name}.json",
-        env!("CARGO_MANIFEST_DIR")
+/// The cases by name.
+static FIXTURES: LazyLock<BTreeMap<String, Fixture>> = LazyLock::new(|| {
+    let path = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/tests/fixtures/heads/heads.json"
     );
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
-}
+});
 
 fn check(name: &str) {
-    let fixture = load(name);
+    let fixture = &FIXTURES[name];
     let values: Vec<Vec<f32>> = fixture
         .outputs
         .iter()
@@ -95,7 +101,10 @@ macro_rules! agree {
             check($name);
         })*
 
-        const ALL: &[&str] = &[$($name),*];
+        #[test]
+        fn every_case_is_tested() {
+            assert!(FIXTURES.keys().eq(&BTreeSet::from([$($name),*])));
+        }
     };
 }
 
@@ -146,10 +155,9 @@ fn check_declared(fixture: &Fixture, shapes: &[Vec<i64>]) -> Result<(), String> 
 
 #[test]
 fn every_head_accepts_its_model_with_an_open_batch_axis() {
-    for name in ALL {
-        let fixture = load(name);
+    for (name, fixture) in &*FIXTURES {
         assert_eq!(
-            check_declared(&fixture, &declared(&fixture)),
+            check_declared(fixture, &declared(fixture)),
             Ok(()),
             "{name}"
         );
@@ -158,12 +166,12 @@ fn every_head_accepts_its_model_with_an_open_batch_axis() {
 
 #[test]
 fn every_head_refuses_outputs_with_an_additional_axis() {
-    for name in ALL.iter().filter(|&&name| name != "end_to_end_seven") {
-        let fixture = load(name);
-        let mut shapes = declared(&fixture);
+    let fixtures = FIXTURES.iter();
+    for (name, fixture) in fixtures.filter(|(name, _)| *name != "end_to_end_seven") {
+        let mut shapes = declared(fixture);
         for shape in &mut shapes {
             shape.push(1);
         }
-        assert!(check_declared(&fixture, &shapes).is_err(), "{name}");
+        assert!(check_declared(fixture, &shapes).is_err(), "{name}");
     }
 }

@@ -15,7 +15,10 @@ use tokio::{
     time::{sleep_until, timeout},
 };
 
-use crate::{outcome::Outcome, pace::Pace, tally::Tally};
+use crate::{
+    pace::Pace,
+    tally::{Outcome, Tally},
+};
 
 /// The request and its server.
 pub struct Target {

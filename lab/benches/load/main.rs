@@ -9,7 +9,6 @@
 //! the number of requests.
 
 mod client;
-mod outcome;
 mod pace;
 mod tally;
 

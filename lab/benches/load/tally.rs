@@ -2,15 +2,24 @@
 
 use std::{collections::BTreeMap, ops::Range, time::Duration};
 
+use hyper::StatusCode;
 use serde_json::{Value, json};
 use tokio::time::Instant;
-
-use crate::outcome::Outcome;
 
 /// The relative resolution of latencies.
 const RESOLUTION: f64 = 0.005;
 /// The shortest latency with a class of its own, seconds.
 const SHORTEST: f64 = 1e-4;
+
+/// The outcome of a request.
+pub enum Outcome {
+    /// The complete response, with its number of bytes.
+    Answered(StatusCode, usize),
+    /// No connection, or a broken one.
+    Broken,
+    /// The response timed out.
+    TimedOut,
+}
 
 /// Counts the outcomes of the requests of a time span.
 pub struct Tally {
@@ -143,7 +152,6 @@ impl Latencies {
 
 #[cfg(test)]
 mod tests {
-    use hyper::StatusCode;
 
     use super::*;
 

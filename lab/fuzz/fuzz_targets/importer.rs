@@ -10,8 +10,8 @@ use std::sync::{
 };
 
 use libfuzzer_sys::{Corpus, fuzz_mutator, fuzz_target, fuzzer_mutate};
-use lookdown_fuzz::importer::{IMPORTERS, read};
 use lookdown_calibration::formats::Format;
+use lookdown_fuzz::importer::{IMPORTERS, read};
 
 /// The interval of prints of the count.
 const PRINT_EVERY: u64 = 1_000;

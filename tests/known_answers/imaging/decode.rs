@@ -83,11 +83,35 @@ fn every_color_format_decodes_to_the_same_image() {
 
 #[test]
 fn all_eight_exif_orientations_are_turned_upright() {
-    for orientation in 1..=8 {
-        let name = format!("orientation_{orientation}.jpg");
-        let image = decoded(&name);
-        assert_shows_the_quarters(&name, &image, 4);
-        assert_eq!(image.orientation_applied, orientation != 1, "{name}");
+    let upright = fixture("orientation_1.jpg");
+    let tag = [0x12, 0x01, 0x03, 0x00, 1, 0, 0, 0];
+    let tag_at = upright.windows(8).position(|window| window == tag).unwrap();
+    let [green, red, blue, white] = QUARTERS.map(|(_, color)| color);
+    // The upper left, upper right, lower left and lower right quarters.
+    for (orientation, quarters) in (1..).zip([
+        [red, green, blue, white],
+        [green, red, white, blue],
+        [white, blue, green, red],
+        [blue, white, red, green],
+        [red, blue, green, white],
+        [blue, red, white, green],
+        [white, green, blue, red],
+        [green, white, red, blue],
+    ]) {
+        let mut bytes = upright.clone();
+        bytes[tag_at + 8] = orientation;
+        let image = decode(&bytes, &DecodeLimits::default()).unwrap();
+        let (width, height) = (image.frame.width(), image.frame.height());
+        let is_turned = orientation > 4;
+        assert_eq!((width, height), if is_turned { (32, 64) } else { (64, 32) });
+        let [left, right] = [width / 4, width * 3 / 4];
+        let [top, bottom] = [height / 4, height * 3 / 4];
+        let centers = [(left, top), (right, top), (left, bottom), (right, bottom)];
+        for ((x, y), color) in centers.into_iter().zip(quarters) {
+            let name = format!("orientation {orientation}");
+            assert_close(&name, image.frame.pixel(x, y), color, 4);
+        }
+        assert_eq!(image.orientation_applied, orientation != 1);
     }
 }
 

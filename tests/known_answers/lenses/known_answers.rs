@@ -25,6 +25,7 @@ impl KnownAnswers {
     }
 }
 
+/// A file of `tests/fixtures/vectors`.
 pub fn fixture(name: &str) -> Value {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fixtures/vectors");
     serde_json::from_str(&std::fs::read_to_string(format!("{folder}/{name}.json")).unwrap())

@@ -4,43 +4,18 @@ use serde_json::{Value, json};
 
 use crate::lenses::known_answers::{KnownAnswers, fixture, items, numbers, pixel, ray};
 
-const FIXTURES: [&str; 22] = [
-    "ideal_equidistant",
-    "ideal_equisolid",
-    "ideal_stereographic",
-    "ideal_orthographic",
-    "ideal_rectilinear",
-    "kb_basalt",
-    "kb_nonmonotonic",
-    "kb_tumvi512",
-    "woodscape_fv",
-    "ucm_a",
-    "ucm_b",
-    "ucm_alpha_lt_half",
-    "eucm_a",
-    "eucm_b",
-    "mei_kalibr",
-    "mei_nodist",
-    "mei_xi_gt1",
-    "ds_basalt",
-    "ds_euroc",
-    "ocamcalib_1600",
-    "ftheta_forward",
-    "ftheta_backward",
-];
-
 pub fn all() -> Vec<KnownAnswers> {
-    FIXTURES.into_iter().map(read).collect()
+    let fixtures = fixture("lenses");
+    fixtures.as_object().unwrap().values().map(read).collect()
 }
 
-fn read(name: &str) -> KnownAnswers {
-    let fixture = fixture(name);
+fn read(fixture: &Value) -> KnownAnswers {
     let projections = items(&fixture["project"]).iter();
     let unprojections = items(&fixture["unproject"]).iter();
     let is_valid = |case: &Value| case["valid"].as_bool().unwrap();
     KnownAnswers {
-        name: name.to_owned(),
-        lens_fields: lens_fields(&fixture),
+        name: fixture["name"].as_str().unwrap().to_owned(),
+        lens_fields: lens_fields(fixture),
         image: serde_json::from_value(fixture["image_size"].clone()).unwrap(),
         projections: projections
             .map(|case| {
