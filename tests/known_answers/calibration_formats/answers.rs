@@ -1,4 +1,7 @@
 //! Files with the parameters of a camera in `fixtures/vectors` project to its known answers.
+//!
+//! OpenCV 5.0.0 and pycolmap 4.2.1 wrote the files of their formats. The other files are written by
+//! hand in the structure of each program.
 
 use lookdown_calibration::CalibrationFile;
 use lookdown_lens::geometry::Pixel;
@@ -7,7 +10,7 @@ use serde_json::Value;
 use crate::calibration_formats::{camera, fixture, json, lens, ray};
 
 /// File, index of the camera in it, format, known answers.
-const FILES: [(&str, usize, &str, &str); 45] = [
+const FILES: [(&str, usize, &str, &str); 47] = [
     ("opencv_fisheye.yml", 0, "OpenCV FileStorage", "kb_tumvi512"),
     (
         "opencv_fisheye_4x_header.yml",
@@ -86,6 +89,8 @@ const FILES: [(&str, usize, &str, &str); 45] = [
         "ocamcalib_1600",
     ),
     ("adapter_ds.yml", 0, "fisheye-calib-adapter", "ds_basalt"),
+    ("adapter_eucm.yml", 0, "fisheye-calib-adapter", "eucm_a"),
+    ("adapter_ucm.yml", 0, "fisheye-calib-adapter", "ucm_a"),
     ("adapter_kb4.yml", 0, "fisheye-calib-adapter", "kb_tumvi512"),
     (
         "intrinsic_model_eucm.json",
