@@ -1,6 +1,7 @@
 //! Line plots of figures, as SVG or PNG.
 
 mod draw;
+mod line_plot;
 mod precision_recall;
 
 use lookdown_imaging::{
@@ -12,38 +13,13 @@ use plotters::{
     drawing::{DrawingAreaErrorKind, IntoDrawingArea},
 };
 
+pub use line_plot::{Line, LinePlot};
 pub use precision_recall::precision_recall_plot;
 
 /// Most lines that can be distinguished in a plot.
 const MAX_LINES: usize = 64;
 /// Pixels of the PNG per unit of the SVG.
 const PNG_SCALE: u32 = 2;
-
-/// Lines over the unit square.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LinePlot {
-    /// The title above the plot.
-    pub title: String,
-    /// The label of the horizontal axis.
-    pub x_name: String,
-    /// The label of the vertical axis.
-    pub y_name: String,
-    /// The lines, in the order of the legend.
-    pub lines: Vec<Line>,
-}
-
-/// One line of the legend.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Line {
-    /// The text in the legend.
-    pub name: String,
-    /// `[x, y]`, 0 to 1 each.
-    pub points: Vec<[f64; 2]>,
-    /// A dashed line in the same color, without its own name.
-    pub dashed: Vec<[f64; 2]>,
-    /// True if the points have markers.
-    pub marked: bool,
-}
 
 /// The reason why a plot cannot be drawn.
 #[derive(Debug, thiserror::Error)]
