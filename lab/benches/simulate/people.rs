@@ -1,5 +1,5 @@
-//! Persons who walk through a hall, stop, sit, lean and stand behind things, with distance from each
-//! other.
+//! Persons who walk through a hall, stop, sit, lean and stand behind things, with distance from
+//! each other.
 
 use nalgebra::Vector2;
 
