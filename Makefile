@@ -18,7 +18,7 @@ PROFILE ?= release
 export PROFILE
 
 .NOTPARALLEL:
-.PHONY: help setup models serve test test-real reliability real real-parts audit advisories sbom dist deb image wheel arm64 bench bench-full bench-remap check release ci fuzz bless
+.PHONY: help setup models serve test test-real reliability real real-parts audit advisories sbom dist deb image wheel arm64 bench bench-full bench-number bench-remap check release ci fuzz bless
 
 help: ## list the targets
 	@echo "make TARGET, where TARGET is:"
@@ -142,6 +142,9 @@ bench bench-full:
 	@$(PYTHON) packaging/scripts/setup.py toolchain runtime benches
 	cargo build --profile $(PROFILE) --locked --package lookdown --package lookdown-load --target-dir target
 	.setup/benches/benches/bin/python lab/benches/run.py $(BENCH) $(PARTS)
+
+bench-number: ## measure the number of the page beside other work, an hour: docs/lab/count-accuracy.md
+	NUMBER_ROWS=all NUMBER_SECONDS=90 $(MAKE) real PARTS=number
 
 ci: ## run the continuous integration
 	.ci/run

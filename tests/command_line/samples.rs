@@ -95,32 +95,45 @@ fn the_office_persons_are_found_exactly_without_a_calibration() {
     assert_eq!(persons(&report).len(), expected.len());
 }
 
-/// `tests/fixtures/make_sample_persons.py` recorded the persons on a CPU with AVX2. Others sum in
-/// another order, with VNNI in 32 bits where AVX2 has 16, so scores and sides differ a little.
+/// `tests/fixtures/make_sample_persons.py` recorded the persons on CPUs with AVX2 and with AVX-512.
+/// Others sum in the order of one of them (docs/models.md), so all persons are as in one record.
 #[test]
 fn every_cpu_finds_the_recorded_persons() {
     let record: Value =
         serde_json::from_str(include_str!("../fixtures/sample_persons.json")).unwrap();
-    for row in record.as_array().unwrap() {
+    let rows = record.as_array().unwrap();
+    for row in rows.iter().filter(|row| row["processor"] == "AVX2") {
         let flags = row["flags"].as_array().unwrap();
         let flags: Vec<_> = flags.iter().map(|flag| flag.as_str().unwrap()).collect();
         let report = detect(row["sample"].as_str().unwrap(), &flags);
-        let mut found: Vec<_> = persons(&report).iter().collect();
-        let recorded = row["persons"].as_array().unwrap();
-        assert_eq!(found.len(), recorded.len(), "{row}");
-        for person in recorded {
-            let expected = [0, 1, 2, 3].map(|side| person["box"][side].as_f64().unwrap());
-            let size = (expected[2] - expected[0]).hypot(expected[3] - expected[1]);
-            let score = person["score"].as_f64().unwrap();
-            let is_same = |other: &&Value| {
-                let sides = corners(other).into_iter().zip(expected);
-                sides.fold(0.0, |most: f64, (a, b)| most.max((a - b).abs())) < 0.02 * size
-                    && (other["score"].as_f64().unwrap() - score).abs() < 0.03
-            };
-            let place = found.iter().position(is_same);
-            found.remove(place.unwrap_or_else(|| panic!("{person} is not in {report}")));
-        }
+        let same_input =
+            |other: &&Value| other["sample"] == row["sample"] && other["flags"] == row["flags"];
+        let is_recorded = rows
+            .iter()
+            .filter(same_input)
+            .any(|other| are_same(persons(&report), other["persons"].as_array().unwrap()));
+        assert!(is_recorded, "{row} is not {report}");
     }
+}
+
+/// True if each person has a recorded one with nearly the same sides and score, and none is left.
+fn are_same(found: &[Value], recorded: &[Value]) -> bool {
+    let mut left: Vec<_> = found.iter().collect();
+    for person in recorded {
+        let expected = [0, 1, 2, 3].map(|side| person["box"][side].as_f64().unwrap());
+        let size = (expected[2] - expected[0]).hypot(expected[3] - expected[1]);
+        let score = person["score"].as_f64().unwrap();
+        let is_same = |other: &&Value| {
+            let sides = corners(other).into_iter().zip(expected);
+            sides.fold(0.0, |most: f64, (a, b)| most.max((a - b).abs())) < 0.02 * size
+                && (other["score"].as_f64().unwrap() - score).abs() < 0.03
+        };
+        let Some(place) = left.iter().position(is_same) else {
+            return false;
+        };
+        left.remove(place);
+    }
+    left.is_empty()
 }
 
 #[test]

@@ -1,7 +1,7 @@
 """The number of people on the page of `lookdown run`, with the README's command and beside other work.
 
-`NUMBER_ROWS` names rows of `CONDITIONS`, with semicolons between (default: those of `CI_ROWS`), `NUMBER_SECONDS` is the time that is measured of each,
-and `NUMBER_SERIES` a file that gets the series. Rows with a slow search infer on another server, which waits before each answer.
+`NUMBER_ROWS` names rows of `CONDITIONS`, with semicolons between, or `all` (default: those of `CI_ROWS`), `NUMBER_SECONDS`
+is the time that is measured of each, and `NUMBER_SERIES` a file that gets the series. Rows with a slow search infer on another server, which waits before each answer.
 """
 
 import contextlib
@@ -50,6 +50,8 @@ class Condition:
     cameras: int = 1
     enters: bool = False
     """True for the clip in which people enter and leave."""
+    empty: bool = False
+    """True for those frames of it without people."""
     late_seconds: int = 3
     """The time in which a change must be shown."""
 
@@ -71,6 +73,9 @@ CONDITIONS = {
     "enters, busy 4": Condition(busy=4, enters=True),
     "enters, search 1.5 s": Condition(search_seconds=1.5, enters=True),
     "enters, search 4 s": Condition(search_seconds=4.0, enters=True, late_seconds=10),
+    "empty, idle": Condition(empty=True),
+    "empty, busy 4": Condition(busy=4, empty=True),
+    "empty, search 1.5 s": Condition(search_seconds=1.5, empty=True),
 }
 CI_ROWS = ("idle", "enters, search 1.5 s")
 LEAST_WITHIN_ONE = 0.9
@@ -135,12 +140,25 @@ class Number(unittest.TestCase):
         """The folder of the frames of a clip, and the true number of each."""
         folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
         clip = HERE / "walks" / "walks.mp4"
-        if condition.enters:
+        if condition.enters or condition.empty:
             command = [PYTHON, HERE / "entering_walkers.py", clip, folder]
-            return folder, json.loads(subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout)
+            true = json.loads(subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout)
+            return folder, self.empty_frames(folder, true) if condition.empty else true
         images = ["-q:v", "2", "-start_number", "0", folder / "%d.jpg"]
         subprocess.run(["ffmpeg", "-v", "error", "-i", clip, *images], check=True)
         return folder, [WALKERS] * len(list(folder.iterdir()))
+
+    def empty_frames(self, folder: Path, true: list[int]) -> list[int]:
+        """Leaves the frames without people alone in a folder, numbered anew."""
+        kept = 0
+        for number, persons in enumerate(true):
+            image = folder / f"{number}.jpg"
+            if persons:
+                image.unlink()
+            else:
+                image.rename(folder / f"{kept}.jpg")
+                kept += 1
+        return [0] * kept
 
     @contextlib.contextmanager
     def lookdown_run(self, condition: Condition, url: str) -> Iterator[Server]:
@@ -192,7 +210,8 @@ class Number(unittest.TestCase):
         rows = os.environ.get("NUMBER_ROWS")
         seen = {}
         print()
-        for name in rows.split(";") if rows else CI_ROWS:
+        names = CONDITIONS if rows == "all" else rows.split(";") if rows else CI_ROWS
+        for name in names:
             condition = CONDITIONS[name]
             frames, true = self.frames(condition)
             with self.subTest(name), rtsp_camera(frames, FRAMES_PER_SECOND) as port:

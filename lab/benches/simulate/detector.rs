@@ -14,6 +14,7 @@ use std::collections::HashMap;
 use crate::{
     chance::{Chance, Slow},
     figures::{Figures, SCORE_FLOOR},
+    people::Body,
 };
 
 /// Side of the frame, pixels.
@@ -110,27 +111,29 @@ impl Camera {
         Vector2::new(cos * away.x + sin * away.y, cos * away.y - sin * away.x)
     }
 
-    /// The oriented box around a standing person.
-    pub fn show(&self, id: u64, place: Vector2<f64>, height_m: f64) -> Option<Shown> {
+    /// The oriented box around the visible part of a person.
+    pub fn show(&self, id: u64, place: Vector2<f64>, body: Body) -> Option<Shown> {
         let camera_m = self.pose.height_m?;
         let pixel = |x: f64, y: f64, z: f64| {
             let shown = self.lens.project(&Ray::new(x, y, camera_m - z))?;
             Some(Pixel::new(shown.x + 0.5, shown.y + 0.5))
         };
-        let middle = pixel(place.x, place.y, height_m / 2.0)?;
+        let middle = pixel(place.x, place.y, (body.hidden_m + body.top_m) / 2.0)?;
         let up = vertical_in_frame(middle, &self.lens, &self.mount);
         let across = Vector2::new(-up.y, up.x);
         // A round body with narrower feet and head.
         let rings = [(0.0, 0.5), (0.4, 0.8), (0.8, 1.0), (0.95, 0.6), (1.0, 0.3)];
         let (mut low, mut high) = (Vector2::repeat(f64::MAX), Vector2::repeat(f64::MIN));
         for (share, radius) in rings {
+            let share = f64::max(share, body.hidden_m / body.top_m);
+            let center = place + body.lean_m * share;
             for step in 0..12 {
                 let (sin, cos) = (f64::from(step) * std::f64::consts::TAU / 12.0).sin_cos();
                 let radius = radius * BODY_RADIUS_M;
                 let point = pixel(
-                    place.x + radius * cos,
-                    place.y + radius * sin,
-                    share * height_m,
+                    center.x + radius * cos,
+                    center.y + radius * sin,
+                    share * body.top_m,
                 )?;
                 let along = Vector2::new((point - middle).dot(&across), (point - middle).dot(&up));
                 low = low.inf(&along);
@@ -222,7 +225,7 @@ impl Camera {
             let value =
                 FIXED_BETWEEN.sqrt() * fixed.lasting + (1.0 - FIXED_BETWEEN).sqrt() * changing;
             let place = fixed.place;
-            let shown = self.show(0, place, 1.7);
+            let shown = self.show(0, place, Body::standing(1.7));
             let shown = shown.filter(|shown| is_searched(&shown.oriented));
             found.extend(shown.map(|shown| Found {
                 oriented: shown.oriented,
@@ -239,7 +242,7 @@ impl Camera {
                 self.chance.uniform(-reach, reach),
                 self.chance.uniform(-reach, reach),
             );
-            if let Some(Shown { oriented, .. }) = self.show(0, place, 1.7) {
+            if let Some(Shown { oriented, .. }) = self.show(0, place, Body::standing(1.7)) {
                 let logit = background.logit_of(self.chance.normal());
                 found.push(Found { oriented, logit });
             }

@@ -1,4 +1,5 @@
-//! Persons who walk through a hall: waypoints, pauses, and distance from each other.
+//! Persons who walk through a hall, stop, sit, lean and stand behind things, with distance from
+//! each other.
 
 use nalgebra::Vector2;
 
@@ -20,6 +21,32 @@ const BODY_M: f64 = 0.5;
 const PAUSES: f64 = 0.3;
 const LONGEST_PAUSE_S: f64 = 8.0;
 
+/// Share of the stops at which a person sits, and the longest time of it in seconds.
+const SEATS: f64 = 0.4;
+const LONGEST_SEAT_S: f64 = 60.0;
+/// Height of a seated person as a share of the standing one (ISO 7250: 0.92 + 0.44 of 1.75 m).
+const SEATED_HEIGHT: f64 = 0.78;
+/// Share of the stops at which a table or a counter hides the legs.
+const HIDDEN_LEGS: f64 = 0.4;
+/// Heights of a table and of a counter, meters.
+const TABLE_M: f64 = 0.72;
+const COUNTER_M: f64 = 0.95;
+/// Distance of the head of a person who stops from above the feet, meters (standard deviation).
+const LEAN_M: f64 = 0.15;
+
+/// Time in which a person sits down, stands up or goes behind a table, seconds.
+const CHANGE_S: f64 = 1.5;
+
+/// The visible part of a person above a place of the floor.
+#[derive(Clone, Copy)]
+pub struct Body {
+    pub top_m: f64,
+    /// The height from which on the person is seen.
+    pub hidden_m: f64,
+    /// From above the place to the head.
+    pub lean_m: Vector2<f64>,
+}
+
 /// The walls of the hall, meters: half the extent along x and y.
 #[derive(Clone, Copy)]
 pub struct Hall(pub Vector2<f64>);
@@ -28,7 +55,10 @@ pub struct Hall(pub Vector2<f64>);
 pub struct Person {
     pub id: u64,
     pub place: Vector2<f64>,
-    pub height_m: f64,
+    height_m: f64,
+    /// The visible part while the person stops, and how far the body is on its way there.
+    rest: Body,
+    rest_share: f64,
     velocity: Vector2<f64>,
     speed: f64,
     waypoints: Vec<Vector2<f64>>,
@@ -62,10 +92,13 @@ impl People {
         let stops = 2 + chance.count(2.0);
         let mut waypoints = vec![self.hall.door(chance)];
         waypoints.extend((0..stops).map(|_| self.hall.inside(chance)));
+        let height_m = 1.7 + 0.1 * chance.normal();
         self.present.push(Person {
             id: self.next_id,
             place,
-            height_m: 1.7 + 0.1 * chance.normal(),
+            height_m,
+            rest: Body::standing(height_m),
+            rest_share: 0.0,
             velocity: Vector2::zeros(),
             speed: (1.2 + 0.25 * chance.normal()).clamp(0.5, 2.0),
             waypoints,
@@ -108,7 +141,45 @@ impl People {
     }
 }
 
+impl Body {
+    /// Returns a person who stands upright, and whom nothing hides.
+    pub fn standing(height_m: f64) -> Self {
+        Self {
+            top_m: height_m,
+            hidden_m: 0.0,
+            lean_m: Vector2::zeros(),
+        }
+    }
+}
+
 impl Person {
+    /// Returns the visible part of the person now.
+    pub fn body(&self) -> Body {
+        let share = self.rest_share;
+        Body {
+            top_m: self.height_m + share * (self.rest.top_m - self.height_m),
+            hidden_m: share * self.rest.hidden_m,
+            lean_m: share * self.rest.lean_m,
+        }
+    }
+
+    /// Begins a stop: standing or seated, with free or hidden legs, and with a lean.
+    fn stop(&mut self, chance: &mut Chance) {
+        let is_seated = chance.happens(SEATS);
+        let is_hidden = chance.happens(HIDDEN_LEGS);
+        let (top, furniture_m, longest_s) = if is_seated {
+            (SEATED_HEIGHT, TABLE_M, LONGEST_SEAT_S)
+        } else {
+            (1.0, COUNTER_M, LONGEST_PAUSE_S)
+        };
+        self.pause_s = chance.uniform(0.0, longest_s);
+        self.rest = Body {
+            top_m: top * self.height_m,
+            hidden_m: if is_hidden { furniture_m } else { 0.0 },
+            lean_m: Vector2::new(chance.normal(), chance.normal()) * LEAN_M,
+        };
+    }
+
     fn step(&mut self, places: &[Vector2<f64>], chance: &mut Chance) {
         let Some(&target) = self.waypoints.last() else {
             return;
@@ -117,11 +188,13 @@ impl Person {
         if way.norm() < 0.4 {
             self.waypoints.pop();
             if chance.happens(PAUSES) {
-                self.pause_s = chance.uniform(0.0, LONGEST_PAUSE_S);
+                self.stop(chance);
             }
             return;
         }
         self.pause_s -= STEP_S;
+        let change = STEP_S / CHANGE_S * if self.pause_s > CHANGE_S { 1.0 } else { -1.0 };
+        self.rest_share = (self.rest_share + change).clamp(0.0, 1.0);
         let wanted = if self.pause_s > 0.0 {
             Vector2::zeros()
         } else {

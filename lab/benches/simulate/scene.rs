@@ -263,8 +263,10 @@ impl Scene {
         let mut shown: Vec<Shown> = Vec::new();
         for person in &self.people.present {
             let place = camera.floor_of_site(person.place);
+            let mut body = person.body();
+            body.lean_m = camera.floor_of_site(person.place + body.lean_m) - place;
             let in_sight = (place.norm() <= SIGHT_M).then_some(());
-            let seen = in_sight.and_then(|()| camera.show(person.id, place, person.height_m));
+            let seen = in_sight.and_then(|()| camera.show(person.id, place, body));
             if let Some(seen) = seen {
                 truth.push(json!({"id": seen.id, "box": bounds(&seen.oriented)}));
                 shown.push(seen);
