@@ -1,7 +1,5 @@
 //! A place for one value, in which the newest value replaces the one before.
 
-use std::sync::Arc;
-
 use parking_lot::Mutex;
 use tokio::sync::Notify;
 
@@ -71,7 +69,7 @@ impl<T> Slot<T> {
 
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
+    use std::{sync::Arc, time::Duration};
 
     use super::*;
 
