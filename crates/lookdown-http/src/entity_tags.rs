@@ -51,9 +51,7 @@ pub fn named(
     if !headers.contains_key(header) {
         return Ok(None);
     }
-    let mut tags = Vec::new();
-    let mut any = false;
-    let mut is_empty = true;
+    let (mut tags, mut any, mut is_empty) = (Vec::new(), false, true);
     for value in headers.get_all(header) {
         // A comma may be part of a tag.
         let mut in_tag = false;

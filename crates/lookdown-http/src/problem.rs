@@ -1,7 +1,7 @@
 //! Failures as problem documents (RFC 9457): the document of all parts, and the failures that every
 //! listener has. The layer around the routes writes the document.
 
-use std::{collections::BTreeMap, time::SystemTime};
+use std::collections::BTreeMap;
 
 use axum::{
     Json,
@@ -192,7 +192,7 @@ impl Problem {
             status: self.kind.status().as_u16(),
             error: self.detail.clone(),
             detail: self.detail,
-            instance: new_id(SystemTime::now()).urn().to_string(),
+            instance: new_id().urn().to_string(),
             request_id: request_id.as_str().to_owned(),
             parameter: self.parameter,
             members: BTreeMap::new(),

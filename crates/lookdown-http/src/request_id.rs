@@ -7,7 +7,6 @@ use uuid::{NoContext, Timestamp, Uuid};
 
 /// The header of the ID, in requests and responses.
 pub const HEADER: HeaderName = HeaderName::from_static("x-request-id");
-const MAX_CHARS: usize = 128;
 
 /// Identifies a request in logs, reports and problems: 1 to 128 visible ASCII characters.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -18,10 +17,9 @@ impl RequestId {
     #[must_use]
     pub fn from_headers(headers: &HeaderMap) -> Self {
         let given = headers.get(HEADER).and_then(|value| value.to_str().ok());
-        let is_sane = |id: &&str| {
-            (1..=MAX_CHARS).contains(&id.len()) && id.chars().all(|c| c.is_ascii_graphic())
-        };
-        let new = || new_id(SystemTime::now()).to_string();
+        let is_sane =
+            |id: &&str| (1..=128).contains(&id.len()) && id.chars().all(|c| c.is_ascii_graphic());
+        let new = || new_id().to_string();
         Self(given.filter(is_sane).map_or_else(new, str::to_owned))
     }
 
@@ -41,7 +39,11 @@ impl RequestId {
 
 /// Returns a new ID that begins with the time, which is 1970 where the clock is before it.
 #[must_use]
-pub fn new_id(now: SystemTime) -> Uuid {
+pub fn new_id() -> Uuid {
+    id_at(SystemTime::now())
+}
+
+fn id_at(now: SystemTime) -> Uuid {
     let since = now.duration_since(UNIX_EPOCH).unwrap_or_default();
     let time = Timestamp::from_unix(NoContext, since.as_secs(), since.subsec_nanos());
     Uuid::new_v7(time)
@@ -70,7 +72,7 @@ mod tests {
     #[test]
     fn a_clock_before_1970_makes_ids() {
         let before = UNIX_EPOCH - std::time::Duration::from_hours(1);
-        assert_ne!(new_id(before), new_id(before));
+        assert_ne!(id_at(before), id_at(before));
     }
 
     #[test]

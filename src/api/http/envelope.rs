@@ -1,10 +1,6 @@
 //! The layer around every request: request ID, log line, metrics and problem documents.
 
-use std::{
-    any::Any,
-    sync::Arc,
-    time::{Instant, SystemTime},
-};
+use std::{any::Any, sync::Arc, time::Instant};
 
 use axum::{
     Json,
@@ -80,7 +76,7 @@ pub(in crate::api) async fn wrap(
     let _in_request = span.enter();
     let mut failure = None;
     if let Some(problem) = Problem::take_from(&mut response, method, &path) {
-        let (reason, occurrence) = (problem.kind().name(), new_id(SystemTime::now()));
+        let (reason, occurrence) = (problem.kind().name(), new_id());
         failure = Some(Failure { reason, occurrence });
         metrics.failures.with_label_values(&[reason]).inc();
         if let Some(cause) = problem.cause() {

@@ -1,7 +1,7 @@
 //! Sends reports from the outbox to Redis, one after the other. Each report is stored atomically
 //! and exactly once: after a lost answer, Redis recognizes the report by its number.
 
-use std::{sync::Arc, time::SystemTime};
+use std::sync::Arc;
 
 use jiff::Timestamp;
 use lookdown_common::text::one_line;
@@ -18,7 +18,7 @@ const RECORD: &str = concat!(include_str!("forget.lua"), include_str!("record.lu
 pub(super) async fn run(shared: Arc<Shared>) {
     let sender = Sender {
         script: Script::new(RECORD),
-        id: new_id(SystemTime::now()).into_bytes(),
+        id: new_id().into_bytes(),
         shared: &shared,
     };
     let mut last_was_refused = false;

@@ -25,9 +25,13 @@ pub(super) fn is_camera(text: &str) -> bool {
 }
 
 pub(super) fn read(text: &str) -> Result<Camera, FormatError> {
-    let (model, numbers, image) = parts(text).ok_or_else(super::unrecognized)?;
+    let (model, numbers, image) = parts(text).ok_or_else(incomplete)?;
     let lens = lens(model, &numbers, image)?;
     Ok(Camera::new(Some(image), lens))
+}
+
+fn incomplete() -> FormatError {
+    FormatError::malformed("its first two lines are not those of DSO: a model and the size")
 }
 
 /// The name of the model, its parameters and the size of the frames.
@@ -45,7 +49,7 @@ fn parts(text: &str) -> Option<(&str, Vec<f64>, NativeImage)> {
 
 fn lens(model: &str, numbers: &[f64], image: NativeImage) -> Result<LensModel, FormatError> {
     let &[fx, fy, cx, cy, ref distortion @ ..] = numbers else {
-        return Err(super::unrecognized());
+        return Err(incomplete());
     };
     let pinhole = if cx < 1.0 && cy < 1.0 {
         let (width, height) = (f64::from(image.width), f64::from(image.height));
