@@ -207,7 +207,8 @@ fn read_tree(format: Format, fields: &Fields<'_>) -> Result<Vec<FileCamera>, For
         Format::OpenSfm => opensfm::read(fields),
         Format::Matlab => alone(matlab::read(fields)),
         Format::AliceVision => alicevision::read(fields),
-        Format::Native | Format::OCamCalib | Format::MultiCol => Vec::new(),
-        Format::Colmap | Format::Dso => Vec::new(),
+        Format::Native | Format::OCamCalib | Format::MultiCol | Format::Colmap | Format::Dso => {
+            Vec::new()
+        }
     })
 }
