@@ -198,6 +198,7 @@ impl Cameras {
         password: Option<&Secret>,
     ) -> Result<bool, CameraError> {
         let _changing = self.changing.lock();
+        let _locked = self.folder.lock()?;
         let mut file = self.file()?;
         let before = file.cameras.get(name);
         if let (true, Some(before)) = (camera.url.is_empty(), before) {
@@ -248,6 +249,7 @@ impl Cameras {
     /// [`CameraError`].
     pub fn delete(&self, name: &str) -> Result<bool, CameraError> {
         let _changing = self.changing.lock();
+        let _locked = self.folder.lock()?;
         let mut file = self.file()?;
         if file.cameras.remove(name).is_none() && file.invalid.remove(name).is_none() {
             if self.configured.read().contains_key(name) {

@@ -3,7 +3,7 @@
 use std::{
     fs,
     io::{self, Write},
-    os::unix::fs::DirBuilderExt,
+    os::unix::fs::{DirBuilderExt, OpenOptionsExt},
     path::{Path, PathBuf},
 };
 
@@ -14,6 +14,8 @@ use super::error::CameraError;
 
 /// The folder of the passwords in the state folder.
 const PASSWORDS: &str = "passwords";
+/// The file that is locked during a change.
+const LOCK: &str = "lock";
 
 /// The state folder, which may be missing.
 #[derive(Debug)]
@@ -57,7 +59,11 @@ impl StateFolder {
 
     /// Returns the error of a file with another content.
     pub(crate) fn malformed(&self, name: &str, error: &serde_json::Error) -> ConfigError {
-        self.refused(name, &format!("is not a file of cameras: {error}"))
+        let line = error.line();
+        self.refused(
+            name,
+            &format!("is damaged at line {line}: restore it, or delete it"),
+        )
     }
 
     /// Returns the error of a file with this problem, the end of a sentence.
@@ -66,14 +72,22 @@ impl StateFolder {
         ConfigError::problem("state.path", &problem)
     }
 
+    /// Locks the folder for a change, against other processes. The lock ends with the file.
+    pub(crate) fn lock(&self) -> Result<fs::File, CameraError> {
+        let path = self.file(LOCK);
+        let unwritable = |error| CameraError::Folder(path.clone(), error);
+        create(&self.0).map_err(unwritable)?;
+        let mut options = fs::OpenOptions::new();
+        options.append(true).create(true).mode(0o600);
+        let file = options.open(&path).map_err(unwritable)?;
+        file.lock().map_err(unwritable)?;
+        Ok(file)
+    }
+
     /// Writes a file that only this user can read, in one step.
     pub(crate) fn write(&self, path: &Path, content: &str) -> Result<(), CameraError> {
         let unwritable = |error| CameraError::Folder(path.to_owned(), error);
-        fs::DirBuilder::new()
-            .recursive(true)
-            .mode(0o700)
-            .create(path.parent().unwrap_or(&self.0))
-            .map_err(unwritable)?;
+        create(path.parent().unwrap_or(&self.0)).map_err(unwritable)?;
         Replacement::for_secret(path).fill(unwritable, |file| {
             writeln!(file, "{content}").map_err(unwritable)
         })
@@ -88,6 +102,12 @@ impl StateFolder {
     pub(crate) fn rename(from: &Path, to: &Path) -> Result<(), CameraError> {
         unless_missing(from, fs::rename(from, to))
     }
+}
+
+/// Creates a folder that only this user can read, if it is missing.
+fn create(folder: &Path) -> io::Result<()> {
+    let mut builder = fs::DirBuilder::new();
+    builder.recursive(true).mode(0o700).create(folder)
 }
 
 fn unless_missing(path: &Path, done: io::Result<()>) -> Result<(), CameraError> {

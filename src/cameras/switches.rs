@@ -68,6 +68,7 @@ impl Cameras {
         keep_image: Option<bool>,
     ) -> Result<bool, CameraError> {
         let _changing = self.changing.lock();
+        let _locked = self.folder.lock()?;
         let configured: BTreeSet<_> = self.configured.read().keys().cloned().collect();
         if configured.contains(name) {
             for (list, is_listed) in [(PAUSED, paused), (WITH_IMAGE, keep_image)] {

@@ -226,6 +226,37 @@ fn every_accepted_password_is_loaded_as_it_was_given() {
 }
 
 #[test]
+fn changes_of_two_processes_are_all_stored() {
+    let folder = tempfile::tempdir().unwrap();
+    let password = Secret::from("geheim");
+    std::thread::scope(|scope| {
+        for process in ["a", "b"] {
+            let (cameras, password) = (cameras(folder.path()), &password);
+            scope.spawn(move || {
+                for number in 0..40 {
+                    let name = format!("{process}{number}");
+                    let camera = camera("rtsp://10.0.0.8/s2");
+                    assert!(cameras.put(&name, camera, Some(password)).unwrap());
+                }
+            });
+        }
+    });
+    assert_eq!(cameras(folder.path()).stored().unwrap().len(), 80);
+}
+
+#[test]
+fn a_damaged_file_is_named_with_its_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let cameras = cameras(folder.path());
+    let file = cameras.folder.file(FILE);
+    fs::create_dir_all(file.parent().unwrap()).unwrap();
+    fs::write(file, "{\n\"hall\": {").unwrap();
+    let problem = cameras.stored().unwrap_err().to_string();
+    let expected = "is damaged at line 2: restore it, or delete it";
+    assert!(problem.ends_with(expected), "{problem}");
+}
+
+#[test]
 fn a_camera_that_cannot_be_watched_leaves_the_others() {
     let folder = tempfile::tempdir().unwrap();
     let cameras = cameras(folder.path());

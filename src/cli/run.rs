@@ -188,6 +188,7 @@ impl Parts {
             in_process: Some(app.in_process()),
         };
         let stop_of_server = Shutdown::default();
+        let ready = readiness.clone();
         let (watched, after_watching) = watch::channel(false);
         let (counted, after_counting) = watch::channel(false);
         let serving = self.ends_all(serve::serve_app(app, sockets, stop_of_server.clone()));
@@ -207,13 +208,7 @@ impl Parts {
             outcome
         };
         let stopping = async {
-            self.shutdown.requested().await;
-            tokio::select! {
-                () = over(after_counting) => self.shutdown.pass_on(&stop_of_server),
-                () = self.shutdown.requested_at_once() => {}
-            }
-            self.shutdown.requested_at_once().await;
-            self.shutdown.pass_on(&stop_of_server);
+            pass_on_stop(&self.shutdown, &ready, after_counting, &stop_of_server).await;
             std::future::pending().await
         };
         let parts = async { tokio::join!(serving, watching, counting) };
@@ -268,8 +263,55 @@ impl Parts {
     }
 }
 
+/// Ends the readiness with the request to stop, and passes the request on to the server when the
+/// counts are stored.
+async fn pass_on_stop(
+    shutdown: &Shutdown,
+    readiness: &Readiness,
+    after_counting: watch::Receiver<bool>,
+    server: &Shutdown,
+) {
+    shutdown.requested().await;
+    readiness.stopping();
+    tokio::select! {
+        () = over(after_counting) => shutdown.pass_on(server),
+        () = shutdown.requested_at_once() => {}
+    }
+    shutdown.requested_at_once().await;
+    shutdown.pass_on(server);
+}
+
 /// Waits until a part is over.
 async fn over(mut part: watch::Receiver<bool>) {
     // A sender that is gone means the same.
     let _ = part.wait_for(|is_over| *is_over).await;
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+    use crate::api::Phase;
+
+    #[tokio::test(start_paused = true)]
+    async fn a_stop_ends_the_readiness_before_the_counts_end() {
+        let [shutdown, server] = [(); 2].map(|()| Shutdown::default());
+        let readiness = Readiness::default();
+        readiness.warmed_up();
+        let (counted, after_counting) = watch::channel(false);
+        let checks = async {
+            shutdown.request();
+            tokio::time::sleep(Duration::from_secs(1)).await;
+            assert_eq!(readiness.phase(), Phase::Stopping);
+            assert!(!server.is_requested());
+            counted.send(true).unwrap();
+            server.requested().await;
+        };
+        tokio::select! {
+            () = pass_on_stop(&shutdown, &readiness, after_counting, &server) => {}
+            () = checks => {}
+        }
+        assert!(server.is_requested());
+    }
 }

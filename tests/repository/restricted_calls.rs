@@ -19,12 +19,14 @@ const READS: [&str; 6] = [
     "tokio::fs",
 ];
 /// The files that may make them.
-const READERS: [&str; 5] = [
+const READERS: [&str; 6] = [
     "crates/lookdown-common/src/files.rs",
     // Creates files that replace others, and syncs folders.
     "crates/lookdown-common/src/replacement.rs",
     // Creates the file that locks the store.
     "crates/lookdown-count/src/store.rs",
+    // Creates the file that locks the state folder.
+    "src/cameras/state_folder.rs",
     // Tests of generated documentation.
     "src/api/parameters/reference.rs",
     "src/settings/reference.rs",
@@ -60,13 +62,14 @@ const LASTING: [&str; 2] = [
 const CLOCKS: [&str; 3] = ["SystemTime::now()", "Timestamp::now()", "Zoned::now()"];
 /// The files that may make them: they date reports, and compare with the dates of others.
 /// docs/lab/reliability.md states what holds when the clock jumps.
-const CLOCK_READERS: [&str; 20] = [
+const CLOCK_READERS: [&str; 21] = [
     "crates/lookdown-count/src/follower.rs",
     "crates/lookdown-count/src/http/shared.rs",
     "crates/lookdown-count/src/now.rs",
     "crates/lookdown-count/src/run.rs",
     "crates/lookdown-count/src/webhooks/delivery.rs",
     "crates/lookdown-detect/src/pipeline/job.rs",
+    "crates/lookdown-http/src/request_id.rs",
     "crates/lookdown-watch/src/source/folder.rs",
     "crates/lookdown-watch/src/source/sink.rs",
     "src/api/protocols/open_inference/persons.rs",

@@ -15,6 +15,7 @@ mod column_first;
 mod depthai;
 mod distortion;
 mod document;
+mod dso;
 mod error;
 mod fields;
 mod fisheye_calib_adapter;
@@ -171,7 +172,7 @@ fn unrecognized() -> FormatError {
     FormatError::malformed(
         "its fields are those of no format that is read (the native one, Kalibr, OpenCV, ROS, \
          OCamCalib, py-OCamCalib, COLMAP, camodocal, Basalt, WoodScape, NVIDIA f-theta, MOIL, \
-         ORB-SLAM, OpenVSLAM, nerfstudio, gyroflow, DepthAI, OpenSfM, MATLAB and a few more)",
+         ORB-SLAM, OpenVSLAM, DSO, nerfstudio, gyroflow, DepthAI, OpenSfM, MATLAB and a few more)",
     )
 }
 
@@ -180,6 +181,7 @@ fn read_lines(text: &str) -> Result<CalibrationFile, FormatError> {
     let cameras = match format {
         Format::OCamCalib => alone(ocam::read(text)),
         Format::MultiCol => alone(multicol::read(text)),
+        Format::Dso => alone(dso::read(text)),
         _ => colmap::read(text),
     };
     Ok(CalibrationFile { format, cameras })
@@ -205,6 +207,8 @@ fn read_tree(format: Format, fields: &Fields<'_>) -> Result<Vec<FileCamera>, For
         Format::OpenSfm => opensfm::read(fields),
         Format::Matlab => alone(matlab::read(fields)),
         Format::AliceVision => alicevision::read(fields),
-        Format::Native | Format::OCamCalib | Format::MultiCol | Format::Colmap => Vec::new(),
+        Format::Native | Format::OCamCalib | Format::MultiCol | Format::Colmap | Format::Dso => {
+            Vec::new()
+        }
     })
 }

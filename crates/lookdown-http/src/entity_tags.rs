@@ -51,9 +51,7 @@ pub fn named(
     if !headers.contains_key(header) {
         return Ok(None);
     }
-    let mut tags = Vec::new();
-    let mut any = false;
-    let mut is_empty = true;
+    let (mut tags, mut any, mut is_empty) = (Vec::new(), false, true);
     for value in headers.get_all(header) {
         // A comma may be part of a tag.
         let mut in_tag = false;
@@ -65,13 +63,10 @@ pub fn named(
         for element in elements.filter(|element| !element.trim_ascii().is_empty()) {
             is_empty = false;
             let tag = std::str::from_utf8(element).map_or("", str::trim);
-            let (is_weak, opaque) = match tag.strip_prefix("W/") {
-                Some(opaque) => (true, opaque),
-                None => (false, tag),
-            };
-            let inner = opaque
-                .strip_prefix('"')
-                .and_then(|opaque| opaque.strip_suffix('"'));
+            let weak_tag = tag.strip_prefix("W/");
+            let (is_weak, opaque) = (weak_tag.is_some(), weak_tag.unwrap_or(tag));
+            let quoted = opaque.strip_prefix('"');
+            let inner = quoted.and_then(|quoted| quoted.strip_suffix('"'));
             match inner {
                 Some(inner) if weak || !is_weak => tags.push(inner.to_owned()),
                 // A weak tag does not promise equal bytes.

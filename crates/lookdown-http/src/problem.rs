@@ -16,11 +16,10 @@ use axum::{
 use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
-use uuid::Uuid;
 
 use crate::{
     page_headers,
-    request_id::{self, RequestId},
+    request_id::{self, RequestId, new_id},
 };
 
 /// The media type of the documents.
@@ -193,7 +192,7 @@ impl Problem {
             status: self.kind.status().as_u16(),
             error: self.detail.clone(),
             detail: self.detail,
-            instance: Uuid::now_v7().urn().to_string(),
+            instance: new_id().urn().to_string(),
             request_id: request_id.as_str().to_owned(),
             parameter: self.parameter,
             members: BTreeMap::new(),

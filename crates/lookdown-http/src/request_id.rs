@@ -1,11 +1,12 @@
 //! Request IDs: the client's own if it is valid, otherwise a generated one.
 
+use std::time::{SystemTime, UNIX_EPOCH};
+
 use axum::http::{HeaderMap, HeaderName, HeaderValue};
-use uuid::Uuid;
+use uuid::{NoContext, Timestamp, Uuid};
 
 /// The header of the ID, in requests and responses.
 pub const HEADER: HeaderName = HeaderName::from_static("x-request-id");
-const MAX_CHARS: usize = 128;
 
 /// Identifies a request in logs, reports and problems: 1 to 128 visible ASCII characters.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -16,10 +17,10 @@ impl RequestId {
     #[must_use]
     pub fn from_headers(headers: &HeaderMap) -> Self {
         let given = headers.get(HEADER).and_then(|value| value.to_str().ok());
-        match given {
-            Some(id) if is_sane(id) => Self(id.to_owned()),
-            _ => Self(Uuid::now_v7().to_string()),
-        }
+        let is_sane =
+            |id: &&str| (1..=128).contains(&id.len()) && id.chars().all(|c| c.is_ascii_graphic());
+        let new = || new_id().to_string();
+        Self(given.filter(is_sane).map_or_else(new, str::to_owned))
     }
 
     /// Returns the ID as text.
@@ -36,8 +37,16 @@ impl RequestId {
     }
 }
 
-fn is_sane(id: &str) -> bool {
-    (1..=MAX_CHARS).contains(&id.len()) && id.chars().all(|c| c.is_ascii_graphic())
+/// Returns a new ID that begins with the time, which is 1970 where the clock is before it.
+#[must_use]
+pub fn new_id() -> Uuid {
+    id_at(SystemTime::now())
+}
+
+fn id_at(now: SystemTime) -> Uuid {
+    let since = now.duration_since(UNIX_EPOCH).unwrap_or_default();
+    let time = Timestamp::from_unix(NoContext, since.as_secs(), since.subsec_nanos());
+    Uuid::new_v7(time)
 }
 
 #[cfg(test)]
@@ -58,6 +67,12 @@ mod tests {
             let id = id_for(insane);
             assert_eq!(Uuid::parse_str(id.as_str()).unwrap().get_version_num(), 7);
         }
+    }
+
+    #[test]
+    fn a_clock_before_1970_makes_ids() {
+        let before = UNIX_EPOCH - std::time::Duration::from_hours(1);
+        assert_ne!(id_at(before), id_at(before));
     }
 
     #[test]

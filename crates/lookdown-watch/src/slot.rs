@@ -1,7 +1,5 @@
 //! A place for one value, in which the newest value replaces the one before.
 
-use std::sync::Arc;
-
 use parking_lot::Mutex;
 use tokio::sync::Notify;
 
@@ -69,19 +67,9 @@ impl<T> Slot<T> {
     }
 }
 
-/// The slot of a writer, closed when the writer ends, also by a panic.
-#[derive(Debug)]
-pub(crate) struct Writer<T>(pub(crate) Arc<Slot<T>>);
-
-impl<T> Drop for Writer<T> {
-    fn drop(&mut self) {
-        self.0.close();
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
+    use std::{sync::Arc, time::Duration};
 
     use super::*;
 
@@ -111,18 +99,6 @@ mod tests {
         slot.put(3);
         slot.close();
         assert_eq!(slot.take().await, Some(3));
-        assert_eq!(slot.take().await, None);
-    }
-
-    #[tokio::test]
-    async fn a_writer_that_panics_closes_its_slot() {
-        let slot = Arc::new(Slot::<u8>::default());
-        let writer = Writer(Arc::clone(&slot));
-        let task = tokio::spawn(async move {
-            let _writer = writer;
-            panic!("a fault of a source");
-        });
-        assert!(task.await.is_err());
         assert_eq!(slot.take().await, None);
     }
 }

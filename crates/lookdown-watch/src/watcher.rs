@@ -1,16 +1,13 @@
 //! The cameras of a process: each is a task of its own, started and stopped as the settings change.
 
-use std::{collections::HashMap, future::Future, sync::Arc, time::Duration};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::{collections::HashMap, future::Future, sync::Arc, task::Poll, time::Duration};
 
 use tokio::{task::JoinHandle, time::timeout};
 use tracing::Instrument as _;
 
 use crate::{
-    Camera, Metrics, WatchOptions,
-    metrics::CameraMetrics,
-    sender,
-    server::Server,
-    slot::{Slot, Writer},
+    Camera, Metrics, WatchOptions, metrics::CameraMetrics, sender, server::Server, slot::Slot,
     source,
 };
 use lookdown_common::{ClientError, ConfigError, HttpClient, LogOnce, Reload};
@@ -110,14 +107,21 @@ impl Watcher {
         let (name, camera) = (camera.name.clone(), Arc::new(camera));
         let source = tokio::spawn({
             let (camera, client) = (Arc::clone(&camera), self.client.clone());
-            let (writer, metrics) = (Writer(Arc::clone(&slot)), Arc::clone(&metrics));
-            async move { source::supervise(&camera, &client, &writer.0, &metrics).await }
-                .instrument(span.clone())
+            let (slot, metrics) = (Arc::clone(&slot), Arc::clone(&metrics));
+            async move {
+                let run = || source::supervise(&camera, &client, &slot, &metrics);
+                run_again(camera.location.is_finite(), run).await;
+                slot.close();
+            }
+            .instrument(span.clone())
         });
         let sender = tokio::spawn({
             let (server, slot) = (Arc::clone(&self.server), Arc::clone(&slot));
             let metrics = Arc::clone(&metrics);
-            async move { sender::run(&camera, &server, &slot, &metrics).await }.instrument(span)
+            async move {
+                run_again(false, || sender::run(&camera, &server, &slot, &metrics)).await;
+            }
+            .instrument(span)
         });
         let running = Running {
             source,
@@ -158,7 +162,6 @@ impl Watcher {
     /// Waits for the end of all sources.
     async fn finish(&mut self) -> Result<(), WatchError> {
         for (name, running) in &mut self.running {
-            // A task that panicked is logged by the panic hook.
             let _ = (&mut running.sender).await;
             if running.metrics.reports() == 0 {
                 return Err(WatchError::NoFrame(name.clone()));
@@ -208,5 +211,42 @@ impl Watcher {
         for running in self.running.values() {
             running.sender.abort();
         }
+    }
+}
+
+/// Runs a task of a camera again a second after a panic, which the panic hook logs. One with an end
+/// is not begun again.
+async fn run_again<F: Future<Output = ()>>(is_finite: bool, task: impl Fn() -> F) {
+    loop {
+        let mut run = std::pin::pin!(task());
+        let has_ended = std::future::poll_fn(|context| {
+            let poll = catch_unwind(AssertUnwindSafe(|| run.as_mut().poll(context)));
+            poll.map_or(Poll::Ready(is_finite), |poll| poll.map(|()| true))
+        });
+        if has_ended.await {
+            return;
+        }
+        tokio::time::sleep(Duration::from_secs(1)).await;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicU32, Ordering};
+
+    use super::*;
+
+    #[tokio::test(start_paused = true)]
+    async fn a_task_that_panics_runs_again() {
+        let runs = AtomicU32::new(0);
+        let task = || async {
+            tokio::task::yield_now().await;
+            assert!(runs.fetch_add(1, Ordering::Relaxed) > 0, "a fault");
+        };
+        run_again(true, task).await;
+        assert_eq!(runs.load(Ordering::Relaxed), 1);
+        runs.store(0, Ordering::Relaxed);
+        run_again(false, task).await;
+        assert_eq!(runs.load(Ordering::Relaxed), 2);
     }
 }

@@ -10,7 +10,7 @@ use lookdown_lens::geometry::Pixel;
 use strum::VariantArray;
 
 /// The importers, with the names of their folders of seeds and corpora.
-pub const IMPORTERS: [(&str, Format); 22] = [
+pub const IMPORTERS: [(&str, Format); 23] = [
     ("native", Format::Native),
     ("kalibr", Format::Kalibr),
     ("opencv", Format::OpenCv),
@@ -33,6 +33,7 @@ pub const IMPORTERS: [(&str, Format); 22] = [
     ("opensfm", Format::OpenSfm),
     ("matlab", Format::Matlab),
     ("alicevision", Format::AliceVision),
+    ("dso", Format::Dso),
 ];
 
 /// Positions in a frame where its lens is tested, as fractions of its sides.

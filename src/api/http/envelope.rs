@@ -11,7 +11,7 @@ use axum::{
 };
 use lookdown_http::{
     page_headers,
-    request_id::{self, RequestId},
+    request_id::{self, RequestId, new_id},
 };
 use tracing::Instrument;
 use uuid::Uuid;
@@ -76,7 +76,7 @@ pub(in crate::api) async fn wrap(
     let _in_request = span.enter();
     let mut failure = None;
     if let Some(problem) = Problem::take_from(&mut response, method, &path) {
-        let (reason, occurrence) = (problem.kind().name(), Uuid::now_v7());
+        let (reason, occurrence) = (problem.kind().name(), new_id());
         failure = Some(Failure { reason, occurrence });
         metrics.failures.with_label_values(&[reason]).inc();
         if let Some(cause) = problem.cause() {

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use jiff::Timestamp;
 use lookdown_common::text::one_line;
+use lookdown_http::request_id::new_id;
 use redis::{RedisResult, Script, aio::MultiplexedConnection};
-use uuid::Uuid;
 
 use super::{Shared, link::is_refusal, outbox::PendingReport};
 use crate::results::Cameras;
@@ -18,7 +18,7 @@ const RECORD: &str = concat!(include_str!("forget.lua"), include_str!("record.lu
 pub(super) async fn run(shared: Arc<Shared>) {
     let sender = Sender {
         script: Script::new(RECORD),
-        id: Uuid::now_v7().into_bytes(),
+        id: new_id().into_bytes(),
         shared: &shared,
     };
     let mut last_was_refused = false;

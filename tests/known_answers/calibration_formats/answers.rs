@@ -10,7 +10,7 @@ use serde_json::Value;
 use crate::calibration_formats::{camera, fixture, json, lens, ray};
 
 /// File, index of the camera in it, format, known answers.
-const FILES: [(&str, usize, &str, &str); 47] = [
+const FILES: [(&str, usize, &str, &str); 50] = [
     ("opencv_fisheye.yml", 0, "OpenCV FileStorage", "kb_tumvi512"),
     (
         "opencv_fisheye_4x_header.yml",
@@ -143,6 +143,14 @@ const FILES: [(&str, usize, &str, &str); 47] = [
         "MATLAB fisheyeIntrinsics",
         "ocamcalib_1600",
     ),
+    (
+        "matlab_kannala_brandt.json",
+        0,
+        "MATLAB fisheyeIntrinsics",
+        "kb_tumvi512",
+    ),
+    ("dso.txt", 0, "DSO camera.txt", "kb_tumvi512"),
+    ("dso_pixels.txt", 0, "DSO camera.txt", "kb_tumvi512"),
 ];
 
 #[test]

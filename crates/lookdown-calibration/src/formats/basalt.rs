@@ -42,10 +42,8 @@ fn read_camera(calibration: &Fields<'_>, index: usize) -> Result<Camera, FormatE
             return Err(camera.invalid("camera_type", not_a_fisheye(other)));
         }
         other => {
-            return Err(camera.invalid(
-                "camera_type",
-                format!("it is {other:?}: ds, eucm, ucm, kb4 and pinhole are read"),
-            ));
+            let problem = format!("it is {other:?}: ds, eucm, ucm, kb4 and pinhole are read");
+            return Err(camera.invalid("camera_type", problem));
         }
     };
     let lens = named_parameters::read(model, &parameters)?;

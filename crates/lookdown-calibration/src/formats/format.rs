@@ -1,27 +1,23 @@
 //! The formats that are read.
 
-use strum::IntoStaticStr;
+use strum::{EnumIter, IntoStaticStr};
 
-/// A format that is read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, IntoStaticStr)]
+/// A format that is read. A file is in the first one whose fields it has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, IntoStaticStr, EnumIter)]
 #[expect(missing_docs, reason = "the formats' own names")]
 pub enum Format {
     #[strum(serialize = "native")]
     Native,
     #[strum(serialize = "Kalibr camchain")]
     Kalibr,
-    #[strum(serialize = "OpenCV FileStorage")]
-    OpenCv,
-    #[strum(serialize = "ROS camera_info")]
-    Ros,
     #[strum(serialize = "OCamCalib")]
     OCamCalib,
-    #[strum(serialize = "py-OCamCalib")]
-    PyOCamCalib,
     #[strum(serialize = "MultiCol-SLAM")]
     MultiCol,
     #[strum(serialize = "COLMAP cameras.txt")]
     Colmap,
+    #[strum(serialize = "DSO camera.txt")]
+    Dso,
     #[strum(serialize = "camodocal")]
     Camodocal,
     #[strum(serialize = "Basalt")]
@@ -30,6 +26,8 @@ pub enum Format {
     WoodScape,
     #[strum(serialize = "NVIDIA f-theta")]
     NvidiaFTheta,
+    #[strum(serialize = "py-OCamCalib")]
+    PyOCamCalib,
     #[strum(serialize = "MOIL")]
     Moil,
     #[strum(serialize = "fisheye-calib-adapter")]
@@ -50,6 +48,10 @@ pub enum Format {
     Matlab,
     #[strum(serialize = "AliceVision")]
     AliceVision,
+    #[strum(serialize = "ROS camera_info")]
+    Ros,
+    #[strum(serialize = "OpenCV FileStorage")]
+    OpenCv,
 }
 
 impl Format {

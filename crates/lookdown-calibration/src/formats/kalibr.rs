@@ -98,12 +98,9 @@ fn distortion(camera: &Fields<'_>) -> Result<(Distortion, Vec<f64>), FormatError
         return Ok((Distortion::None, Vec::new()));
     }
     let name = camera.text(MODEL)?;
-    let distortion = Distortion::from_name(name).ok_or_else(|| {
-        camera.invalid(
-            MODEL,
-            format!("it is {name:?}: equidistant, radtan, fov and none are read"),
-        )
-    })?;
+    let problem = || format!("it is {name:?}: equidistant, radtan, fov and none are read");
+    let distortion = Distortion::from_name(name);
+    let distortion = distortion.ok_or_else(|| camera.invalid(MODEL, problem()))?;
     if distortion == Distortion::None {
         return Ok((distortion, Vec::new()));
     }

@@ -16,14 +16,11 @@ pub(super) fn read(fields: &Fields<'_>) -> Vec<FileCamera> {
 }
 
 fn read_camera(camera: &Fields<'_>) -> Result<Camera, FormatError> {
-    let pixel_aspect = camera.number_or("ratio", 1.0)?;
-    if pixel_aspect != 1.0 {
-        return Err(camera.invalid(
-            "ratio",
-            format!(
-                "it is {pixel_aspect}: only square pixels (1) are read, measure this lens anew"
-            ),
-        ));
+    let ratio = camera.number_or("ratio", 1.0)?;
+    if ratio != 1.0 {
+        let problem =
+            format!("it is {ratio}: only square pixels (1) are read, measure this lens anew");
+        return Err(camera.invalid("ratio", problem));
     }
     let scale = camera.number("calibrationRatio")?;
     let mut coefficients = vec![0.0];

@@ -12,10 +12,8 @@ use lookdown_lens::geometry::lens::FTheta;
 pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
     let model = fields.text("camera_model_type")?;
     if model != "ftheta" {
-        return Err(fields.invalid(
-            "camera_model_type",
-            format!("it is {model:?}: ftheta is read"),
-        ));
+        let problem = format!("it is {model:?}: ftheta is read");
+        return Err(fields.invalid("camera_model_type", problem));
     }
     let parameters = fields.child("camera_model_parameters")?;
     if let Some(windshield) = parameters.map().get("external_distortion_parameters")
@@ -26,15 +24,10 @@ pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
             "a windshield before the lens is not read: give the lens alone",
         ));
     }
+    let read = |key| polynomial(&parameters, key).map(Some);
     let (forward, backward) = match parameters.text("reference_poly")? {
-        "ANGLE_TO_PIXELDIST" => (
-            Some(polynomial(&parameters, "angle_to_pixeldist_poly")?),
-            None,
-        ),
-        "PIXELDIST_TO_ANGLE" => (
-            None,
-            Some(polynomial(&parameters, "pixeldist_to_angle_poly")?),
-        ),
+        "ANGLE_TO_PIXELDIST" => (read("angle_to_pixeldist_poly")?, None),
+        "PIXELDIST_TO_ANGLE" => (None, read("pixeldist_to_angle_poly")?),
         other => {
             return Err(parameters.invalid(
                 "reference_poly",
@@ -65,10 +58,8 @@ pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
 fn polynomial(parameters: &Fields<'_>, key: &str) -> Result<[f64; 6], FormatError> {
     let coefficients = parameters.numbers(key)?;
     if !(2..=6).contains(&coefficients.len()) {
-        return Err(parameters.invalid(
-            key,
-            format!("it has {} numbers: 2 to 6 are needed", coefficients.len()),
-        ));
+        let problem = format!("it has {} numbers: 2 to 6 are needed", coefficients.len());
+        return Err(parameters.invalid(key, problem));
     }
     let mut six = [0.0; 6];
     six[..coefficients.len()].copy_from_slice(&coefficients);

@@ -157,12 +157,8 @@ fn without_xi(
 fn said_distortion<'a>(fields: &Fields<'a>) -> Result<(&'a str, Option<Distortion>), FormatError> {
     if let Some(key) = present(fields, MODELS, "") {
         let name = fields.text(key)?;
-        let known = Distortion::from_name(name).ok_or_else(|| {
-            fields.invalid(
-                key,
-                format!("it is {name:?}: fisheye or equidistant is read"),
-            )
-        })?;
+        let problem = || format!("it is {name:?}: fisheye or equidistant is read");
+        let known = Distortion::from_name(name).ok_or_else(|| fields.invalid(key, problem()))?;
         return Ok((key, Some(known)));
     }
     let flag = if fields.has("fisheye") {

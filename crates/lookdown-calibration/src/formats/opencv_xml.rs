@@ -29,31 +29,27 @@ pub(super) fn parse(text: &str, max_depth: usize, max_elements: usize) -> Result
             before.split(|byte| *byte == b'\n').count()
         };
         let event = event.map_err(|_| format!("it is not valid XML at line {}", line()))?;
+        let is_whole = matches!(event, Event::Empty(_));
         let closed = match event {
-            Event::Start(start) => {
+            Event::Start(start) | Event::Empty(start) => {
                 elements += 1;
                 check_bounds(elements, open.len(), max_depth, max_elements)?;
-                open.push(Element::begun(&start, open.is_empty())?);
-                continue;
-            }
-            Event::Empty(start) => {
-                elements += 1;
-                check_bounds(elements, open.len(), max_depth, max_elements)?;
-                Some(Element::begun(&start, open.is_empty())?)
+                let element = Element::begun(&start, open.is_empty())?;
+                if !is_whole {
+                    open.push(element);
+                    continue;
+                }
+                Some(element)
             }
             Event::End(_) => open.pop(),
             Event::Text(text) => {
-                add_text(
-                    &mut open,
-                    &text.decode().map_err(|error| error.to_string())?,
-                );
+                let text = text.decode().map_err(|error| error.to_string())?;
+                add_text(&mut open, &text);
                 continue;
             }
             Event::CData(text) => {
-                add_text(
-                    &mut open,
-                    &text.decode().map_err(|error| error.to_string())?,
-                );
+                let text = text.decode().map_err(|error| error.to_string())?;
+                add_text(&mut open, &text);
                 continue;
             }
             Event::GeneralRef(reference) => {

@@ -15,10 +15,8 @@ pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
     let [cx, cy] = fields.exactly("distortion_center", "column and row")?;
     let [c, d, e, one] = fields.exactly("stretch_matrix", "[[c, d], [e, 1]]")?;
     if one != 1.0 {
-        return Err(fields.invalid(
-            "stretch_matrix",
-            format!("its last number is {one}: it must be 1"),
-        ));
+        let problem = format!("its last number is {one}: it must be 1");
+        return Err(fields.invalid("stretch_matrix", problem));
     }
     let lens = ColumnFirst {
         polynomial: negated(&fields.numbers("taylor_coefficient")?),

@@ -1,6 +1,9 @@
 //! Recognition of a file's format from its content alone.
 
-use super::{Format, fields::Fields, matlab, opencv, slam};
+use serde_json::Value;
+use strum::IntoEnumIterator as _;
+
+use super::{Format, dso, fields::Fields, matlab, opencv, slam};
 
 /// The line-based format of a text, if it is in one.
 pub(super) fn recognize_lines(text: &str) -> Option<Format> {
@@ -14,6 +17,8 @@ pub(super) fn recognize_lines(text: &str) -> Option<Format> {
         Some(Format::MultiCol)
     } else if text.starts_with("# Camera list") || content.next().is_some_and(is_colmap_camera) {
         Some(Format::Colmap)
+    } else if dso::is_camera(text) {
+        Some(Format::Dso)
     } else {
         None
     }
@@ -33,62 +38,43 @@ fn is_colmap_camera(line: &str) -> bool {
         && is_count(words.next())
 }
 
-/// The format of a tree.
+/// The format of a tree: the first one whose fields it has.
 pub(super) fn recognize_tree(fields: &Fields<'_>) -> Option<Format> {
     let has = |key: &str| fields.has(key);
     let any_entry_has = |keys: &[&str]| {
         let mut entries = fields.map().values();
         entries.any(|entry| keys.iter().all(|key| entry.get(key).is_some()))
     };
-    let first_of = |list: &str, key: &str| {
-        let first = fields.map().get(list).and_then(|list| list.get(0));
-        first.is_some_and(|entry| entry.get(key).is_some())
-    };
-    Some(if has("lens") || (has("id") && has("image")) {
-        Format::Native
-    } else if any_entry_has(&["camera_model", "intrinsics"])
-        || (has("camera_model") && has("intrinsics") && has("resolution"))
-    {
-        Format::Kalibr
-    } else if has("model_type") && has("camera_name") {
-        Format::Camodocal
-    } else if any_entry_has(&["intrinsics", "resolution"]) {
-        Format::Basalt
-    } else if fields
-        .map()
-        .get("intrinsic")
-        .is_some_and(|intrinsic| intrinsic.get("k1").is_some())
-    {
-        Format::WoodScape
-    } else if has("camera_model_type") {
-        Format::NvidiaFTheta
-    } else if has("taylor_coefficient") {
-        Format::PyOCamCalib
-    } else if has("calibrationRatio") || any_entry_has(&["calibrationRatio"]) {
-        Format::Moil
-    } else if has("image") && has("parameter") {
-        Format::FisheyeCalibAdapter
-    } else if fields.map().len() == 1 && any_entry_has(&["fx", "width"]) {
-        Format::CameraIntrinsicModel
-    } else if slam::is_settings(fields) {
-        Format::Slam
-    } else if has("fl_x") || first_of("frames", "fl_x") {
-        Format::Nerfstudio
-    } else if has("fisheye_params") || has("calibration_data") {
-        Format::Gyroflow
-    } else if has("cameraData") {
-        Format::DepthAi
-    } else if any_entry_has(&["projection_type"]) {
-        Format::OpenSfm
-    } else if has(matlab::POLYNOMIAL) || any_entry_has(&[matlab::POLYNOMIAL]) {
-        Format::Matlab
-    } else if first_of("intrinsics", "intrinsicId") {
-        Format::AliceVision
-    } else if has("distortion_model") && (has("camera_matrix") || has("K") || has("k")) {
-        Format::Ros
-    } else if opencv::is_storage(fields) {
-        Format::OpenCv
-    } else {
-        return None;
+    let part_has = |part: Option<&Value>, key: &str| part.is_some_and(|it| it.get(key).is_some());
+    let field_has = |field: &str, key: &str| part_has(fields.map().get(field), key);
+    let first_has =
+        |list: &str, key: &str| part_has(fields.map().get(list).and_then(|list| list.get(0)), key);
+    Format::iter().find(|format| match format {
+        Format::Native => has("lens") || (has("id") && has("image")),
+        Format::Kalibr => {
+            any_entry_has(&["camera_model", "intrinsics"])
+                || (has("camera_model") && has("intrinsics") && has("resolution"))
+        }
+        Format::Camodocal => has("model_type") && has("camera_name"),
+        Format::Basalt => any_entry_has(&["intrinsics", "resolution"]),
+        Format::WoodScape => field_has("intrinsic", "k1"),
+        Format::NvidiaFTheta => has("camera_model_type"),
+        Format::PyOCamCalib => has("taylor_coefficient"),
+        Format::Moil => has("calibrationRatio") || any_entry_has(&["calibrationRatio"]),
+        Format::FisheyeCalibAdapter => has("image") && has("parameter"),
+        Format::CameraIntrinsicModel => fields.map().len() == 1 && any_entry_has(&["fx", "width"]),
+        Format::Slam => slam::is_settings(fields),
+        Format::Nerfstudio => has("fl_x") || first_has("frames", "fl_x"),
+        Format::Gyroflow => has("fisheye_params") || has("calibration_data"),
+        Format::DepthAi => has("cameraData"),
+        Format::OpenSfm => any_entry_has(&["projection_type"]),
+        Format::Matlab => {
+            let mut names = matlab::FIELDS.iter();
+            names.any(|name| has(name) || any_entry_has(&[name]))
+        }
+        Format::AliceVision => first_has("intrinsics", "intrinsicId"),
+        Format::Ros => has("distortion_model") && (has("camera_matrix") || has("K") || has("k")),
+        Format::OpenCv => opencv::is_storage(fields),
+        Format::OCamCalib | Format::MultiCol | Format::Colmap | Format::Dso => false,
     })
 }

@@ -10,10 +10,8 @@ use lookdown_lens::geometry::lens::RadialPolynomial;
 pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
     let intrinsic = fields.child("intrinsic")?;
     if intrinsic.has("model") && intrinsic.text("model")? != "radial_poly" {
-        return Err(intrinsic.invalid(
-            "model",
-            format!("it is {:?}: radial_poly is read", intrinsic.text("model")?),
-        ));
+        let problem = format!("it is {:?}: radial_poly is read", intrinsic.text("model")?);
+        return Err(intrinsic.invalid("model", problem));
     }
     let image = intrinsic.image("width", "height")?;
     let center = |side: u32| f64::from(side) / 2.0 - 0.5;

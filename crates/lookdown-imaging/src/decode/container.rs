@@ -218,3 +218,21 @@ fn chunks(mut bytes: &[u8]) -> impl Iterator<Item = ([u8; 4], &[u8])> {
         Some(([*n0, *n1, *n2, *n3], payload))
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn profiles_and_texts_of_a_png_are_left_out() {
+        let chunk = |name: &[u8; 4]| [&[0, 0, 0, 13][..], name, &[0; 17]].concat();
+        let names = [
+            b"IHDR", b"iCCP", b"zTXt", b"iTXt", b"tEXt", b"IDAT", b"IEND",
+        ];
+        let chunks = names.map(chunk).concat();
+        let essence = png_essence(&[b"\x89PNG\r\n\x1a\n", &chunks[..]].concat()).unwrap();
+        let is_kept = |name: &&[u8; 4]| essence.windows(4).any(|window| window == *name);
+        let kept: Vec<_> = names.iter().copied().filter(is_kept).collect();
+        assert_eq!(kept, [b"IHDR", b"IDAT", b"IEND"]);
+    }
+}
