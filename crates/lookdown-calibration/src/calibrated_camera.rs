@@ -72,43 +72,36 @@ impl Calibration {
     }
 
     /// The calibration's ID.
-    #[must_use]
     pub fn id(&self) -> &CalibrationId {
         &self.id
     }
 
     /// Changes whenever the content of the file does.
-    #[must_use]
     pub fn revision(&self) -> &str {
         &self.revision
     }
 
     /// Width and height of the frames the calibration was made for, pixels.
-    #[must_use]
     pub fn image_size(&self) -> (u32, u32) {
         (self.image_width, self.image_height)
     }
 
     /// The lens, in pixels of frames of [`Calibration::image_size`].
-    #[must_use]
     pub fn lens(&self) -> &Lens {
         &self.lens
     }
 
     /// The mount of the camera.
-    #[must_use]
     pub fn mount(&self) -> &Mount {
         &self.mount
     }
 
     /// The place of the camera on the floor of a site, if it has one.
-    #[must_use]
     pub fn site(&self) -> Option<&SitePlacement> {
         self.site.as_ref()
     }
 
     /// Its zones, lines and masks, in pixels of frames of [`Calibration::image_size`].
-    #[must_use]
     pub fn areas(&self) -> &Areas {
         &self.areas
     }

@@ -98,7 +98,6 @@ impl CalibrationFile {
     /// The file's cameras, checked, under the IDs they have when the file is called `stem`: a
     /// native file has its ID, a single camera has the name of its file, and one of several the
     /// file's and its own, as in `lobby-cam0`.
-    #[must_use]
     pub fn calibrations(&self, stem: &str, content: &[u8]) -> Vec<Checked> {
         let several = self.cameras.len() > 1;
         let checked = self.cameras.iter().enumerate().map(|(index, entry)| {

@@ -42,7 +42,6 @@ struct Entry {
 
 impl RowName {
     /// The name of the row's file: `<profile>.<refinement>.<model>.json`.
-    #[must_use]
     pub fn file_name(&self) -> String {
         match (self.profile, self.refinement) {
             (Some(profile), Some(refinement)) => {

@@ -30,7 +30,6 @@ const MIN_NOISE_LEVELS: u16 = 6;
 
 /// Returns the frame in even light, and with less noise if it is noisy. Returns `None` for a frame
 /// with color, which stays as it is.
-#[must_use]
 pub fn with_even_light(frame: &Frame) -> Option<Frame> {
     (!has_color(frame)).then(|| evened(frame))
 }

@@ -64,7 +64,6 @@ impl Frame {
     }
 
     /// A black image. A side of zero becomes 1.
-    #[must_use]
     pub fn black(width: u32, height: u32) -> Self {
         let (width, height) = (width.max(1), height.max(1));
         Self {
@@ -75,19 +74,16 @@ impl Frame {
     }
 
     /// Width in pixels, at least 1.
-    #[must_use]
     pub fn width(&self) -> u32 {
         self.width
     }
 
     /// Height in pixels, at least 1.
-    #[must_use]
     pub fn height(&self) -> u32 {
         self.height
     }
 
     /// All bytes: R, G and B of the top-left pixel, then of the pixel to its right, and so on.
-    #[must_use]
     pub fn pixels(&self) -> &[u8] {
         &self.pixels
     }
@@ -120,7 +116,6 @@ impl Frame {
     ///
     /// # Panics
     /// Panics if the pixel lies outside the frame.
-    #[must_use]
     pub fn pixel(&self, x: u32, y: u32) -> [u8; 3] {
         assert!(
             x < self.width && y < self.height,

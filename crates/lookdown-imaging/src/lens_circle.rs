@@ -45,7 +45,6 @@ const MAX_GAP_RADIANS: f64 = 3.5;
 ///
 /// Returns `None` where no dark surround shows it: in a frame filled by the lens image, an image of
 /// an ordinary camera, or a dark room. Use [`assumed_circle`] then. The result is deterministic.
-#[must_use]
 pub fn find_lens_circle(frame: &Frame) -> Option<LensCircle> {
     if short_side(frame) < MIN_SIDE {
         return None;
@@ -70,7 +69,6 @@ fn find_at_contrast(frame: &Frame, min_contrast: f64) -> Option<LensCircle> {
 
 /// Brightness (0 to 255) above which a pixel is lens image, or `None` in a frame without a dark
 /// surround.
-#[must_use]
 pub fn surround_threshold(frame: &Frame) -> Option<f64> {
     if short_side(frame) < MIN_SIDE {
         return None;
@@ -104,7 +102,6 @@ fn is_shown(edge: &[RimPoint], frame: &Frame, circle: &LensCircle) -> bool {
 
 /// Returns true for a frame of two lenses, beside or above each other: each half has a lens circle
 /// in its middle. The halves of one lens circle have its middle at their edge.
-#[must_use]
 pub fn shows_two_circles(frame: &Frame) -> bool {
     let (width, height) = (frame.width(), frame.height());
     let halves = if 2 * width >= 3 * height {
@@ -130,7 +127,6 @@ pub fn shows_two_circles(frame: &Frame) -> bool {
 
 /// The largest circle in the center of a frame of this size. It is the guess for frames without a
 /// detected circle.
-#[must_use]
 pub fn assumed_circle(width: u32, height: u32) -> LensCircle {
     LensCircle {
         cx: (f64::from(width) - 1.0) / 2.0,

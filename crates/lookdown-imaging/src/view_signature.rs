@@ -22,7 +22,6 @@ pub struct ViewSignature {
 
 impl ViewSignature {
     /// Computes the signature of a view rendered for `input`, from its slot `[3, height, width]`.
-    #[must_use]
     pub fn new(slot: &[f32], input: &NetworkInput) -> Self {
         let (width, height) = (input.width as usize, input.height as usize);
         let (across, down) = (width.div_ceil(CELL), height.div_ceil(CELL));
@@ -49,7 +48,6 @@ impl ViewSignature {
     }
 
     /// Returns true if there is motion between two signatures of the same view, not only noise.
-    #[must_use]
     pub fn differs_from(&self, other: &Self) -> bool {
         if self.across != other.across || self.levels.len() != other.levels.len() {
             return true;

@@ -138,13 +138,11 @@ impl LineCounter {
     }
 
     /// Returns the lines.
-    #[must_use]
     pub fn lines(&self) -> &[Line] {
         &self.lines
     }
 
     /// Returns the state to be stored with that of the tracker.
-    #[must_use]
     pub fn state(&self) -> &LineState {
         &self.state
     }

@@ -168,13 +168,11 @@ impl Metrics {
     }
 
     /// Returns the viewers of the cameras.
-    #[must_use]
     pub fn viewers(&self) -> &Arc<Viewers> {
         &self.viewers
     }
 
     /// Returns the states of all cameras.
-    #[must_use]
     pub fn states(&self) -> Vec<CameraState> {
         let cameras = self.cameras.lock();
         let states = cameras.iter().map(|camera| {
@@ -194,7 +192,6 @@ impl Metrics {
     }
 
     /// Returns all metrics in the text format of Prometheus.
-    #[must_use]
     pub fn text(&self) -> Vec<u8> {
         for camera in self.cameras.lock().iter() {
             let age = camera.last_frame.lock().elapsed().as_secs_f64();

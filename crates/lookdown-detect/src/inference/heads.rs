@@ -52,7 +52,6 @@ macro_rules! heads {
 
         impl Head {
             /// Returns the outputs that the head expects, as a phrase.
-            #[must_use]
             pub fn description(&self) -> &'static str {
                 match self {
                     $(Self::$variant(_) => concat!($($description),+).trim_ascii_start(),)+
@@ -104,7 +103,6 @@ impl CandidateOptions {
 
 impl Head {
     /// Returns the name, as in manifests.
-    #[must_use]
     pub fn name(&self) -> &'static str {
         self.into()
     }

@@ -18,7 +18,6 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
 );
 
 /// Most bytes that [`byte_elements`] returns for data of this length: three of four letters.
-#[must_use]
 pub fn bytes_at_most(json: &str) -> usize {
     // With the quotes and the separator around it, each element has at least three letters more
     // than are decoded.

@@ -109,26 +109,22 @@ impl Lens {
     }
 
     /// The name of the model, as in calibration files.
-    #[must_use]
     pub fn model(&self) -> &'static str {
         self.curve.model()
     }
 
     /// Returns the end of the lens image: the largest angle from the optical axis, in radians.
-    #[must_use]
     pub fn max_theta(&self) -> f64 {
         self.max_theta
     }
 
     /// The principal point: where the optical axis meets the image, pixel centers.
-    #[must_use]
     pub fn principal_point(&self) -> Pixel {
         Pixel::new(self.plane.cx, self.plane.cy)
     }
 
     /// The pixel (pixel centers) that sees `ray` (camera frame, any length above 0), or `None`
     /// beyond `max_theta`, exactly behind the camera, or for a ray that is not finite.
-    #[must_use]
     pub fn project(&self, ray: &Ray) -> Option<Pixel> {
         let off_axis = ray.xy().norm();
         let theta = off_axis.atan2(ray.z);
@@ -143,7 +139,6 @@ impl Lens {
 
     /// Like [`Lens::project`], but a ray beyond `max_theta` is pulled to the rim of the lens image
     /// along its own azimuth. `None` only where there is no azimuth or nothing finite to map.
-    #[must_use]
     pub fn project_to_rim(&self, ray: &Ray) -> Option<Pixel> {
         let off_axis = ray.xy().norm();
         if off_axis.atan2(ray.z) <= self.max_theta || off_axis == 0.0 {
@@ -168,7 +163,6 @@ impl Lens {
 
     /// The unit ray in the camera frame that `pixel` (pixel centers) sees, or `None` outside the
     /// lens image.
-    #[must_use]
     pub fn unproject(&self, pixel: &Pixel) -> Option<Ray> {
         let (x, y) = self.plane.normalized_from_pixel(pixel);
         let (x, y) = match &self.distortion {
@@ -191,13 +185,11 @@ impl Lens {
     }
 
     /// The affine map from the normalized plane to pixels.
-    #[must_use]
     pub fn image_plane(&self) -> &ImagePlane {
         &self.plane
     }
 
     /// Returns true for a lens that is the same in every azimuth, apart from its image plane.
-    #[must_use]
     pub fn is_symmetric(&self) -> bool {
         self.distortion
             .is_none_or(|distortion| distortion.is_radial())
@@ -205,7 +197,6 @@ impl Lens {
 
     /// The same lens for a frame `scale_x`, `scale_y` times as large. Pixel centers move with
     /// their corners: the frame's edges stay its edges.
-    #[must_use]
     pub fn scaled(&self, scale_x: f64, scale_y: f64) -> Self {
         Self {
             plane: self.plane.scaled(scale_x, scale_y),
@@ -214,7 +205,6 @@ impl Lens {
     }
 
     /// The same lens with its image ending at `max_theta`, when that is less than now.
-    #[must_use]
     pub fn limited_to(&self, max_theta: f64) -> Self {
         let max_theta = max_theta.min(self.max_theta);
         Self {

@@ -76,7 +76,6 @@ impl Polygon {
     }
 
     /// A frame of `width` × `height` pixels, corner-origin.
-    #[must_use]
     pub fn for_frame(width: u32, height: u32) -> Self {
         let (width, height) = (f64::from(width), f64::from(height));
         let corners = [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)];
@@ -86,7 +85,6 @@ impl Polygon {
     }
 
     /// The corners along the outline.
-    #[must_use]
     pub fn corners(&self) -> &[Point2<f64>] {
         &self.corners
     }
@@ -99,7 +97,6 @@ impl Polygon {
 
     /// Returns true for a point inside: a ray from it toward growing x crosses the outline an odd
     /// number of times (the even-odd rule). Of areas with a common edge, one holds a point on it.
-    #[must_use]
     pub fn holds(&self, point: Point2<f64>) -> bool {
         let crossed = self
             .edges()
@@ -109,20 +106,17 @@ impl Polygon {
     }
 
     /// Returns true for a point inside, or at most `margin` away from the outline.
-    #[must_use]
     pub fn holds_within(&self, point: Point2<f64>, margin: f64) -> bool {
         self.holds(point) || self.edges().any(|edge| distance(edge, point) <= margin)
     }
 
     /// Returns true when two areas have a point in common, be it one of their outlines.
-    #[must_use]
     pub fn meets(&self, other: &Self) -> bool {
         let crosses = |edge: Edge| other.edges().any(|another| meet(edge, another));
         self.edges().any(crosses) || self.holds(other.corners[0]) || other.holds(self.corners[0])
     }
 
     /// Returns the width and the height of the bounding box.
-    #[must_use]
     pub fn extent(&self) -> Vector2<f64> {
         let corners = self.corners.iter();
         let (least, most) = corners.fold(
@@ -134,7 +128,6 @@ impl Polygon {
 
     /// Returns the share of a frame of `width` × `height` pixels that the area covers, 0 to 1. The
     /// outline is cut at each side of the frame (Sutherland and Hodgman, 1974).
-    #[must_use]
     pub fn share_of_frame(&self, width: u32, height: u32) -> f64 {
         let mut corners = self.corners.clone();
         for [from, to] in Self::for_frame(width, height).edges() {
@@ -166,7 +159,6 @@ impl Polygon {
     }
 
     /// The same area with its coordinates multiplied by two factors above 0.
-    #[must_use]
     pub fn scaled(&self, scale_x: f64, scale_y: f64) -> Self {
         let corners = self.corners.iter();
         Self {
@@ -210,7 +202,6 @@ impl Polygon {
 
 /// Returns the place at which an edge passes the height `y`, if it does; its upper end belongs to
 /// it, its lower one does not, so that of two edges which meet there one passes.
-#[must_use]
 pub fn crossing([a, b]: Edge, y: f64) -> Option<f64> {
     // The same number whichever way the edge leads: areas side by side have it both ways.
     let [upper, lower] = if a.y <= b.y { [a, b] } else { [b, a] };

@@ -99,7 +99,6 @@ pub enum HeightRefusal {
 
 impl HeightRefusal {
     /// Returns the name of the reason, for programs: the variant in snake case.
-    #[must_use]
     pub fn reason(&self) -> &'static str {
         self.into()
     }

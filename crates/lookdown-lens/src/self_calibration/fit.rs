@@ -101,7 +101,6 @@ pub struct RoomFit {
 impl RoomFit {
     /// Returns the camera without a lens circle, whose image reaches to a distance from the center,
     /// in pixels, and to 100° from the axis at most.
-    #[must_use]
     pub fn without_circle(self, distance: f64) -> Self {
         let [k1, k2, k3, _] = self.k;
         let is_within = |theta: &f64| {

@@ -83,7 +83,6 @@ impl LevelFromPeople {
     }
 
     /// Returns true if the level of the camera, known to `sd_deg`, is not that of the people.
-    #[must_use]
     pub fn contradicts(&self, sd_deg: f64) -> bool {
         self.difference_deg > CONTRADICTION * self.sd_deg.hypot(sd_deg)
     }

@@ -31,7 +31,6 @@ pub struct ImagePlane {
 
 impl ImagePlane {
     /// An image plane without skew.
-    #[must_use]
     pub fn new(fx: f64, fy: f64, cx: f64, cy: f64) -> Self {
         Self {
             fx,

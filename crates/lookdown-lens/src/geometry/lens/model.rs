@@ -47,21 +47,18 @@ macro_rules! lens_parameters {
 
         impl $Model {
             /// Creates the lens with these focal lengths and center.
-            #[must_use]
             pub fn new([fx, fy, cx, cy]: $crate::geometry::lens::Pinhole) -> Self {
                 Self { focal: None, fx: Some(fx), fy: Some(fy), cx, cy, max_theta: None }
             }
 
             /// Creates the lens with one focal length (pixels) that sees up to `max_theta` radians
             /// off its axis.
-            #[must_use]
             pub fn with_focal(focal: f64, cx: f64, cy: f64, max_theta: f64) -> Self {
                 let max_theta = Some(max_theta);
                 Self { focal: Some(focal), fx: None, fy: None, cx, cy, max_theta }
             }
 
             /// Returns the focal lengths and the center, unless a focal length is missing.
-            #[must_use]
             pub fn pinhole(&self) -> Option<$crate::geometry::lens::Pinhole> {
                 Some([self.fx.or(self.focal)?, self.fy.or(self.focal)?, self.cx, self.cy])
             }
@@ -119,13 +116,11 @@ macro_rules! lens_parameters {
 
         impl $Model {
             /// Creates the lens with these focal lengths, center and parameters, without skew.
-            #[must_use]
             pub fn new([fx, fy, cx, cy]: $crate::geometry::lens::Pinhole, $($own: $Own),*) -> Self {
                 Self { fx, fy, cx, cy, $($own,)* $($skew: 0.0,)? max_theta: None }
             }
 
             /// Returns the focal lengths and the center.
-            #[must_use]
             pub fn pinhole(&self) -> $crate::geometry::lens::Pinhole {
                 [self.fx, self.fy, self.cx, self.cy]
             }
@@ -219,7 +214,6 @@ macro_rules! lens_models {
             pub const NAMES: &'static [&'static str] = &[$($Model::NAME),+];
 
             /// Returns the model's name in calibration files.
-            #[must_use]
             pub fn name(&self) -> &'static str {
                 match self {
                     $(Self::$Model(_) => $Model::NAME,)+
@@ -227,7 +221,6 @@ macro_rules! lens_models {
             }
 
             /// Returns the end of the lens image that the file states, radians.
-            #[must_use]
             pub fn max_theta(&self) -> Option<f64> {
                 match self {
                     $(Self::$Model(model) => model.max_theta,)+

@@ -34,7 +34,6 @@ lens_parameters! {
 
 impl Ocam {
     /// Creates the lens with this polynomial and center and with square pixels.
-    #[must_use]
     pub fn new(polynomial: Vec<f64>, [cx, cy]: [f64; 2]) -> Self {
         Self {
             polynomial,

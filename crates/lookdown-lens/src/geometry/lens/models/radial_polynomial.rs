@@ -19,7 +19,6 @@ lens_parameters! {
 
 impl RadialPolynomial {
     /// Creates the lens with these coefficients and center and with square pixels.
-    #[must_use]
     pub fn new(coefficients: Vec<f64>, [cx, cy]: [f64; 2]) -> Self {
         Self {
             coefficients,
