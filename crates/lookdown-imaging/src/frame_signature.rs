@@ -78,7 +78,6 @@ impl FrameSignature {
         })
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "at most a few thousand cells")]
     fn cell(&self, index: usize) -> [f64; 4] {
         let side = f64::from(self.cell);
         let (x, y) = ((index % self.across) as f64, (index / self.across) as f64);

@@ -95,7 +95,6 @@ fn is_shown(edge: &[RimPoint], frame: &Frame, circle: &LensCircle) -> bool {
         .map(|(angle, next)| next - angle)
         .fold(0.0, f64::max);
     let visible = rim::visible_rays(frame, circle);
-    #[expect(clippy::cast_precision_loss, reason = "a few hundred rays")]
     let is_supported = shown.len() as f64 >= MIN_SUPPORT * visible as f64;
     !shown.is_empty() && is_supported && widest_gap <= MAX_GAP_RADIANS
 }

@@ -38,7 +38,6 @@ impl ViewSignature {
                 let tall = rows.len() / width;
                 for (column, sum) in sums.into_iter().enumerate() {
                     let wide = CELL.min(width - column * CELL);
-                    #[expect(clippy::cast_precision_loss, reason = "at most 256")]
                     let mean = sum / (tall * wide) as f32;
                     levels.push(level((mean - offset) / scale));
                 }
@@ -66,7 +65,6 @@ impl ViewSignature {
         !is_noise(&moved)
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "at most a few thousand cells")]
     fn cell(&self, index: usize) -> [f64; 4] {
         let (x, y) = ((index % self.across) as f64, (index / self.across) as f64);
         [x, y, x + 1.0, y + 1.0].map(|at| at * CELL as f64)

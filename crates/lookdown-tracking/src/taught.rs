@@ -199,7 +199,6 @@ fn scale(number: f64) -> f64 {
     (number + 1.0).sqrt()
 }
 
-#[expect(clippy::cast_precision_loss, reason = "numbers of persons are small")]
 fn to_f64(number: usize) -> f64 {
     number as f64
 }

@@ -244,19 +244,6 @@ impl Track {
         self.motion.on_floor().map(|state| state.velocity().into())
     }
 
-    /// Returns the filtered direction in the camera's frame: azimuth (as in the observations) and
-    /// angle off the axis, degrees; `None` on the floor.
-    pub fn bearing_deg(&self) -> Option<[f64; 2]> {
-        let direction = self.motion.direction()?;
-        let azimuth = direction
-            .y
-            .atan2(direction.x)
-            .to_degrees()
-            .rem_euclid(360.0);
-        let off_axis = direction.xy().norm().atan2(direction.z).to_degrees();
-        Some([azimuth, off_axis])
-    }
-
     /// Returns the last places, oldest first, at most [`MAX_TAIL_POINTS`].
     pub fn tail(&self) -> impl ExactSizeIterator<Item = &TailPoint> {
         self.tail.iter()

@@ -15,7 +15,6 @@ const ELLIPSE_POINTS: usize = 32;
 /// Sine and cosine of the angles at which these points lie: thousands of ellipses have the same.
 static ELLIPSE_ANGLES: LazyLock<[(f64, f64); ELLIPSE_POINTS]> = LazyLock::new(|| {
     std::array::from_fn(|index| {
-        #[expect(clippy::cast_precision_loss, reason = "at most 32")]
         let share = TAU * index as f64 / ELLIPSE_POINTS as f64;
         share.sin_cos()
     })
@@ -96,7 +95,6 @@ impl Footprint {
                 });
             }
         }
-        #[expect(clippy::cast_precision_loss, reason = "at most 32 points")]
         let inside_share = inside as f64 / POINTS as f64;
         (inside_share >= MIN_INSIDE_SHARE && !outline.is_empty()).then_some(Self {
             outline,

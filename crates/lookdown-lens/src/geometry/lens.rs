@@ -77,9 +77,11 @@ impl Lens {
         let max_radius = curve.radius(max_theta.min(limit));
         let rises = limit > 0.0 && max_radius.is_finite();
         if !rises {
-            return Err(LensError::NotRising {
-                model: curve.model(),
-            });
+            return Err(LensError::new(format!(
+                "the lens curve of {} does not rise at the optical axis: check the order and sign \
+                 of its parameters",
+                curve.model()
+            )));
         }
         let is_within = max_theta > 0.0 && max_theta <= limit + RIM_TOLERANCE;
         if !is_within {
@@ -221,18 +223,18 @@ fn beyond_limit(curve: &AnyCurve, value: f64, limit: f64) -> LensError {
     let model = curve.model();
     let turns_back = curve.is_polynomial() && value > limit && limit < PI;
     let limit = (limit * 1e4).floor() / 1e4;
-    if turns_back {
-        return LensError::TurnsBack {
-            model,
-            value,
-            limit,
-        };
-    }
-    LensError::MaxThetaOutOfRange {
-        model,
-        value,
-        limit,
-    }
+    let problem = if turns_back {
+        format!(
+            "max_theta is {value} rad, but the curve of this {model} lens turns back at {limit} \
+             rad: check its coefficients, or give at most that"
+        )
+    } else {
+        format!(
+            "max_theta is {value} rad, but this {model} lens is one-to-one only up to {limit} rad: \
+             give a value above 0 and at most that"
+        )
+    };
+    LensError::beyond(limit, problem)
 }
 
 #[cfg(test)]

@@ -18,37 +18,9 @@ pub struct Polygon {
 pub type Edge = [Point2<f64>; 2];
 
 /// Corners that bound no area. They are counted from 1.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum PolygonError {
-    /// Too few corners, or too many.
-    #[error("it has {0} corners: give 3 to {MAX_CORNERS}")]
-    Count(usize),
-    /// A corner at no place.
-    #[error(
-        "corner {number} is [{x}, {y}]: give two finite numbers of at most a million on either \
-         side of 0"
-    )]
-    Coordinate {
-        /// The index of the corner.
-        number: usize,
-        /// Its first coordinate.
-        x: f64,
-        /// Its second one.
-        y: f64,
-    },
-    /// Two neighboring corners in one place.
-    #[error(
-        "corners {0} and {1} are the same: leave one out (the last corner is joined to the first \
-         by itself)"
-    )]
-    Repeated(usize, usize),
-    /// An outline that meets itself.
-    #[error(
-        "the edge from corner {0} to {1} meets the one from corner {2} to {3}: list the corners in \
-         the order in which a walk along the outline passes them"
-    )]
-    Crossing(usize, usize, usize, usize),
-}
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{0}")]
+pub struct PolygonError(String);
 
 impl Polygon {
     /// The area within `corners`, which follow each other along its outline, either way around.
@@ -58,14 +30,19 @@ impl Polygon {
     /// is not finite or beyond a million, or the outline meets itself.
     pub fn new(corners: &[[f64; 2]]) -> Result<Self, PolygonError> {
         if !(3..=MAX_CORNERS).contains(&corners.len()) {
-            return Err(PolygonError::Count(corners.len()));
+            let count = corners.len();
+            let problem = format!("it has {count} corners: give 3 to {MAX_CORNERS}");
+            return Err(PolygonError(problem));
         }
         for (index, &[x, y]) in corners.iter().enumerate() {
             // Not so where it is not a number either.
             let is_near = x.abs() <= MAX_COORDINATE && y.abs() <= MAX_COORDINATE;
             if !is_near {
                 let number = index + 1;
-                return Err(PolygonError::Coordinate { number, x, y });
+                return Err(PolygonError(format!(
+                    "corner {number} is [{x}, {y}]: give two finite numbers of at most a million \
+                     on either side of 0"
+                )));
             }
         }
         let polygon = Self {
@@ -174,7 +151,12 @@ impl Polygon {
         let edges: Vec<Edge> = self.edges().collect();
         for (index, [from, to]) in edges.iter().enumerate() {
             if from == to {
-                return Err(PolygonError::Repeated(index + 1, following(index) + 1));
+                return Err(PolygonError(format!(
+                    "corners {} and {} are the same: leave one out (the last corner is joined to \
+                     the first by itself)",
+                    index + 1,
+                    following(index) + 1
+                )));
             }
         }
         for (one, edge) in edges.iter().enumerate() {
@@ -187,12 +169,14 @@ impl Polygon {
                     meet(*edge, *another)
                 };
                 if is_met {
-                    return Err(PolygonError::Crossing(
+                    return Err(PolygonError(format!(
+                        "the edge from corner {} to {} meets the one from corner {} to {}: list \
+                         the corners in the order in which a walk along the outline passes them",
                         one + 1,
                         following(one) + 1,
                         other + 1,
-                        following(other) + 1,
-                    ));
+                        following(other) + 1
+                    )));
                 }
             }
         }

@@ -359,9 +359,7 @@ fn sizes(has_height: bool) -> [f64; SIZES] {
 }
 
 fn float(number: usize) -> f64 {
-    #[expect(clippy::cast_precision_loss, reason = "small numbers")]
-    let number = number as f64;
-    number
+    number as f64
 }
 
 #[cfg(test)]

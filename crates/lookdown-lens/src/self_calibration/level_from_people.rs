@@ -72,7 +72,6 @@ impl LevelFromPeople {
                 scatter = (squares / total).sqrt().max(LEAST_SCATTER);
             }
         }
-        #[expect(clippy::cast_precision_loss, reason = "a few thousand boxes")]
         let repeated = (rows.len() as f64 / MAX_INDEPENDENT).max(1.0);
         let covariance = information.try_inverse()? * scatter * scatter * repeated;
         let sd_deg = (covariance[(1, 1)] + covariance[(2, 2)]).sqrt();

@@ -30,7 +30,13 @@ pub(super) fn one() -> f64 {
 /// * `SkewedPinhole`: `fx`, `fy` and `skew`;
 /// * `Centered`: none but `cx` and `cy`; the model's file has a `plane` function for the rest.
 macro_rules! lens_parameters {
-    ($(#[$doc:meta])* pub struct $Model:ident: Ideal with $Curve:ident;) => {
+    (
+        $(#[$doc:meta])* pub struct $Model:ident: Ideal with $Curve:ident {
+            limit: $limit:expr,
+            radius: |$theta:ident| $radius_at:expr,
+            angle: |$radius:ident| $angle_at:expr,
+        }
+    ) => {
         lens_parameters! {
             @struct $(#[$doc])* $Model {
                 /// Focal length, pixels; stands for equal `fx` and `fy`.
@@ -80,6 +86,20 @@ macro_rules! lens_parameters {
 
             fn curve(&self) -> Result<$Curve, $crate::geometry::LensError> {
                 Ok($Curve)
+            }
+        }
+
+        impl $crate::geometry::lens::curve::Curve for $Curve {
+            fn limit(&self) -> f64 {
+                $limit
+            }
+
+            fn radius(&self, $theta: f64) -> f64 {
+                $radius_at
+            }
+
+            fn angle(&self, $radius: f64) -> f64 {
+                $angle_at
             }
         }
     };
@@ -169,9 +189,7 @@ pub(super) fn ideal_plane(
         }
         (None, Some(fx), Some(fy)) => (fx, fy),
         _ => {
-            return Err(LensError::EitherOr {
-                choice: "focal, or both fx and fy",
-            });
+            return Err(LensError::new("give either focal, or both fx and fy"));
         }
     };
     Ok(ImagePlane::new(fx, fy, cx, cy))

@@ -1,7 +1,7 @@
 //! A polynomial of the angle, as `WoodScape` and MOIL use it.
 
 use crate::geometry::lens::{
-    ImagePlane, LensError, check::positive, curve::RadiusCurve, model::Model,
+    ImagePlane, LensError, check::positive, curve::FittedCurve, model::Model,
     polynomial::Polynomial,
 };
 
@@ -36,10 +36,10 @@ impl RadialPolynomial {
 }
 
 impl Model for RadialPolynomial {
-    type Curve = RadiusCurve;
+    type Curve = FittedCurve<Polynomial>;
 
-    fn curve(&self) -> Result<RadiusCurve, LensError> {
+    fn curve(&self) -> Result<Self::Curve, LensError> {
         let polynomial = Polynomial::from_axis("coefficients", &self.coefficients)?;
-        Ok(RadiusCurve::new(polynomial))
+        Ok(FittedCurve::radius(polynomial))
     }
 }
