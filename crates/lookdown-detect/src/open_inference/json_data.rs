@@ -165,12 +165,10 @@ impl<'de, E: Elements<'de>> Visitor<'de> for Reading<'_, E> {
     }
 
     fn visit_u64<F: Error>(self, number: u64) -> Result<(), F> {
-        #[expect(clippy::cast_precision_loss, reason = "the target format is FP32")]
         self.visit_f64(number as f64)
     }
 
     fn visit_i64<F: Error>(self, number: i64) -> Result<(), F> {
-        #[expect(clippy::cast_precision_loss, reason = "the target format is FP32")]
         self.visit_f64(number as f64)
     }
 
