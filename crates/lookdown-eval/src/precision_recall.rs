@@ -98,9 +98,7 @@ impl PrecisionRecallCurve {
 
 /// Converts a count to a floating-point number.
 pub(super) fn count(count: usize) -> f64 {
-    #[expect(clippy::cast_precision_loss, reason = "counts are far below 2⁵³")]
-    let count = count as f64;
-    count
+    count as f64
 }
 
 #[cfg(test)]
