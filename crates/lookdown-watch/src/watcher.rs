@@ -160,7 +160,7 @@ impl Watcher {
         for (name, running) in &mut self.running {
             // A task that panicked is logged by the panic hook.
             let _ = (&mut running.sender).await;
-            if running.metrics.reports() == 0 {
+            if running.metrics.sent.get() == 0 {
                 return Err(WatchError::NoFrame(name.clone()));
             }
         }
