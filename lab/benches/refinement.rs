@@ -95,9 +95,7 @@ impl Noise {
             .0
             .wrapping_mul(6_364_136_223_846_793_005)
             .wrapping_add(1_442_695_040_888_963_407);
-        #[expect(clippy::cast_precision_loss, reason = "53 bits")]
-        let share = (self.0 >> 11) as f64 / (1_u64 << 53) as f64;
-        share
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
     }
 
     /// Left, top, width and height of a person anywhere in the frame, 30 to 150 pixels a side.

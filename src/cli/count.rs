@@ -110,7 +110,7 @@ pub(super) fn counting(
         .check()?;
         if let Some(server) = &server {
             options.server = server.clone();
-            options.listen = None;
+            options.entry.listen = None;
         }
         Ok::<_, ConfigError>(Counting { options, mqtt })
     })

@@ -70,10 +70,6 @@ impl Lines {
         let Self {
             name, total, done, ..
         } = self;
-        #[expect(
-            clippy::cast_precision_loss,
-            reason = "an approximate value is sufficient"
-        )]
         let to_go = total.saturating_sub(*done) as f64 / (*done).max(1) as f64;
         let seconds = elapsed.as_secs_f64() * to_go;
         format!("{name}: {done} of {total} images, about {seconds:.0} s left")

@@ -100,7 +100,6 @@ impl SettingsSource {
 
     /// Reads the settings again, while the log has started.
     pub(super) fn again(&self) -> Result<Settings, ConfigError> {
-        self.read()
-            .map_err(|error| ConfigError::File(error.to_string()))
+        self.read().map_err(|error| ConfigError(error.to_string()))
     }
 }

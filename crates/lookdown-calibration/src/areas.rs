@@ -99,7 +99,6 @@ impl Areas {
 
     /// Returns the zones, masks, areas and ignored places in the frame with the share of a frame of
     /// `width` × `height` pixels that each covers.
-    #[must_use]
     pub fn shares(&self, width: u32, height: u32) -> Vec<AreaShare> {
         fn in_frame(area: &ZoneArea) -> Option<&Polygon> {
             match area {
@@ -133,7 +132,6 @@ impl Areas {
     }
 
     /// The same areas in frames `scale_x`, `scale_y` times as large.
-    #[must_use]
     pub fn scaled(&self, scale_x: f64, scale_y: f64) -> Self {
         let (zones, lines, masks) = (self.zones.iter(), self.lines.iter(), self.masks.iter());
         Self {

@@ -1,7 +1,6 @@
 //! A checked calibration, and its fit to frames of other sizes.
 
 use super::{Areas, CalibrationId};
-use crate::revision::revision_of;
 use lookdown_lens::geometry::{Lens, Mount, Pixel, SitePlacement};
 
 /// A frame's height may differ by this from the calibration's aspect, pixels.
@@ -10,14 +9,14 @@ const ASPECT_TOLERANCE: f64 = 1.0;
 /// A camera's calibration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Calibration {
-    id: CalibrationId,
-    revision: String,
-    image_width: u32,
-    image_height: u32,
-    lens: Lens,
-    mount: Mount,
-    areas: Areas,
-    site: Option<SitePlacement>,
+    pub(crate) id: CalibrationId,
+    pub(crate) revision: String,
+    pub(crate) image_width: u32,
+    pub(crate) image_height: u32,
+    pub(crate) lens: Lens,
+    pub(crate) mount: Mount,
+    pub(crate) areas: Areas,
+    pub(crate) site: Option<SitePlacement>,
 }
 
 /// A calibration fitted to the frames at hand.
@@ -41,74 +40,37 @@ pub struct FrameSizeMismatch {
 }
 
 impl Calibration {
-    pub(super) fn new(
-        id: CalibrationId,
-        content: &[u8],
-        image_width: u32,
-        image_height: u32,
-        lens: Lens,
-        mount: Mount,
-    ) -> Self {
-        Self {
-            id,
-            revision: revision_of(content),
-            image_width,
-            image_height,
-            lens,
-            mount,
-            areas: Areas::default(),
-            site: None,
-        }
-    }
-
-    /// The calibration at this place of a site.
-    pub(super) fn with_site(self, site: Option<SitePlacement>) -> Self {
-        Self { site, ..self }
-    }
-
-    /// The calibration with these zones, lines and masks, in pixels of frames of its size.
-    pub(super) fn with_areas(self, areas: Areas) -> Self {
-        Self { areas, ..self }
-    }
-
     /// The calibration's ID.
-    #[must_use]
     pub fn id(&self) -> &CalibrationId {
         &self.id
     }
 
     /// Changes whenever the content of the file does.
-    #[must_use]
     pub fn revision(&self) -> &str {
         &self.revision
     }
 
     /// Width and height of the frames the calibration was made for, pixels.
-    #[must_use]
     pub fn image_size(&self) -> (u32, u32) {
         (self.image_width, self.image_height)
     }
 
     /// The lens, in pixels of frames of [`Calibration::image_size`].
-    #[must_use]
     pub fn lens(&self) -> &Lens {
         &self.lens
     }
 
     /// The mount of the camera.
-    #[must_use]
     pub fn mount(&self) -> &Mount {
         &self.mount
     }
 
     /// The place of the camera on the floor of a site, if it has one.
-    #[must_use]
     pub fn site(&self) -> Option<&SitePlacement> {
         self.site.as_ref()
     }
 
     /// Its zones, lines and masks, in pixels of frames of [`Calibration::image_size`].
-    #[must_use]
     pub fn areas(&self) -> &Areas {
         &self.areas
     }

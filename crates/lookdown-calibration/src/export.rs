@@ -45,7 +45,6 @@ pub struct NotExpressible {
 
 impl Target {
     /// Returns the name, as on the command line.
-    #[must_use]
     pub fn name(self) -> &'static str {
         self.into()
     }

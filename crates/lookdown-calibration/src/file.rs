@@ -2,14 +2,15 @@
 
 use std::path::Path;
 
-use lookdown_common::files;
+use lookdown_common::files::{self, FileError};
 use nalgebra::{Unit, Vector3};
 
 use super::{
-    Areas, Calibration, CalibrationError, CalibrationId,
+    Areas, Calibration, CalibrationId,
     formats::{CalibrationFile, Camera, FileCamera, Format, FormatError},
     native::{NativeImage, NativeMount},
     plausibility,
+    revision::revision_of,
     site::site_placement,
 };
 use lookdown_lens::geometry::{Lens, Mount};
@@ -24,23 +25,19 @@ const UNIT_TOLERANCE: f64 = 1e-3;
 /// The content of a calibration file, at most a byte more than [`CalibrationFile::parse`] accepts.
 ///
 /// # Errors
-/// [`CalibrationError::Unreadable`].
-pub fn content(path: &Path) -> Result<Vec<u8>, CalibrationError> {
+/// [`FileError`].
+pub fn content(path: &Path) -> Result<Vec<u8>, FileError> {
     // One byte more than is accepted, so that a larger file is recognized.
-    files::read_start(path, CalibrationFile::MAX_BYTES as u64 + 1).map_err(|source| {
-        CalibrationError::Unreadable {
-            path: path.to_owned(),
-            source,
-        }
-    })
+    files::read_start(path, CalibrationFile::MAX_BYTES as u64 + 1)
+        .map_err(|error| FileError::unreadable(path, &error))
 }
 
 impl Calibration {
     /// Reads a calibration file with one camera, in any format of [`super::formats`].
     ///
     /// # Errors
-    /// [`CalibrationError`] when it cannot be read, is malformed, describes no camera or several.
-    pub fn read(path: &Path) -> Result<Self, CalibrationError> {
+    /// [`FileError`] when it cannot be read, is malformed, describes no camera or several.
+    pub fn read(path: &Path) -> Result<Self, FileError> {
         read_camera(path, None).map(|(calibration, _)| calibration)
     }
 }
@@ -48,13 +45,10 @@ impl Calibration {
 /// Reads a file of any format: its only camera, or the one with this ID, checked and as stated.
 ///
 /// # Errors
-/// [`CalibrationError`] when the file cannot be read or is malformed, when it does not have that
+/// [`FileError`] when the file cannot be read or is malformed, when it does not have that
 /// camera or has several, or when the camera cannot be used.
-pub fn read_camera(
-    path: &Path,
-    id: Option<&str>,
-) -> Result<(Calibration, Camera), CalibrationError> {
-    let in_file = |problem| CalibrationError::in_file(path, problem);
+pub fn read_camera(path: &Path, id: Option<&str>) -> Result<(Calibration, Camera), FileError> {
+    let in_file = |problem: FormatError| FileError::new(path, problem.to_string());
     let content = content(path)?;
     let mut file = CalibrationFile::parse(&content).map_err(in_file)?;
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
@@ -98,7 +92,6 @@ impl CalibrationFile {
     /// The file's cameras, checked, under the IDs they have when the file is called `stem`: a
     /// native file has its ID, a single camera has the name of its file, and one of several the
     /// file's and its own, as in `lobby-cam0`.
-    #[must_use]
     pub fn calibrations(&self, stem: &str, content: &[u8]) -> Vec<Checked> {
         let several = self.cameras.len() > 1;
         let checked = self.cameras.iter().enumerate().map(|(index, entry)| {
@@ -139,12 +132,16 @@ fn check(id: &str, camera: &Camera, content: &[u8]) -> Result<Calibration, Forma
     let ends_explicitly = camera.lens.max_theta().is_some();
     let lens = Lens::new(&camera.lens).map_err(|error| invalid("lens", error.to_string()))?;
     let mount = mount(&camera.mount).map_err(|problem| invalid("mount", problem))?;
-    let image = NativeImage { width, height };
-    let areas = Areas::checked(camera, image, &mount)?;
-    let site = site_placement(&camera.mount)?;
-    let whole = Calibration::new(id, content, width, height, lens, mount)
-        .with_areas(areas)
-        .with_site(site);
+    let whole = Calibration {
+        id,
+        revision: revision_of(content),
+        image_width: width,
+        image_height: height,
+        lens,
+        mount,
+        areas: Areas::checked(camera, NativeImage { width, height }, &mount)?,
+        site: site_placement(&camera.mount)?,
+    };
     let within_frame = whole.clone().limited_to_image();
     plausibility::check(whole.lens(), width, height, within_frame.lens().max_theta())
         .map_err(|problem| invalid("lens", problem))?;

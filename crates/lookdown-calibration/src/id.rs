@@ -24,7 +24,6 @@ impl CalibrationId {
                                     with a letter or digit";
 
     /// The ID as text.
-    #[must_use]
     pub fn as_str(&self) -> &str {
         &self.0
     }

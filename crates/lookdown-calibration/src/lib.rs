@@ -2,7 +2,6 @@
 
 mod areas;
 mod calibrated_camera;
-mod error;
 pub mod export;
 mod file;
 pub mod formats;
@@ -16,7 +15,6 @@ mod warnings;
 
 pub use areas::{AreaShare, Areas};
 pub use calibrated_camera::{Calibration, CameraGeometry, FrameSizeMismatch};
-pub use error::CalibrationError;
 pub use file::{content as read_content, read_camera};
 pub use formats::{CalibrationFile, FormatError};
 pub use id::CalibrationId;

@@ -57,7 +57,6 @@ pub struct NativeCalibration {
 
 impl NativeCalibration {
     /// Creates the calibration of a camera that looks straight down, without areas and defaults.
-    #[must_use]
     pub fn new(id: String, image: NativeImage, lens: LensModel) -> Self {
         Self {
             version: StoredFile::Calibration.version(),

@@ -8,7 +8,6 @@ use sha2::{Digest, Sha256};
 const SHOWN_DIGITS: usize = 12;
 
 /// Returns the SHA-256 of `content`, hexadecimal.
-#[must_use]
 pub fn sha256_of(content: &[u8]) -> String {
     let digest = Sha256::digest(content);
     digest.iter().fold(String::new(), |mut digits, byte| {
@@ -20,7 +19,6 @@ pub fn sha256_of(content: &[u8]) -> String {
 
 /// Returns the revision of `content`: twelve hexadecimal digits that change whenever the content
 /// does.
-#[must_use]
 pub fn revision_of(content: &[u8]) -> String {
     let mut digits = sha256_of(content);
     digits.truncate(SHOWN_DIGITS);

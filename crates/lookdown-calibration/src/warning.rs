@@ -17,7 +17,6 @@ macro_rules! warnings {
             pub const ALL: &[Self] = &[$(Self::$code),+];
 
             /// The stable name.
-            #[must_use]
             pub fn name(self) -> &'static str {
                 match self {
                     $(Self::$code => $name,)+
@@ -25,7 +24,6 @@ macro_rules! warnings {
             }
 
             /// The meaning, as one sentence.
-            #[must_use]
             pub fn description(self) -> &'static str {
                 match self {
                     $(Self::$code => concat!($($description),+).trim_ascii_start(),)+
@@ -84,7 +82,6 @@ impl fmt::Display for Warning {
 }
 
 /// Returns the table of all codes as Markdown.
-#[must_use]
 pub fn warning_table() -> String {
     let rows = WarningCode::ALL
         .iter()

@@ -17,7 +17,6 @@ const NEAR_AXIS: f64 = 0.01;
 
 impl Calibration {
     /// Returns the implausible properties: the field, its value, and its usual cause.
-    #[must_use]
     pub fn warnings(&self) -> Vec<Warning> {
         let lens = self.lens();
         let mut warnings = self.off_center();

@@ -16,7 +16,6 @@ pub struct Backoff {
 
 impl Backoff {
     /// Creates a backoff from the first to the longest pause.
-    #[must_use]
     pub fn new(first: Duration, longest: Duration) -> Self {
         Self {
             first,

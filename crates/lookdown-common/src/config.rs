@@ -1,6 +1,6 @@
 //! Settings files: reading with limits, secrets, and errors that name the field.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde::de::DeserializeOwned;
 
@@ -9,104 +9,56 @@ use crate::{
     files::{self, MAX_SETTINGS_BYTES},
 };
 
-/// A setting that cannot be used.
+/// A setting that cannot be used. The message is one sentence with the field and the remedy.
 #[derive(Debug, thiserror::Error)]
-pub enum ConfigError {
-    /// A file that cannot be read.
-    #[error("{field}: {path} cannot be read: {source}: give a readable file of at most 1 MiB")]
-    Unreadable {
-        /// The setting that names the file.
-        field: String,
-        /// The file.
-        path: PathBuf,
-        /// The cause.
-        source: std::io::Error,
-    },
-    /// Not TOML, an unknown key, or a value of another type.
-    #[error("{field}: {problem}")]
-    Malformed {
-        /// The place in the file.
-        field: String,
-        /// The problem and its remedy.
-        problem: String,
-    },
-    /// A value that cannot be used.
-    #[error("{field}: {value:?} {remedy}")]
-    Value {
-        /// The setting.
-        field: String,
-        /// Its value.
-        value: String,
-        /// The remedy, as the end of the sentence.
-        remedy: String,
-    },
-    /// A whole file of settings that cannot be used.
-    #[error("{0}")]
-    File(String),
-    /// A missing or secret value.
-    #[error("{field}: {problem}")]
-    Problem {
-        /// The setting.
-        field: String,
-        /// The problem and its remedy.
-        problem: String,
-    },
-}
+#[error("{0}")]
+pub struct ConfigError(pub String);
 
 impl ConfigError {
     /// Creates the error of a value. `remedy` is the end of the sentence.
     pub fn value(field: &str, value: &(impl ToString + ?Sized), remedy: &str) -> Self {
-        Self::Value {
-            field: field.to_owned(),
-            value: value.to_string(),
-            remedy: remedy.to_owned(),
-        }
+        Self(format!("{field}: {:?} {remedy}", value.to_string()))
     }
 
     /// Creates the error of a missing or secret value.
     pub fn problem(field: &str, problem: &impl ToString) -> Self {
-        Self::Problem {
-            field: field.to_owned(),
-            problem: problem.to_string(),
-        }
+        Self(format!("{field}: {}", problem.to_string()))
     }
 }
 
 /// Parses a settings file in TOML. `whole` names the file in errors, and `page` documents it.
 ///
 /// # Errors
-/// [`ConfigError::Malformed`].
+/// [`ConfigError`].
 pub fn parse_toml<T: DeserializeOwned>(
     text: &str,
     whole: &str,
     page: &str,
 ) -> Result<T, ConfigError> {
-    let malformed = |field: String, error: &toml::de::Error| {
+    let malformed = |field: &str, error: &toml::de::Error| {
         let line = error.span().map_or(1, |span| {
             let before = text.get(..span.start).unwrap_or_default();
             before.matches('\n').count() + 1
         });
         let message = error.message().trim();
-        ConfigError::Malformed {
-            field,
-            problem: format!("{message} (line {line}): correct the file as {page} describes"),
-        }
+        let problem = format!("{message} (line {line}): correct the file as {page} describes");
+        ConfigError::problem(field, &problem)
     };
-    let deserializer =
-        toml::Deserializer::parse(text).map_err(|error| malformed(whole.to_owned(), &error))?;
+    let deserializer = toml::Deserializer::parse(text).map_err(|error| malformed(whole, &error))?;
     serde_path_to_error::deserialize(deserializer)
-        .map_err(|error| malformed(error.path().to_string(), error.inner()))
+        .map_err(|error| malformed(&error.path().to_string(), error.inner()))
 }
 
 /// Reads a file of at most 1 MiB. Blocks.
 ///
 /// # Errors
-/// [`ConfigError::Unreadable`].
+/// [`ConfigError`].
 pub fn read_file(field: &str, path: &Path) -> Result<Vec<u8>, ConfigError> {
-    files::read(path, MAX_SETTINGS_BYTES).map_err(|source| ConfigError::Unreadable {
-        field: field.to_owned(),
-        path: path.to_owned(),
-        source,
+    files::read(path, MAX_SETTINGS_BYTES).map_err(|error| {
+        let path = path.display();
+        let problem =
+            format!("{path} cannot be read: {error}: give a readable file of at most 1 MiB");
+        ConfigError::problem(field, &problem)
     })
 }
 

@@ -7,7 +7,6 @@ use jiff::SignedDuration;
 use crate::ConfigError;
 
 /// Parses a duration with its unit, such as `500ms`. Returns `None` outside of the limits.
-#[must_use]
 pub fn parse_duration(text: &str, limits: RangeInclusive<Duration>) -> Option<Duration> {
     let parsed = Duration::try_from(text.parse::<SignedDuration>().ok()?).ok()?;
     limits.contains(&parsed).then_some(parsed)

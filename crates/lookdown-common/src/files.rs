@@ -8,7 +8,7 @@ use std::{
     fs::{File, OpenOptions},
     io::{self, Read},
     os::unix::fs::OpenOptionsExt,
-    path::Path,
+    path::{Path, PathBuf},
 };
 
 use rustix::fs::OFlags;
@@ -18,6 +18,31 @@ pub const MAX_SETTINGS_BYTES: u64 = 1 << 20;
 
 /// Most bytes of an image file that the command line reads.
 pub const MAX_IMAGE_BYTES: u64 = 256 << 20;
+
+/// A file or folder that cannot be used. The message is one sentence with the remedy.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{path}: {problem}")]
+pub struct FileError {
+    /// The file or folder.
+    pub path: PathBuf,
+    /// The problem and its remedy.
+    pub problem: String,
+}
+
+impl FileError {
+    /// Creates the error for the content of a file.
+    pub fn new(path: &Path, problem: impl Into<String>) -> Self {
+        Self {
+            path: path.to_owned(),
+            problem: problem.into(),
+        }
+    }
+
+    /// Creates the error for a file or folder that the operating system does not let read.
+    pub fn unreadable(path: &Path, error: &io::Error) -> Self {
+        Self::new(path, format!("cannot be read: {error}"))
+    }
+}
 
 /// The treatment of a symbolic link at the end of a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -63,7 +63,6 @@ impl ServerClient {
     }
 
     /// Returns the URL of a route.
-    #[must_use]
     pub fn route<'a>(&self, segments: impl IntoIterator<Item = &'a str>) -> Url {
         let mut url = self.url.clone();
         // HTTP URLs always have a path.
@@ -111,7 +110,6 @@ impl ServerClient {
     }
 
     /// Returns the scheme, the host and the port of the server.
-    #[must_use]
     pub fn address(&self) -> String {
         self.url.origin().ascii_serialization()
     }
@@ -130,7 +128,6 @@ impl ServerClient {
     }
 
     /// Describes a request without a response.
-    #[must_use]
     pub fn failure(&self, error: &HttpError) -> String {
         format!(
             "the server {} cannot be reached: {}: start it, or correct upstream.url",
@@ -141,7 +138,6 @@ impl ServerClient {
 }
 
 /// Returns the time of `Retry-After` in seconds, at most a minute.
-#[must_use]
 pub fn retry_after(headers: &HeaderMap) -> Option<Duration> {
     let seconds = headers.get(RETRY_AFTER)?.to_str().ok()?.parse().ok()?;
     Some(Duration::from_secs(seconds).min(MAX_RETRY_AFTER))

@@ -12,7 +12,6 @@ pub const JPEG_END: &[u8] = &[0xff, 0xd9];
 ///
 /// Segments are skipped by their length, so that the end marker of a thumbnail inside one does not
 /// count. Bytes between segments are entropy-coded data or padding.
-#[must_use]
 pub fn jpeg_length(bytes: &[u8]) -> Option<usize> {
     let mut rest = bytes;
     loop {

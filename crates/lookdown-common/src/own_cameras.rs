@@ -18,21 +18,18 @@ impl OwnCameras {
 
     /// Returns true for a camera of this process that is paused: its last number is not the present
     /// one.
-    #[must_use]
     pub fn is_paused(&self, name: &str) -> bool {
         let names = self.0.read().unwrap_or_else(PoisonError::into_inner);
         names.get(name).copied().unwrap_or_default()
     }
 
     /// Returns true for the name of a camera of this process.
-    #[must_use]
     pub fn contains(&self, name: &str) -> bool {
         let names = self.0.read().unwrap_or_else(PoisonError::into_inner);
         names.contains_key(name)
     }
 
     /// Returns the claim of a camera.
-    #[must_use]
     pub fn claim(&self, name: &str, is_calibrated: bool) -> Claim {
         match is_calibrated {
             _ if self.contains(name) => Claim::Own,

@@ -4,7 +4,6 @@
 pub const MAX_CHARS: usize = 64;
 
 /// Returns true if the name is plain.
-#[must_use]
 pub fn is_plain(name: &str) -> bool {
     let letter_or_digit = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit();
     name.len() <= MAX_CHARS

@@ -27,7 +27,6 @@ pub struct Replacement {
 impl Replacement {
     /// The replacement of the file at `path`, which may be missing. Several writers may replace the
     /// same file: their names are random, as containers on one volume have the same process IDs.
-    #[must_use]
     pub fn new(path: &Path) -> Self {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         // Each state has keys of its own, random at first.
@@ -41,7 +40,6 @@ impl Replacement {
 
     /// The replacement of a file with secrets, which only this user can read, for one writer at a
     /// time: what a killed writer left is overwritten by the next one.
-    #[must_use]
     pub fn for_secret(path: &Path) -> Self {
         Self {
             path: path.to_owned(),

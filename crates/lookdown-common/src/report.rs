@@ -254,7 +254,6 @@ pub struct ReportTimings {
 
 impl ReportTimings {
     /// Returns every stage by name, the total last.
-    #[must_use]
     pub fn stages(&self) -> [(&'static str, f64); 7] {
         [
             ("decode", self.decode),

@@ -40,7 +40,6 @@ pub struct ServerEntry {
 
 impl ServerEntry {
     /// Fills absent values with those of another entry.
-    #[must_use]
     pub fn or(self, other: &Self) -> Self {
         Self {
             url: self.url.or_else(|| other.url.clone()),

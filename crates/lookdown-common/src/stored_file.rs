@@ -26,7 +26,6 @@ impl StoredFile {
     pub const KEY: &str = "version";
 
     /// Returns the newest version, which is the one that this program writes.
-    #[must_use]
     pub const fn version(self) -> u8 {
         match self {
             Self::Settings | Self::Calibration | Self::Cameras | Self::Views | Self::Counts => 1,

@@ -22,7 +22,6 @@ impl fmt::Display for Quoted<'_> {
 
 /// Returns true for characters that a name must not have: control characters, and invisible ones
 /// that join, hide or reorder the others (Unicode category Cf), such as U+202E, and fillers.
-#[must_use]
 pub fn is_invisible(character: char) -> bool {
     character.is_control()
         || matches!(
@@ -46,7 +45,6 @@ pub fn is_invisible(character: char) -> bool {
 pub const MAX_CAMERA_CHARS: usize = 128;
 
 /// Returns true if a camera may have this name.
-#[must_use]
 pub fn is_camera_name(name: &str) -> bool {
     let is_shown = !name.trim().is_empty() && !name.contains(is_invisible);
     is_shown && name.chars().count() <= MAX_CAMERA_CHARS
@@ -54,7 +52,6 @@ pub fn is_camera_name(name: &str) -> bool {
 
 /// Formats a text as one line of at most 300 characters, so that it can neither forge nor fill log
 /// lines.
-#[must_use]
 pub fn one_line(text: &(impl fmt::Display + ?Sized)) -> String {
     let text = text.to_string();
     let text = text.trim().chars().take(MAX_LINE_CHARS);
@@ -63,7 +60,6 @@ pub fn one_line(text: &(impl fmt::Display + ?Sized)) -> String {
 }
 
 /// Formats an error with its causes in one line.
-#[must_use]
 pub fn with_causes(error: &(dyn Error + 'static)) -> String {
     one_line(
         &causes(error)
@@ -81,7 +77,6 @@ pub fn causes<'a>(
 }
 
 /// Returns the first 64 characters of a text.
-#[must_use]
 pub fn shortened(text: &str) -> &str {
     let end = text.char_indices().nth(MAX_CHARS);
     end.map_or(text, |(end, _)| &text[..end])

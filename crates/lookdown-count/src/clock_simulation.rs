@@ -285,7 +285,6 @@ impl World {
 
 /// The place of a person who walks to and fro, 6 s each way.
 fn place_at(true_ms: i64) -> f64 {
-    #[expect(clippy::cast_precision_loss, reason = "small")]
     let phase = (true_ms - START_MS).rem_euclid(12_000) as f64 / 6_000.0;
     let share = if phase < 1.0 { phase } else { 2.0 - phase };
     share * 6.0 - 3.05

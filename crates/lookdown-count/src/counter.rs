@@ -44,6 +44,7 @@ pub(crate) struct CountingOptions {
 }
 
 /// The cameras and sites.
+#[derive(Default)]
 pub(crate) struct Counter {
     options: CountingOptions,
     scenes: BTreeMap<Owner, Scene>,
@@ -88,23 +89,10 @@ impl Counter {
     pub(crate) fn new(options: CountingOptions, last_event: u64, totals: Totals) -> Self {
         Self {
             options,
-            scenes: BTreeMap::new(),
-            owners: BTreeMap::new(),
-            sums: Sums::default(),
             stored_totals: totals.clone(),
             totals,
-            is_urgent: false,
             last_event,
-            position_resets: 0,
-            displaced_cameras: 0,
-            drops: Drops::default(),
-            room_log: LogPause::default(),
-            position_log: LogPause::default(),
-            tracks_log: LogPause::default(),
-            ahead_log: LogPause::default(),
-            bars: BTreeMap::new(),
-            changed: BTreeSet::new(),
-            has_news: false,
+            ..Self::default()
         }
     }
 

@@ -202,7 +202,6 @@ impl Planes<'_> {
                 let per_edge = (MAX_CORNERS / area.corners().len()).clamp(1, 8);
                 let points = area.edges().flat_map(|[from, to]| {
                     (0..per_edge).map(move |point| {
-                        #[expect(clippy::cast_precision_loss, reason = "at most 8")]
                         let share = point as f64 / per_edge as f64;
                         from + (to - from) * share
                     })

@@ -24,7 +24,6 @@ pub(crate) struct FrameRate {
 
 impl FrameRate {
     /// Adds the time between two reports. Returns true if it had too few frames.
-    #[expect(clippy::cast_precision_loss, reason = "no longer than the longest gap")]
     pub(crate) fn add(&mut self, time: TimeSpan) -> bool {
         let interval_ms = (time.to_ms - time.from_ms) as f64;
         let weight = 1.0 - (-interval_ms / AVERAGED_MS).exp();

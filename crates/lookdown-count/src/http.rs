@@ -69,7 +69,6 @@ pub(crate) fn operation_router(counter: &Arc<Mutex<Counter>>, metrics: &Arc<Metr
 }
 
 /// Returns the OpenAPI document of the counts.
-#[must_use]
 pub fn openapi_document() -> OpenApi {
     document::merged([
         routes().into_openapi(),

@@ -69,26 +69,10 @@ impl Default for CountEntry {
 pub struct CountOptions {
     /// The server.
     pub server: ServerOptions,
-    /// The address of the HTTP API; `None` if another server answers with its routes.
-    pub listen: Option<SocketAddr>,
     /// The key that requests to the HTTP API must have.
     pub api_key: Option<Secret>,
-    /// True if every client may read without a key.
-    pub open: bool,
-    /// Public names of an open address.
-    pub hosts: Vec<String>,
-    /// The file of the store.
-    pub store: PathBuf,
-    /// The time after which sums are removed.
-    pub retention: Duration,
-    /// The interval of the transactions.
-    pub commit_every: Duration,
-    /// The longest time between two reports of a camera that is known.
-    pub longest_gap: Duration,
-    /// Most cameras.
-    pub max_cameras: usize,
-    /// The time after which people on the floor are an alert; `None` for no alerts.
-    pub floor_alert_after: Option<Duration>,
+    /// The other settings, as they are written.
+    pub entry: CountEntry,
     /// Receivers of messages.
     pub(crate) webhooks: Vec<Webhook>,
 }
@@ -98,7 +82,7 @@ impl CountEntry {
     ///
     /// # Errors
     /// [`ConfigError`].
-    pub fn check(self) -> Result<CountOptions, ConfigError> {
+    pub fn check(mut self) -> Result<CountOptions, ConfigError> {
         if self.webhooks.len() > MAX_WEBHOOKS {
             let remedy = "webhooks are too many: give at most 32";
             return Err(ConfigError::value("webhooks", &self.webhooks.len(), remedy));
@@ -110,21 +94,13 @@ impl CountEntry {
                           to true to let every client read the counts";
             return Err(ConfigError::value("counts.listen", &listen, remedy));
         }
-        let webhooks = self.webhooks.into_iter().enumerate();
+        let webhooks = std::mem::take(&mut self.webhooks).into_iter().enumerate();
         let webhooks = webhooks.map(|(index, entry)| entry.check(&format!("webhooks[{index}].")));
         Ok(CountOptions {
             server: self.server.check()?,
-            listen: self.listen,
             api_key,
-            open: self.open,
-            hosts: self.hosts,
-            store: self.store,
-            retention: self.retention,
-            commit_every: self.commit_every,
-            longest_gap: self.longest_gap,
-            max_cameras: self.max_cameras,
-            floor_alert_after: self.floor_alert_after,
             webhooks: webhooks.collect::<Result<_, _>>()?,
+            entry: self,
         })
     }
 }

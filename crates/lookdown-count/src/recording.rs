@@ -98,7 +98,6 @@ impl Recording {
     }
 
     /// Returns the time of the last report of the camera that is counted.
-    #[must_use]
     pub fn counted_until(&self) -> Option<Timestamp> {
         let micros = i64::try_from(self.counter.last_event()).ok();
         let micros = micros.filter(|micros| *micros > 0)?;
@@ -157,13 +156,11 @@ impl Recording {
     }
 
     /// Returns true if this process has counted a report.
-    #[must_use]
     pub fn has_counted(&self) -> bool {
         self.first.is_some()
     }
 
     /// Returns the persons at the last report.
-    #[must_use]
     pub fn persons(&self) -> u64 {
         let scene = self.counter.scene_of(&self.camera);
         scene.map_or(0, |scene| scene.presence().persons)
@@ -171,7 +168,6 @@ impl Recording {
 
     /// Returns the indices of the persons in the report of this time, the last one, that are
     /// followed and count.
-    #[must_use]
     pub fn followed(&self, at: Timestamp) -> BTreeSet<usize> {
         let at_s = seconds(at.as_millisecond());
         let tracks = self.counter.scene_of(&self.camera).into_iter();
@@ -181,7 +177,6 @@ impl Recording {
     }
 
     /// Returns the crossings of the lines of the camera since the store was created.
-    #[must_use]
     pub fn lines(&self) -> Vec<LineSnapshot> {
         let snapshot = self.counter.snapshot(0);
         let cameras = snapshot.cameras.into_iter();

@@ -89,14 +89,14 @@ pub async fn count(
 ) -> Result<(), CountError> {
     let metrics = Arc::new(Metrics::new()?);
     let client = ServerClient::new(&options.server)?;
-    let listener = match options.listen {
+    let listener = match options.entry.listen {
         Some(address) => {
             let listener = bind("counts.listen", address).await;
             Some(listener.map_err(CountError::Address)?)
         }
         None => None,
     };
-    let path = options.store.clone();
+    let path = options.entry.store.clone();
     let opened = spawn_blocking(move || {
         let store = Store::open(&path)?;
         let resumed = store.resumed()?;
@@ -106,9 +106,10 @@ pub async fn count(
     let calibrations = Calibrations::resumed(resumed.calibrations);
     let in_process = options.server.in_process.as_ref();
     let counting = CountingOptions {
-        longest_gap_ms: i64::try_from(options.longest_gap.as_millis()).unwrap_or(i64::MAX),
-        max_cameras: options.max_cameras,
+        longest_gap_ms: i64::try_from(options.entry.longest_gap.as_millis()).unwrap_or(i64::MAX),
+        max_cameras: options.entry.max_cameras,
         floor_alert_after_ms: options
+            .entry
             .floor_alert_after
             .map(|after| i64::try_from(after.as_millis()).unwrap_or(i64::MAX)),
         own: in_process.map_or_else(OwnCameras::default, |server| server.own_cameras.clone()),
@@ -161,10 +162,10 @@ pub async fn count(
         store,
         metrics,
         snapshots,
-        commit_every: options.commit_every,
-        retention: options.retention,
+        commit_every: options.entry.commit_every,
+        retention: options.entry.retention,
         messages: Vec::new(),
-        next_commit: Instant::now() + options.commit_every,
+        next_commit: Instant::now() + options.entry.commit_every,
         next_expiry: Instant::now(),
         stop: stop_receiver,
     };
@@ -201,7 +202,7 @@ fn serve_alone(
     }
     let access = match (&options.api_key, address) {
         (Some(key), _) => Access::Key(SecretString::clone(key)),
-        (None, _) if options.open => Access::Everyone(options.hosts.clone().into()),
+        (None, _) if options.entry.open => Access::Everyone(options.entry.hosts.clone().into()),
         (None, Some(address)) => Access::without_key(address),
         (None, None) => Access::OwnMachine,
     };

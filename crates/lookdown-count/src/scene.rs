@@ -233,9 +233,7 @@ impl Scene {
 
 /// Returns seconds of milliseconds.
 pub(crate) fn seconds(milliseconds: i64) -> f64 {
-    #[expect(clippy::cast_precision_loss, reason = "exact for 285,000 years")]
-    let milliseconds = milliseconds as f64;
-    milliseconds / 1000.0
+    milliseconds as f64 / 1000.0
 }
 
 #[cfg(test)]

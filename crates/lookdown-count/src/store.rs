@@ -8,9 +8,10 @@ mod schema;
 mod write;
 
 use std::{
+    fmt::Display,
     fs::{File, OpenOptions, TryLockError},
     os::unix::fs::OpenOptionsExt,
-    path::{Path, PathBuf},
+    path::Path,
     sync::Arc,
     thread::sleep,
     time::{Duration, Instant},
@@ -34,34 +35,30 @@ const LOCK_PAUSE: Duration = Duration::from_millis(50);
 
 /// A store that cannot be used.
 #[derive(Debug, thiserror::Error)]
-pub enum StoreError {
-    /// The file cannot be opened, or is not a store.
-    #[error(
-        "counts.path: {path} cannot be used: {problem}: give a writable path of a store of lookdown count"
-    )]
-    Unusable {
-        /// The file.
-        path: PathBuf,
-        /// The cause.
-        problem: String,
-    },
-    /// Another process has the store open.
-    #[error("counts.path: {0} is in use by another process: stop it, or give another path")]
-    InUse(PathBuf),
-    /// The store is of a later version.
-    #[error("counts.path: {path} {problem}")]
-    Version {
-        /// The file.
-        path: PathBuf,
-        /// Its version and the remedy.
-        problem: String,
-    },
-    /// A query failed.
-    #[error("the store cannot be read or written: {0}")]
-    Query(#[from] rusqlite::Error),
-    /// A state cannot be encoded.
-    #[error("the state of a tracker cannot be stored: {0}")]
-    State(#[from] postcard::Error),
+#[error("{0}")]
+pub struct StoreError(String);
+
+impl StoreError {
+    fn unusable(path: &Path, problem: impl Display) -> Self {
+        Self(format!(
+            "counts.path: {} cannot be used: {problem}: give a writable path of a store of lookdown count",
+            path.display()
+        ))
+    }
+}
+
+impl From<rusqlite::Error> for StoreError {
+    fn from(problem: rusqlite::Error) -> Self {
+        Self(format!("the store cannot be read or written: {problem}"))
+    }
+}
+
+impl From<postcard::Error> for StoreError {
+    fn from(problem: postcard::Error) -> Self {
+        Self(format!(
+            "the state of a tracker cannot be stored: {problem}"
+        ))
+    }
 }
 
 /// The store. One connection writes, one reads.
@@ -77,29 +74,19 @@ impl Store {
     /// Opens or creates the store. Blocks.
     pub(crate) fn open(path: &Path) -> Result<Self, StoreError> {
         let lock = lock(path)?;
-        let unusable = |problem: rusqlite::Error| StoreError::Unusable {
-            path: path.to_owned(),
-            problem: problem.to_string(),
-        };
+        let unusable = |problem: rusqlite::Error| StoreError::unusable(path, problem);
         // The files of SQLite beside it get its mode.
-        let created = open_private(path);
-        created.map_err(|problem| StoreError::Unusable {
-            path: path.to_owned(),
-            problem: problem.to_string(),
-        })?;
+        open_private(path).map_err(|problem| StoreError::unusable(path, problem))?;
         let writer = connect(path).map_err(unusable)?;
         if schema::has_code(&writer).map_err(unusable)? {
-            return Err(StoreError::Unusable {
-                path: path.to_owned(),
-                problem: "it has views, triggers or virtual tables of another program".to_owned(),
-            });
+            let problem = "it has views, triggers or virtual tables of another program";
+            return Err(StoreError::unusable(path, problem));
         }
         let version = schema::version(&writer).map_err(unusable)?;
         if version != NEW {
             let checked = StoredFile::Counts.check(&version.to_string());
-            checked.map_err(|problem| StoreError::Version {
-                path: path.to_owned(),
-                problem,
+            checked.map_err(|problem| {
+                StoreError(format!("counts.path: {} {problem}", path.display()))
             })?;
         }
         schema::create(&writer).map_err(unusable)?;
@@ -145,18 +132,19 @@ fn open_private(path: &Path) -> std::io::Result<File> {
 fn lock(path: &Path) -> Result<File, StoreError> {
     let mut name = path.as_os_str().to_owned();
     name.push(".lock");
-    let opened = open_private(Path::new(&name));
-    let unusable = |problem: std::io::Error| StoreError::Unusable {
-        path: path.to_owned(),
-        problem: problem.to_string(),
-    };
-    let file = opened.map_err(unusable)?;
+    let unusable = |problem| StoreError::unusable(path, problem);
+    let file = open_private(Path::new(&name)).map_err(unusable)?;
     let started = Instant::now();
     loop {
         match file.try_lock() {
             Ok(()) => return Ok(file),
             Err(TryLockError::WouldBlock) if started.elapsed() < LOCK_TIMEOUT => sleep(LOCK_PAUSE),
-            Err(TryLockError::WouldBlock) => return Err(StoreError::InUse(path.to_owned())),
+            Err(TryLockError::WouldBlock) => {
+                return Err(StoreError(format!(
+                    "counts.path: {} is in use by another process: stop it, or give another path",
+                    path.display()
+                )));
+            }
             Err(TryLockError::Error(problem)) => return Err(unusable(problem)),
         }
     }

@@ -99,27 +99,27 @@ impl WebhookEntry {
         let secret = read_secret(&field("secret_file"), &self.secret_file)?;
         let key = SigningKey::parse(secret.expose_secret());
         let key = key.map_err(|problem| ConfigError::problem(&field("secret_file"), &problem))?;
-        let is_for = |name: &str, is_given: bool, on: &[Occasion]| {
-            if !is_given || on.contains(&self.on) {
-                return Ok(());
+        for (name, is_given, belongs) in [
+            ("line", self.line.is_some(), self.on == Occasion::Crossing),
+            (
+                "direction",
+                self.direction.is_some(),
+                self.on == Occasion::Crossing,
+            ),
+            ("zone", self.zone.is_some(), self.on == Occasion::Occupancy),
+            (
+                "at_least",
+                self.at_least.is_some(),
+                self.on == Occasion::Occupancy,
+            ),
+            ("after", self.after.is_some(), self.on == Occasion::Silent),
+            ("image", self.image, self.on != Occasion::Silent),
+        ] {
+            if is_given && !belongs {
+                let problem = "it does not belong to this condition: remove it, or change `on`";
+                return Err(ConfigError::problem(&field(name), &problem));
             }
-            let problem = "it does not belong to this condition: remove it, or change `on`";
-            Err(ConfigError::problem(&field(name), &problem))
-        };
-        is_for("line", self.line.is_some(), &[Occasion::Crossing])?;
-        is_for("direction", self.direction.is_some(), &[Occasion::Crossing])?;
-        is_for("zone", self.zone.is_some(), &[Occasion::Occupancy])?;
-        is_for("at_least", self.at_least.is_some(), &[Occasion::Occupancy])?;
-        is_for("after", self.after.is_some(), &[Occasion::Silent])?;
-        is_for(
-            "image",
-            self.image,
-            &[
-                Occasion::Crossing,
-                Occasion::Occupancy,
-                Occasion::FloorAlert,
-            ],
-        )?;
+        }
         let condition = match self.on {
             Occasion::Crossing => Condition::Crossing {
                 line: self.line,

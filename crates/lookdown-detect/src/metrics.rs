@@ -75,7 +75,6 @@ pub fn replace_info(info: &IntGaugeVec, before: Option<&[&str]>, now: &[&str]) {
 }
 
 /// Returns the value of a gauge that counts things.
-#[must_use]
 pub fn gauge_value(count: impl TryInto<i64>) -> i64 {
     count.try_into().unwrap_or(i64::MAX)
 }

@@ -16,7 +16,6 @@ pub struct AveragePrecision {
 
 impl PrecisionRecallCurve {
     /// The average precision of this curve, 0 to 1.
-    #[must_use]
     pub fn average_precision(&self) -> AveragePrecision {
         let envelope = self.envelope();
         AveragePrecision {
@@ -28,7 +27,6 @@ impl PrecisionRecallCurve {
     }
 
     /// `(recall, envelope precision)` of each point, by ascending recall.
-    #[must_use]
     pub fn envelope(&self) -> Vec<(f64, f64)> {
         let mut greatest: f64 = 0.0;
         let mut envelope: Vec<(f64, f64)> = self

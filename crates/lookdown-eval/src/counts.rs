@@ -58,7 +58,6 @@ pub struct CalibrationError {
 
 impl Counts {
     /// Matches the detections of `images` by `rule` at `O_t` = 0.5.
-    #[must_use]
     pub fn from_images<B: Region>(images: &[EvaluatedImage<B>], rule: MatchingRule) -> Self {
         let counted = images.iter().map(|image| {
             let outcomes = rule.outcomes(&image.detections, &image.truth, MIN_IOU);
@@ -77,20 +76,17 @@ impl Counts {
     }
 
     /// Returns the number of images.
-    #[must_use]
     pub fn image_count(&self) -> usize {
         self.images.len()
     }
 
     /// Returns the number of images without persons.
-    #[must_use]
     pub fn empty_image_count(&self) -> usize {
         let empty = self.images.iter().filter(|image| image.persons == 0);
         empty.count()
     }
 
     /// Returns the counts of detections with at least this score.
-    #[must_use]
     pub fn at(&self, score_threshold: f64) -> CountFigures {
         let (mut wrong, mut missed, mut error, mut disturbed) = (0, 0, 0, 0);
         for image in &self.images {
@@ -117,7 +113,6 @@ impl Counts {
 
     /// Returns the counts at the threshold of the least count error, in hundredths. Of equal ones
     /// it is the nearest to the default threshold.
-    #[must_use]
     pub fn best(&self) -> CountFigures {
         let distance =
             |figures: &CountFigures| (figures.score_threshold - DEFAULT_COUNT_THRESHOLD).abs();
@@ -131,7 +126,6 @@ impl Counts {
     }
 
     /// Returns the calibration error; `None` without detections.
-    #[must_use]
     pub fn calibration_error(&self) -> Option<CalibrationError> {
         let mut bins = [Bin::default(); BINS];
         let detections = self.images.iter().flat_map(|image| &image.detections);

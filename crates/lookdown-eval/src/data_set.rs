@@ -10,16 +10,23 @@ mod error;
 mod heads;
 mod image_files;
 mod image_id;
-mod text;
+pub(crate) mod text;
 mod voc;
 
 use std::path::Path;
 
 pub use content::{DataSet, DataSetImage};
-pub use error::{DataSetError, ScoringMismatch};
+pub use error::ScoringMismatch;
 pub use image_id::ImageId;
 
+use lookdown_common::files::FileError;
+
 use self::image_files::{Files, ImageFileIndex};
+
+const UNRECOGNIZED: &str = "holds no data set in a known format; expected annotations.json, \
+                            annotations/*.json, *.json, *.xml or \
+                            Ground_Truth_Annotations/groundTruth_*.csv";
+
 impl DataSet {
     /// Opens the data set at `path`, which is one of:
     ///
@@ -33,12 +40,9 @@ impl DataSet {
     ///   beside `<sequence>/`, or one such CSV file.
     ///
     /// # Errors
-    /// [`DataSetError`], which names the file and the problem.
-    pub fn open(path: &Path) -> Result<Self, DataSetError> {
-        let unreadable = |source| DataSetError::Unreadable {
-            path: path.to_owned(),
-            source,
-        };
+    /// [`FileError`], which names the file and the problem.
+    pub fn open(path: &Path) -> Result<Self, FileError> {
+        let unreadable = |error| FileError::unreadable(path, &error);
         if std::fs::metadata(path).map_err(unreadable)?.is_file() {
             return Self::open_file(path);
         }
@@ -59,12 +63,10 @@ impl DataSet {
         if !heads.is_empty() {
             return heads::read_files(&heads);
         }
-        Err(DataSetError::Unrecognized {
-            path: path.to_owned(),
-        })
+        Err(FileError::new(path, UNRECOGNIZED))
     }
 
-    fn open_file(path: &Path) -> Result<Self, DataSetError> {
+    fn open_file(path: &Path) -> Result<Self, FileError> {
         let ending = path.extension().and_then(|ending| ending.to_str());
         let folder = path.parent().unwrap_or(Path::new("."));
         match ending {
@@ -77,9 +79,7 @@ impl DataSet {
                 coco::read_files(&[path.to_owned()], &image_files)
             }
             Some("csv") if heads::is_head_file(path) => heads::read_files(&[path.to_owned()]),
-            _ => Err(DataSetError::Unrecognized {
-                path: path.to_owned(),
-            }),
+            _ => Err(FileError::new(path, UNRECOGNIZED)),
         }
     }
 }

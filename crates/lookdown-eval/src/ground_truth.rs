@@ -34,7 +34,6 @@ impl<B> From<B> for AnnotatedPerson<B> {
 
 impl<B> GroundTruth<B> {
     /// The number of persons that count.
-    #[must_use]
     pub fn person_count(&self) -> usize {
         self.persons.iter().filter(|person| person.counts).count()
     }

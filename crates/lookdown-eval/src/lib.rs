@@ -21,7 +21,7 @@ mod summary;
 
 pub use average_precision::AveragePrecision;
 pub use counts::{CalibrationError, CountFigures, Counts, DEFAULT_COUNT_THRESHOLD};
-pub use data_set::{DataSet, DataSetError, DataSetImage, ImageId, ScoringMismatch};
+pub use data_set::{DataSet, DataSetImage, ImageId, ScoringMismatch};
 pub use ground_truth::{AnnotatedPerson, EvaluatedImage, GroundTruth, ScoredBox};
 pub use matching::{MatchingRule, Outcome};
 pub use outline::{Outline, Scoring};
@@ -29,7 +29,6 @@ pub use precision_recall::{OperatingPoint, PrecisionRecallCurve};
 pub use region::Region;
 pub use rotated_box::RotatedBox;
 pub use row::{DetectedRow, EvaluatedRow, FoundPerson, RowCost, RowName};
-pub use run::{EvaluationError, detect};
-pub use saved::SavedDetectionsError;
+pub use run::detect;
 pub use strata::{NoStrata, Stratification, Stratum, StratumFigures};
 pub use summary::{NoPersons, Summary};

@@ -35,7 +35,6 @@ pub enum MatchingRule {
 impl MatchingRule {
     /// Returns the outcome of each detection of one image, in the order of `detections`. A match
     /// needs at least `min_iou` (`O_t`).
-    #[must_use]
     pub fn outcomes<B: Region>(
         self,
         detections: &[ScoredBox<B>],

@@ -34,7 +34,6 @@ impl Scoring {
     /// Returns the compared outline of a person detected in a frame of `[width, height]` pixels. If
     /// the ground truth is rotated it is the oriented box, or the axis-parallel box if there is
     /// none.
-    #[must_use]
     pub fn outline(
         self,
         bbox: BBox<FramePixels>,
@@ -57,7 +56,6 @@ impl Scoring {
 
 impl Outline {
     /// The center, `[x, y]`, corner-origin frame pixels.
-    #[must_use]
     pub fn center(&self) -> [f64; 2] {
         match self {
             Self::AxisParallel(bbox) => bbox.center(),
@@ -67,7 +65,6 @@ impl Outline {
     }
 
     /// Width times height, square pixels. `None` for a point.
-    #[must_use]
     pub fn area(&self) -> Option<f64> {
         match self {
             Self::AxisParallel(bbox) => Some(bbox.area()),

@@ -27,7 +27,6 @@ pub struct OperatingPoint {
 impl PrecisionRecallCurve {
     /// Returns the curve at `O_t` = `min_iou`. `None` if no person counts, as recall is undefined
     /// then.
-    #[must_use]
     pub fn from_images<B: Region>(
         images: &[EvaluatedImage<B>],
         rule: MatchingRule,
@@ -77,13 +76,11 @@ impl PrecisionRecallCurve {
     }
 
     /// The points, by descending score.
-    #[must_use]
     pub fn points(&self) -> &[OperatingPoint] {
         &self.points
     }
 
     /// The recall of all detections, 0 to 1.
-    #[must_use]
     pub fn final_recall(&self) -> f64 {
         self.points.last().map_or(0.0, |point| point.recall)
     }
@@ -91,7 +88,6 @@ impl PrecisionRecallCurve {
     /// The point of greatest F1, of equal ones that of the highest score. `None` without
     /// detections. A threshold cannot separate equal scores, so only the last point of each score
     /// counts.
-    #[must_use]
     pub fn best_f1(&self) -> Option<OperatingPoint> {
         self.points
             .chunk_by(|a, b| a.score.total_cmp(&b.score).is_eq())
@@ -102,9 +98,7 @@ impl PrecisionRecallCurve {
 
 /// Converts a count to a floating-point number.
 pub(super) fn count(count: usize) -> f64 {
-    #[expect(clippy::cast_precision_loss, reason = "counts are far below 2⁵³")]
-    let count = count as f64;
-    count
+    count as f64
 }
 
 #[cfg(test)]

@@ -34,7 +34,6 @@ impl RotatedBox {
     /// `angle` radians, in a frame of `[width, height]` pixels. Returns `None` unless all numbers
     /// are finite and within ±1e9, the extents are not negative, and the frame's sides are at most
     /// 65 536.
-    #[must_use]
     pub fn new([cx, cy, width, height]: [f64; 4], angle: f64, frame: [u32; 2]) -> Option<Self> {
         let within = |value: f64| (-MAX_COORDINATE..=MAX_COORDINATE).contains(&value);
         let valid = [cx, cy, width, height].into_iter().all(within)
@@ -55,7 +54,6 @@ impl RotatedBox {
 
     /// Creates the oriented box of a detection, in a frame of `[width, height]` pixels. Returns
     /// `None` as [`RotatedBox::new`] does.
-    #[must_use]
     pub fn from_oriented_box(oriented_box: &OrientedBox, frame: [u32; 2]) -> Option<Self> {
         let OrientedBox {
             center,
@@ -68,13 +66,11 @@ impl RotatedBox {
     }
 
     /// The center, `[x, y]`, corner-origin frame pixels.
-    #[must_use]
     pub fn center(&self) -> [f64; 2] {
         self.center
     }
 
     /// Width times height, square pixels, including the part outside the frame.
-    #[must_use]
     pub fn full_area(&self) -> f64 {
         self.width * self.height
     }

@@ -110,7 +110,6 @@ impl DetectedRow {
     }
 
     /// Counts the persons of each image. The data set may have no persons.
-    #[must_use]
     pub fn counts(&self, data_set: &DataSet) -> Counts {
         Counts::from_images(&self.evaluated_images(data_set), RULE)
     }

@@ -2,40 +2,18 @@
 
 use std::{
     num::NonZeroUsize,
-    path::PathBuf,
     time::{Duration, Instant},
 };
 
-use lookdown_common::files::{self, MAX_IMAGE_BYTES};
+use lookdown_common::files::{self, FileError, MAX_IMAGE_BYTES};
 use lookdown_detect::{
     parameters::DetectParameters,
-    pipeline::{DetectJob, Engine, JobImage, PipelineError},
+    pipeline::{DetectJob, Engine, JobImage},
 };
 
 use super::{
     DataSet, DataSetImage, DetectedRow, FoundPerson, RowCost, RowName, in_order::in_order,
 };
-
-/// The reason why an image has no detections.
-#[derive(Debug, thiserror::Error)]
-pub enum EvaluationError {
-    /// An image cannot be read.
-    #[error("{path}: cannot be read: {source}")]
-    Unreadable {
-        /// The image.
-        path: PathBuf,
-        /// The error of the operating system.
-        source: std::io::Error,
-    },
-    /// An image cannot be processed.
-    #[error("{path}: {source}")]
-    Failed {
-        /// The image.
-        path: PathBuf,
-        /// The error of the engine.
-        source: PipelineError,
-    },
-}
 
 /// The detections of one image.
 struct Seen {
@@ -53,14 +31,14 @@ struct Seen {
 /// the times.
 ///
 /// # Errors
-/// [`EvaluationError`] of the first image that cannot be used.
+/// [`FileError`] of the first image that cannot be used.
 pub fn detect(
     engine: &Engine,
     data_set: &DataSet,
     variants: &[DetectParameters],
     at_once: NonZeroUsize,
     done: impl Fn() + Sync,
-) -> Result<Vec<DetectedRow>, EvaluationError> {
+) -> Result<Vec<DetectedRow>, FileError> {
     let Some(first) = variants.first() else {
         return Ok(Vec::new());
     };
@@ -77,14 +55,10 @@ fn evaluate_image(
     image: &DataSetImage,
     first: &DetectParameters,
     variants: &[DetectParameters],
-) -> Result<Seen, EvaluationError> {
-    let observation =
-        engine
-            .observe(&job(image, first)?)
-            .map_err(|source| EvaluationError::Failed {
-                path: image.path.clone(),
-                source,
-            })?;
+) -> Result<Seen, FileError> {
+    let observation = engine
+        .observe(&job(image, first)?)
+        .map_err(|error| FileError::new(&image.path, error.to_string()))?;
     let refined = variants.iter().map(|variant| {
         let refining = Instant::now();
         let persons = engine.persons(&observation, &variant.refinement);
@@ -99,13 +73,9 @@ fn evaluate_image(
     })
 }
 
-fn job(image: &DataSetImage, parameters: &DetectParameters) -> Result<DetectJob, EvaluationError> {
-    let bytes = files::read(&image.path, MAX_IMAGE_BYTES).map_err(|source| {
-        EvaluationError::Unreadable {
-            path: image.path.clone(),
-            source,
-        }
-    })?;
+fn job(image: &DataSetImage, parameters: &DetectParameters) -> Result<DetectJob, FileError> {
+    let bytes = files::read(&image.path, MAX_IMAGE_BYTES)
+        .map_err(|error| FileError::unreadable(&image.path, &error))?;
     Ok(DetectJob::local(
         String::new(),
         JobImage::Encoded(bytes.into()),
@@ -118,10 +88,6 @@ fn rows(seen: Vec<Seen>, variants: &[DetectParameters]) -> Vec<DetectedRow> {
     let model = seen.first().map_or("", |image| &image.model).to_owned();
     let count = u32::try_from(seen.len().max(1)).unwrap_or(u32::MAX);
     let views: usize = seen.iter().map(|image| image.views).sum();
-    #[expect(
-        clippy::cast_precision_loss,
-        reason = "there are far fewer than 2^52 views"
-    )]
     let views_per_image = views as f64 / f64::from(count);
     let observing: Duration = seen.iter().map(|image| image.observing).sum();
     let mut rows: Vec<_> = variants

@@ -3,31 +3,19 @@
 //! A file is a JSON array of `{"image_id", "category_id", "bbox": [left, top, width, height],
 //! "score"}`, in corner-origin pixels. Lookdown's own files also have an `oriented_box`.
 
-use std::{
-    collections::HashMap,
-    fs, io,
-    path::{Path, PathBuf},
-};
+use std::{collections::HashMap, fs, io, path::Path};
 
-use lookdown_common::{files, report::ReportOrientedBox};
+use lookdown_common::{files::FileError, report::ReportOrientedBox};
 use lookdown_detect::detection::BBox;
 use lookdown_lens::geometry::{OrientedBox, Pixel};
 use serde::{Deserialize, Serialize};
 
-use super::{DataSet, DetectedRow, FoundPerson, ImageId, RowName};
+use super::{DataSet, DetectedRow, FoundPerson, ImageId, RowName, data_set::text::read_text};
 
 /// The category ID of `person` in COCO. Detections of other categories are skipped.
 const PERSON: u64 = 1;
 /// Enough for the results of a hundred thousand crowded images.
 const MAX_BYTES: u64 = 1024 * 1024 * 1024;
-
-/// The reason why detections cannot be saved or read.
-#[derive(Debug, thiserror::Error)]
-#[error("{path}: {problem}")]
-pub struct SavedDetectionsError {
-    path: PathBuf,
-    problem: String,
-}
 
 #[derive(Serialize, Deserialize)]
 struct Entry {
@@ -42,7 +30,6 @@ struct Entry {
 
 impl RowName {
     /// The name of the row's file: `<profile>.<refinement>.<model>.json`.
-    #[must_use]
     pub fn file_name(&self) -> String {
         match (self.profile, self.refinement) {
             (Some(profile), Some(refinement)) => {
@@ -77,8 +64,8 @@ impl DetectedRow {
     /// Writes the row to its file in `folder`, which is created if it is missing.
     ///
     /// # Errors
-    /// [`SavedDetectionsError`] if the file cannot be written.
-    pub fn save(&self, folder: &Path, data_set: &DataSet) -> Result<(), SavedDetectionsError> {
+    /// [`FileError`] if the file cannot be written.
+    pub fn save(&self, folder: &Path, data_set: &DataSet) -> Result<(), FileError> {
         let path = folder.join(self.name.file_name());
         positions(data_set, &path)?;
         let images = data_set.images.iter().zip(&self.images);
@@ -91,24 +78,17 @@ impl DetectedRow {
             serde_json::to_writer(file, &entries)?;
             io::Result::Ok(())
         };
-        write().map_err(|error| SavedDetectionsError {
-            problem: format!("cannot be written: {error}"),
-            path: path.clone(),
-        })
+        write().map_err(|error| FileError::new(&path, format!("cannot be written: {error}")))
     }
 
     /// Reads a row of detections in the images of `data_set`: Lookdown's own, or COCO results of
     /// any detector.
     ///
     /// # Errors
-    /// [`SavedDetectionsError`] with the problem of the file.
-    pub fn load(path: &Path, data_set: &DataSet) -> Result<Self, SavedDetectionsError> {
-        let wrong = |problem| SavedDetectionsError {
-            path: path.to_owned(),
-            problem,
-        };
-        let unreadable = |error| wrong(format!("cannot be read: {error}"));
-        let text = files::read_text(path, MAX_BYTES).map_err(unreadable)?;
+    /// [`FileError`] with the problem of the file.
+    pub fn load(path: &Path, data_set: &DataSet) -> Result<Self, FileError> {
+        let wrong = |problem: String| FileError::new(path, problem);
+        let text = read_text(path, MAX_BYTES)?;
         let entries: Vec<Entry> = serde_json::from_str(&text)
             .map_err(|error| wrong(format!("not COCO results: {error}")))?;
         let position_of = positions(data_set, path)?;
@@ -139,18 +119,18 @@ impl DetectedRow {
 fn positions<'a>(
     data_set: &'a DataSet,
     path: &Path,
-) -> Result<HashMap<&'a ImageId, usize>, SavedDetectionsError> {
+) -> Result<HashMap<&'a ImageId, usize>, FileError> {
     let mut position_of = HashMap::with_capacity(data_set.images.len());
     for (position, image) in data_set.images.iter().enumerate() {
         if position_of.insert(&image.id, position).is_some() {
-            return Err(SavedDetectionsError {
-                path: path.to_owned(),
-                problem: format!(
+            return Err(FileError::new(
+                path,
+                format!(
                     "the data set has several images with the ID {}; give its annotation files \
                      one by one",
                     image.id
                 ),
-            });
+            ));
         }
     }
     Ok(position_of)

@@ -69,7 +69,6 @@ pub struct NoStrata {
 
 impl Stratification {
     /// Returns the name, as in a flag.
-    #[must_use]
     pub fn name(self) -> &'static str {
         self.into()
     }

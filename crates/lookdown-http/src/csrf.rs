@@ -59,7 +59,6 @@ pub struct Remedies {
 
 impl AllowedOrigins {
     /// Returns true if the host of the request is not refused.
-    #[must_use]
     pub fn admits(&self, request: &Request) -> bool {
         check(request, self).is_ok()
     }

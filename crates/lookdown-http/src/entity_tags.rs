@@ -14,14 +14,12 @@ pub enum Named {
 }
 
 /// Returns the entity tag of an opaque value.
-#[must_use]
 pub fn entity_tag(value: &str) -> HeaderValue {
     // Revisions and report IDs are digits.
     HeaderValue::from_str(&format!("\"{value}\"")).unwrap_or(HeaderValue::from_static("\"\""))
 }
 
 /// Returns the weak entity tag of an opaque value, for responses that are the same but for times.
-#[must_use]
 pub fn weak_entity_tag(value: &str) -> HeaderValue {
     HeaderValue::from_str(&format!("W/\"{value}\"")).unwrap_or(HeaderValue::from_static("W/\"\""))
 }

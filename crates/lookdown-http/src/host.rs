@@ -24,7 +24,6 @@ pub async fn require(request: Request, next: Next) -> Response {
 
 /// Returns the host of the request: that of the request target, or else the only `Host` header.
 /// HTTP/1.0 requires none.
-#[must_use]
 pub fn host_of(uri: &Uri, headers: &HeaderMap) -> Option<Authority> {
     uri.authority().cloned().or_else(|| only_host(headers))
 }

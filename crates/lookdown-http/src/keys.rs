@@ -27,7 +27,6 @@ pub fn presented(headers: &HeaderMap) -> impl Iterator<Item = &[u8]> {
 }
 
 /// Returns the password of Basic authentication (RFC 7617).
-#[must_use]
 pub fn basic_password(headers: &HeaderMap) -> Option<String> {
     let value = headers.get(AUTHORIZATION)?.as_bytes();
     let (scheme, credentials) = value.split_at_checked(BASIC.len())?;

@@ -105,19 +105,16 @@ impl Kind {
     }
 
     /// The HTTP status.
-    #[must_use]
     pub fn status(self) -> StatusCode {
         self.entry().0
     }
 
     /// The stable name: the end of `type`.
-    #[must_use]
     pub fn name(self) -> &'static str {
         self.entry().1
     }
 
     /// The usual phrase for the kind.
-    #[must_use]
     pub fn title(self) -> &'static str {
         self.entry().2
     }
@@ -145,7 +142,6 @@ impl Problem {
     }
 
     /// Creates the problem of a parameter: the detail is `parameter: fault`.
-    #[must_use]
     pub fn for_parameter(parameter: &str, fault: &str) -> Self {
         Self {
             parameter: Some(parameter.to_owned()),
@@ -154,7 +150,6 @@ impl Problem {
     }
 
     /// A failure whose cause only the log has.
-    #[must_use]
     pub fn internal() -> Self {
         let detail = "the request failed: the log has the reason under this request_id";
         Self::new(Kind::Internal, detail)

@@ -42,7 +42,6 @@ pub enum Access {
 
 impl Access {
     /// Returns the access of an address without a key.
-    #[must_use]
     pub fn without_key(listen: SocketAddr) -> Self {
         if listen.ip().is_loopback() {
             Self::OwnMachine

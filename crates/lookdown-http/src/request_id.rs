@@ -14,7 +14,6 @@ pub struct RequestId(String);
 
 impl RequestId {
     /// Returns the ID of the request with these headers.
-    #[must_use]
     pub fn from_headers(headers: &HeaderMap) -> Self {
         let given = headers.get(HEADER).and_then(|value| value.to_str().ok());
         let is_sane =
@@ -24,13 +23,11 @@ impl RequestId {
     }
 
     /// Returns the ID as text.
-    #[must_use]
     pub fn as_str(&self) -> &str {
         &self.0
     }
 
     /// Returns the ID as the value of the header.
-    #[must_use]
     pub fn header_value(&self) -> HeaderValue {
         // Visible ASCII is always a header value.
         HeaderValue::from_str(&self.0).unwrap_or(HeaderValue::from_static("invalid"))

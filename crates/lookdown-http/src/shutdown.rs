@@ -92,7 +92,6 @@ impl Shutdown {
     }
 
     /// Returns true if a stop was requested.
-    #[must_use]
     pub fn is_requested(&self) -> bool {
         self.stage() >= Stage::Announced
     }

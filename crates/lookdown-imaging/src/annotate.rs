@@ -66,7 +66,6 @@ const LINE_OPACITY: f64 = 0.55;
 
 impl Drawing {
     /// A drawing of both boxes of the marks, without lines, zones or a caption.
-    #[must_use]
     pub fn new(marks: Vec<Mark>) -> Self {
         Self {
             marks,

@@ -30,7 +30,6 @@ impl MovedCell {
 
 /// Returns true if cells with motion are few, weak and apart from each other, as those that the
 /// noise of a video encoder changes.
-#[must_use]
 pub fn is_noise(moved: &[MovedCell]) -> bool {
     let is_apart = |(index, cell): (usize, &MovedCell)| {
         let mut others = moved.iter().skip(index + 1);

@@ -122,7 +122,6 @@ pub fn decode(bytes: &[u8], limits: &DecodeLimits) -> Result<DecodedFrame, Decod
 
 /// Returns the width and the height that the header of an image states, without decoding a pixel.
 /// `None` if the header cannot be read.
-#[must_use]
 pub fn declared_size(bytes: &[u8]) -> Option<(u32, u32)> {
     match image::guess_format(bytes).ok()? {
         ImageFormat::Jpeg => Some(JpegDecoder::new(Cursor::new(bytes)).ok()?.dimensions()),

@@ -28,7 +28,6 @@ pub(super) const USED_RADIUS: f64 = 0.975;
 
 /// Returns the smooth edges inside a circle, in pixel centers of the frame: those of the finest
 /// raster first.
-#[must_use]
 pub fn edge_curves(frame: &Frame, circle: &LensCircle) -> [Vec<EdgeCurve>; RASTERS] {
     let finest = frame.width().max(frame.height()).div_ceil(MAX_SIDE);
     std::array::from_fn(|raster| curves_of_raster(frame, circle, finest << raster))

@@ -30,7 +30,6 @@ const MIN_NOISE_LEVELS: u16 = 6;
 
 /// Returns the frame in even light, and with less noise if it is noisy. Returns `None` for a frame
 /// with color, which stays as it is.
-#[must_use]
 pub fn with_even_light(frame: &Frame) -> Option<Frame> {
     (!has_color(frame)).then(|| evened(frame))
 }
@@ -55,7 +54,6 @@ fn has_color(frame: &Frame) -> bool {
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
     reason = "levels and positions in a frame are small, and `as` saturates"
 )]
 fn evened(frame: &Frame) -> Frame {
@@ -133,7 +131,6 @@ fn is_noisy(gray: &[u8], width: usize) -> bool {
 }
 
 /// Returns the factor of each cell of `cell` pixels, row by row.
-#[expect(clippy::cast_precision_loss, reason = "sums of levels need few digits")]
 fn gains(gray: &[u8], width: usize, cell: usize) -> Vec<f32> {
     let across = width.div_ceil(cell);
     let (mut levels, mut lit) = (Vec::new(), Vec::new());
@@ -167,7 +164,6 @@ fn gains(gray: &[u8], width: usize, cell: usize) -> Vec<f32> {
 }
 
 /// Returns the values with a Gaussian along each row, columns as rows.
-#[expect(clippy::cast_precision_loss, reason = "a few cells")]
 fn blurred_and_turned(values: &[f32], across: usize) -> Vec<f32> {
     let radius = 3 * usize::from(SIGMA_CELLS);
     let weights: Vec<f32> = (0..=2 * radius)

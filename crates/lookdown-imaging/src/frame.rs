@@ -16,28 +16,8 @@ pub struct Frame {
 
 /// Bytes that do not form a [`Frame`].
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum FrameError {
-    /// One side is zero.
-    #[error("a frame of {width}×{height} pixels has no pixels; both sides must be at least 1")]
-    NoPixels {
-        /// Width in pixels.
-        width: u32,
-        /// Height in pixels.
-        height: u32,
-    },
-    /// The length of the buffer does not match the size.
-    #[error(
-        "a frame of {width}×{height} pixels takes width × height × 3 bytes of RGB, not {bytes}"
-    )]
-    WrongLength {
-        /// Width in pixels.
-        width: u32,
-        /// Height in pixels.
-        height: u32,
-        /// Length of the given buffer.
-        bytes: usize,
-    },
-}
+#[error("{0}")]
+pub struct FrameError(String);
 
 impl Frame {
     /// Wraps row-major RGB bytes.
@@ -46,15 +26,17 @@ impl Frame {
     /// Returns an error if a side is zero, or `pixels` is not `width * height * 3` bytes long.
     pub fn new(width: u32, height: u32, pixels: Vec<u8>) -> Result<Self, FrameError> {
         if width == 0 || height == 0 {
-            return Err(FrameError::NoPixels { width, height });
+            let problem = "has no pixels; both sides must be at least 1";
+            return Err(FrameError(format!(
+                "a frame of {width}×{height} pixels {problem}"
+            )));
         }
         // The product of two u32 and a small factor cannot overflow a u128.
         if u128::from(width) * u128::from(height) * 3 != pixels.len() as u128 {
-            return Err(FrameError::WrongLength {
-                width,
-                height,
-                bytes: pixels.len(),
-            });
+            return Err(FrameError(format!(
+                "a frame of {width}×{height} pixels takes width × height × 3 bytes of RGB, not {}",
+                pixels.len()
+            )));
         }
         Ok(Self {
             width,
@@ -64,7 +46,6 @@ impl Frame {
     }
 
     /// A black image. A side of zero becomes 1.
-    #[must_use]
     pub fn black(width: u32, height: u32) -> Self {
         let (width, height) = (width.max(1), height.max(1));
         Self {
@@ -75,19 +56,16 @@ impl Frame {
     }
 
     /// Width in pixels, at least 1.
-    #[must_use]
     pub fn width(&self) -> u32 {
         self.width
     }
 
     /// Height in pixels, at least 1.
-    #[must_use]
     pub fn height(&self) -> u32 {
         self.height
     }
 
     /// All bytes: R, G and B of the top-left pixel, then of the pixel to its right, and so on.
-    #[must_use]
     pub fn pixels(&self) -> &[u8] {
         &self.pixels
     }
@@ -100,7 +78,7 @@ impl Frame {
     /// Copies the given columns and rows, clipped to the frame.
     ///
     /// # Errors
-    /// [`FrameError::NoPixels`] when the range lies outside the frame.
+    /// [`FrameError`] when the range lies outside the frame.
     pub fn crop(&self, columns: Range<u32>, rows: Range<u32>) -> Result<Self, FrameError> {
         let columns = columns.start..columns.end.min(self.width);
         let rows = rows.start..rows.end.min(self.height);
@@ -120,7 +98,6 @@ impl Frame {
     ///
     /// # Panics
     /// Panics if the pixel lies outside the frame.
-    #[must_use]
     pub fn pixel(&self, x: u32, y: u32) -> [u8; 3] {
         assert!(
             x < self.width && y < self.height,

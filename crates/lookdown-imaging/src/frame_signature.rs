@@ -22,7 +22,6 @@ pub struct FrameSignature {
 
 impl FrameSignature {
     /// Computes the signature of a frame.
-    #[must_use]
     pub fn new(frame: &Frame) -> Self {
         let longer = frame.width().max(frame.height());
         let cell = longer.div_ceil(MOST_CELLS).max(MIN_CELL);
@@ -61,7 +60,6 @@ impl FrameSignature {
 
     /// Returns the cells of `visible` in which there is motion since an earlier frame of the same
     /// size. `None` for a frame of another size.
-    #[must_use]
     pub fn moved_since(&self, earlier: &Self, visible: &[bool]) -> Option<Vec<MovedCell>> {
         let is_comparable = self.cell == earlier.cell
             && self.across == earlier.across
@@ -80,7 +78,6 @@ impl FrameSignature {
         })
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "at most a few thousand cells")]
     fn cell(&self, index: usize) -> [f64; 4] {
         let side = f64::from(self.cell);
         let (x, y) = ((index % self.across) as f64, (index / self.across) as f64);

@@ -45,7 +45,6 @@ const MAX_GAP_RADIANS: f64 = 3.5;
 ///
 /// Returns `None` where no dark surround shows it: in a frame filled by the lens image, an image of
 /// an ordinary camera, or a dark room. Use [`assumed_circle`] then. The result is deterministic.
-#[must_use]
 pub fn find_lens_circle(frame: &Frame) -> Option<LensCircle> {
     if short_side(frame) < MIN_SIDE {
         return None;
@@ -70,7 +69,6 @@ fn find_at_contrast(frame: &Frame, min_contrast: f64) -> Option<LensCircle> {
 
 /// Brightness (0 to 255) above which a pixel is lens image, or `None` in a frame without a dark
 /// surround.
-#[must_use]
 pub fn surround_threshold(frame: &Frame) -> Option<f64> {
     if short_side(frame) < MIN_SIDE {
         return None;
@@ -97,14 +95,12 @@ fn is_shown(edge: &[RimPoint], frame: &Frame, circle: &LensCircle) -> bool {
         .map(|(angle, next)| next - angle)
         .fold(0.0, f64::max);
     let visible = rim::visible_rays(frame, circle);
-    #[expect(clippy::cast_precision_loss, reason = "a few hundred rays")]
     let is_supported = shown.len() as f64 >= MIN_SUPPORT * visible as f64;
     !shown.is_empty() && is_supported && widest_gap <= MAX_GAP_RADIANS
 }
 
 /// Returns true for a frame of two lenses, beside or above each other: each half has a lens circle
 /// in its middle. The halves of one lens circle have its middle at their edge.
-#[must_use]
 pub fn shows_two_circles(frame: &Frame) -> bool {
     let (width, height) = (frame.width(), frame.height());
     let halves = if 2 * width >= 3 * height {
@@ -130,7 +126,6 @@ pub fn shows_two_circles(frame: &Frame) -> bool {
 
 /// The largest circle in the center of a frame of this size. It is the guess for frames without a
 /// detected circle.
-#[must_use]
 pub fn assumed_circle(width: u32, height: u32) -> LensCircle {
     LensCircle {
         cx: (f64::from(width) - 1.0) / 2.0,

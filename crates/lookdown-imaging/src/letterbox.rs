@@ -17,7 +17,6 @@ pub struct Letterbox {
 
 impl Letterbox {
     /// The letterbox for frames of `frame_width` × `frame_height` pixels.
-    #[must_use]
     pub fn new(frame_width: u32, frame_height: u32, input: &NetworkInput) -> Self {
         let scale = (f64::from(input.width) / f64::from(frame_width))
             .min(f64::from(input.height) / f64::from(frame_height));
@@ -64,7 +63,6 @@ impl Letterbox {
     }
 
     /// Maps an input position to the frame (corner-origin, pixels).
-    #[must_use]
     pub fn frame_from_input(&self, position: f64) -> f64 {
         position / self.scale
     }

@@ -22,7 +22,6 @@ pub struct MaskedPixels {
 impl MaskedPixels {
     /// Computes the pixels under `masks` (corner-origin pixels) in frames of `width` × `height`
     /// pixels.
-    #[must_use]
     pub fn new(masks: &[Polygon], width: u32, height: u32) -> Self {
         if masks.is_empty() {
             return Self::default();
@@ -37,13 +36,11 @@ impl MaskedPixels {
     }
 
     /// Returns true without masks.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.rows.is_empty()
     }
 
     /// Number of masked pixels.
-    #[must_use]
     pub fn count(&self) -> u64 {
         let spans = self.rows.iter().flatten();
         spans.map(|span| u64::from(span.end - span.start)).sum()
@@ -51,7 +48,6 @@ impl MaskedPixels {
 
     /// Returns true if the pixel in column `x` and row `y` is masked. Pixels outside the frame are
     /// not.
-    #[must_use]
     pub fn hides(&self, x: u32, y: u32) -> bool {
         let Some(row) = self.rows.get(y as usize) else {
             return false;
@@ -61,7 +57,6 @@ impl MaskedPixels {
     }
 
     /// Returns true if the pixel that contains a position (pixel centers) is masked.
-    #[must_use]
     pub fn hides_position(&self, position: Pixel) -> bool {
         let position = cross_half_pixel(position, PixelConvention::CornerOrigin);
         position.x >= 0.0
@@ -81,7 +76,6 @@ impl MaskedPixels {
     }
 
     /// Memory held, bytes.
-    #[must_use]
     pub fn bytes(&self) -> usize {
         let rows = self.rows.iter().map(|row| size_of_val(&**row));
         size_of_val(self.rows.as_slice()) + rows.sum::<usize>()

@@ -29,7 +29,6 @@ pub struct NetworkInput {
 
 impl NetworkInput {
     /// Unscaled pixels (0 to 255) in RGB planes.
-    #[must_use]
     pub fn plain(width: u32, height: u32) -> Self {
         Self {
             width,
@@ -41,19 +40,16 @@ impl NetworkInput {
     }
 
     /// Number of values in one plane of one view.
-    #[must_use]
     pub fn plane_len(&self) -> usize {
         self.width as usize * self.height as usize
     }
 
     /// Number of values in one view.
-    #[must_use]
     pub fn view_len(&self) -> usize {
         3 * self.plane_len()
     }
 
     /// The source channel of each plane of the input: red (0), green (1) or blue (2).
-    #[must_use]
     pub fn source_channels(&self) -> [usize; 3] {
         match self.channel_order {
             ChannelOrder::Rgb => [0, 1, 2],
@@ -109,13 +105,11 @@ impl ViewBatch {
     }
 
     /// Number of views.
-    #[must_use]
     pub fn views(&self) -> usize {
         self.views
     }
 
     /// The values, `[views, 3, height, width]`, row-major.
-    #[must_use]
     pub fn values(&self) -> &[f32] {
         &self.values
     }

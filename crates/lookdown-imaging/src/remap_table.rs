@@ -65,7 +65,6 @@ pub struct RemapTable {
 impl RemapTable {
     /// The tables of `views` into frames of `frame_width` × `frame_height` pixels (both at least 2)
     /// taken through `lens`, one per view. Tables with a common grid share its memory.
-    #[must_use]
     pub fn for_views(
         views: &[VirtualView],
         lens: &Lens,
@@ -100,7 +99,6 @@ impl RemapTable {
 
     /// The table of a panorama into frames of `frame_width` × `frame_height` pixels. The lens image
     /// ends at a node.
-    #[must_use]
     pub fn for_panorama(
         panorama: &Panorama,
         lens: &Lens,
@@ -114,7 +112,6 @@ impl RemapTable {
 
     /// The table of a crop of frames of `frame_width` × `frame_height` pixels. Positions are exact
     /// between nodes as well; what lies beyond the lens image is shown as the frame has it.
-    #[must_use]
     pub fn for_crop(crop: &FrameCrop, frame_width: u32, frame_height: u32) -> Self {
         let grid = Arc::new(NodeGrid::for_crop(crop));
         Self::from_grid(grid, FrameFromPlane::identity(), frame_width, frame_height)
@@ -141,7 +138,6 @@ impl RemapTable {
     ///
     /// # Panics
     /// Panics if the pixel lies outside the view.
-    #[must_use]
     pub fn position(&self, x: u32, y: u32) -> Option<Pixel> {
         let (x, y) = (x as usize, y as usize);
         let band = self.band(y / LANES);
@@ -153,20 +149,17 @@ impl RemapTable {
     }
 
     /// Returns true if a pixel of the view shows a part of the lens image in the frame.
-    #[must_use]
     pub fn sees_anything(&self) -> bool {
         self.has_sample(|_| true)
     }
 
     /// Returns true if a pixel of the view shows an unmasked part of the lens image.
-    #[must_use]
     pub fn sees_beside(&self, masked: &MaskedPixels) -> bool {
         self.sees_pixel(|x, y| !masked.hides(x, y))
     }
 
     /// Returns true if a pixel of the view depends on a pixel of the frame for which `counts`
     /// holds.
-    #[must_use]
     pub fn sees_pixel(&self, counts: impl Fn(u32, u32) -> bool) -> bool {
         let width = self.frame_width as usize;
         self.has_sample(|sample| {
@@ -192,7 +185,6 @@ impl RemapTable {
     }
 
     /// Memory held by some tables, bytes; what several of them share counts once.
-    #[must_use]
     pub fn bytes<'a>(tables: impl IntoIterator<Item = &'a Self>) -> usize {
         let mut counted = HashSet::new();
         let bytes = tables.into_iter().map(|table| {

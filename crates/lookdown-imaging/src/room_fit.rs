@@ -36,7 +36,6 @@ pub struct RoomFrame {
 
 impl RoomFrame {
     /// Finds the lens circle and the edges of a frame.
-    #[must_use]
     pub fn new(frame: &Frame) -> Self {
         let (width, height) = (frame.width(), frame.height());
         let circle = find_lens_circle(frame);
@@ -57,14 +56,12 @@ impl RoomFrame {
     }
 
     /// Returns width and height of the frame, pixels.
-    #[must_use]
     pub fn size(&self) -> (u32, u32) {
         (self.width, self.height)
     }
 
     /// Returns the edges that follow each direction of a fit to this frame and others, in the
     /// raster that the fit used. Positions are pixel centers.
-    #[must_use]
     pub fn edges_along(&self, fit: &RoomFit) -> [Vec<&EdgeCurve>; 3] {
         let is_used = |curve: &EdgeCurve| (curve.scale - fit.edge_scale).abs() < 0.5;
         let mut rasters = self.curves.iter();

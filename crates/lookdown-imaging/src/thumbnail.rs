@@ -6,7 +6,6 @@ use super::Frame;
 
 /// Scales the image down to `width`, averaging all pixels. An image that is not wider stays
 /// unchanged.
-#[must_use]
 pub fn narrowed(frame: &Frame, width: u32) -> Frame {
     if frame.width() <= width {
         return frame.clone();

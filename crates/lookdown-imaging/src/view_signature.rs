@@ -22,7 +22,6 @@ pub struct ViewSignature {
 
 impl ViewSignature {
     /// Computes the signature of a view rendered for `input`, from its slot `[3, height, width]`.
-    #[must_use]
     pub fn new(slot: &[f32], input: &NetworkInput) -> Self {
         let (width, height) = (input.width as usize, input.height as usize);
         let (across, down) = (width.div_ceil(CELL), height.div_ceil(CELL));
@@ -39,7 +38,6 @@ impl ViewSignature {
                 let tall = rows.len() / width;
                 for (column, sum) in sums.into_iter().enumerate() {
                     let wide = CELL.min(width - column * CELL);
-                    #[expect(clippy::cast_precision_loss, reason = "at most 256")]
                     let mean = sum / (tall * wide) as f32;
                     levels.push(level((mean - offset) / scale));
                 }
@@ -49,7 +47,6 @@ impl ViewSignature {
     }
 
     /// Returns true if there is motion between two signatures of the same view, not only noise.
-    #[must_use]
     pub fn differs_from(&self, other: &Self) -> bool {
         if self.across != other.across || self.levels.len() != other.levels.len() {
             return true;
@@ -68,7 +65,6 @@ impl ViewSignature {
         !is_noise(&moved)
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "at most a few thousand cells")]
     fn cell(&self, index: usize) -> [f64; 4] {
         let (x, y) = ((index % self.across) as f64, (index / self.across) as f64);
         [x, y, x + 1.0, y + 1.0].map(|at| at * CELL as f64)

@@ -74,7 +74,6 @@ impl PyView {
             let shape = (view.height() as usize, view.width() as usize);
             let (mut x, mut y) = (Array2::zeros(shape), Array2::zeros(shape));
             for (((row, column), x), y) in x.indexed_iter_mut().zip(&mut y) {
-                #[expect(clippy::cast_precision_loss, reason = "indices far below 2^52")]
                 let pixel = Pixel::new(column as f64, row as f64);
                 let at = lens.project(&view.ray_in_camera(&pixel));
                 let at = at.map_or([f64::NAN; 2], |at| [at.x, at.y]);

@@ -40,7 +40,6 @@ pub struct FollowedPeople<P> {
 impl<P: FoundPerson> FollowedPeople<P> {
     /// Takes the people of a search at `at_s` (seconds), with the motion of those before it. A
     /// person in motion whom the search has missed is expected for a second.
-    #[must_use]
     pub fn from_search(persons: &[P], at_s: f64, before: Option<&Self>) -> Self {
         let before = before.map(|before| before.targets.as_slice());
         Self {
@@ -49,14 +48,12 @@ impl<P: FoundPerson> FollowedPeople<P> {
     }
 
     /// Returns true if a crop or the search has confirmed everyone.
-    #[must_use]
     pub fn are_all_seen(&self) -> bool {
         self.targets.iter().all(|target| target.is_seen)
     }
 
     /// Returns true if crops at `at_s` (seconds) show everyone in motion who is seen. Someone who
     /// may be further away needs a search.
-    #[must_use]
     pub fn are_in_reach(&self, moving: &[bool], at_s: f64) -> bool {
         let mut seen = self.targets.iter().zip(moving);
         seen.all(|(target, is_moving)| !is_moving || !target.is_seen || target.is_in_reach(at_s))
@@ -64,7 +61,6 @@ impl<P: FoundPerson> FollowedPeople<P> {
 
     /// Returns true if `after` lacks someone who is seen here, or has a score below `least_score`
     /// instead. The frame of `after` needs a search.
-    #[must_use]
     pub fn are_lost_in(&self, after: &Self, least_score: f64) -> bool {
         let mut both = self.targets.iter().zip(&after.targets);
         both.any(|(before, after)| {
@@ -75,7 +71,6 @@ impl<P: FoundPerson> FollowedPeople<P> {
 
     /// Returns for each person whether there is motion where it was or is expected at `at_s`
     /// (seconds). `moved` are boxes with motion, frame pixels.
-    #[must_use]
     pub fn moving(&self, moved: &[[f64; 4]], at_s: f64) -> Vec<bool> {
         let moving = self.targets.iter().map(|target| {
             let places = target.places(at_s);
@@ -86,7 +81,6 @@ impl<P: FoundPerson> FollowedPeople<P> {
 
     /// Returns the indices of boxes with motion that are joined to no person, as shadows are. Boxes
     /// are joined if at most `reach_px` pixels lie between them.
-    #[must_use]
     pub fn unexplained(&self, moved: &[[f64; 4]], reach_px: f64, at_s: f64) -> Vec<usize> {
         let surroundings = self.targets.iter().map(|target| target.surroundings(at_s));
         let surroundings: Vec<_> = surroundings.collect();

@@ -158,37 +158,31 @@ impl Shape {
 
 impl Thing {
     /// Returns the identifier, unique per camera.
-    #[must_use]
     pub fn id(&self) -> u64 {
         self.id
     }
 
     /// Returns the state.
-    #[must_use]
     pub fn state(&self) -> ThingState {
         self.state
     }
 
     /// Returns the center of the box in frame pixels.
-    #[must_use]
     pub fn center_px(&self) -> [f64; 2] {
         self.smoothed.center_px
     }
 
     /// Returns width and height of the oriented box in frame pixels.
-    #[must_use]
     pub fn size_px(&self) -> [f64; 2] {
         self.smoothed.log_size.map(f64::exp)
     }
 
     /// Returns the observed time of its presence, seconds.
-    #[must_use]
     pub fn present_s(&self) -> f64 {
         self.present_s
     }
 
     /// Returns true if it is not counted.
-    #[must_use]
     pub fn is_furniture(&self) -> bool {
         matches!(self.state, ThingState::Remembered | ThingState::Confirmed)
     }

@@ -69,7 +69,6 @@ impl HeatMap {
 
 impl Cell {
     /// Returns the cell of a place in meters. `None` for places more than a kilometer away.
-    #[must_use]
     pub fn at([x, y]: [f64; 2]) -> Option<Self> {
         let index = |meters: f64| {
             let cell = (meters / CELL_M).floor();
@@ -84,7 +83,6 @@ impl Cell {
     }
 
     /// Returns the corner with the least x and y, meters.
-    #[must_use]
     pub fn corner_m(self) -> [f64; 2] {
         [self.column, self.row].map(|index| f64::from(index) * CELL_M)
     }

@@ -60,33 +60,8 @@ pub struct Crossing {
 
 /// Lines that cannot be counted.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum LineError {
-    /// Too many lines.
-    #[error("there are {0} lines: give at most {MAX_LINES}")]
-    Count(usize),
-    /// A line with too few or too many points.
-    #[error("line `{name}` has {count} points: give 2 to {MAX_LINE_POINTS}")]
-    Points {
-        /// Name of the line.
-        name: String,
-        /// Number of its points.
-        count: usize,
-    },
-    /// A coordinate that is not finite.
-    #[error("line `{0}` has a coordinate that is not finite: give numbers")]
-    Coordinate(String),
-    /// Two neighboring points in one place.
-    #[error("line `{0}` has the same point twice in a row: leave one out")]
-    Repeated(String),
-    /// A band without a width.
-    #[error("line `{name}` has the band {band}: give a number above 0")]
-    Band {
-        /// Name of the line.
-        name: String,
-        /// Its band.
-        band: f64,
-    },
-}
+#[error("{0}")]
+pub struct LineError(String);
 
 /// The lines over the tracks of one tracker.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -128,7 +103,8 @@ impl LineCounter {
     /// [`LineError`] for a line that cannot be counted.
     pub fn resumed(lines: Vec<Line>, mut state: LineState) -> Result<Self, LineError> {
         if lines.len() > MAX_LINES {
-            return Err(LineError::Count(lines.len()));
+            let problem = format!("there are {} lines: give at most {MAX_LINES}", lines.len());
+            return Err(LineError(problem));
         }
         lines.iter().try_for_each(Line::check)?;
         state
@@ -138,13 +114,11 @@ impl LineCounter {
     }
 
     /// Returns the lines.
-    #[must_use]
     pub fn lines(&self) -> &[Line] {
         &self.lines
     }
 
     /// Returns the state to be stored with that of the tracker.
-    #[must_use]
     pub fn state(&self) -> &LineState {
         &self.state
     }
@@ -213,25 +187,19 @@ impl Approach {
 
 impl Line {
     fn check(&self) -> Result<(), LineError> {
-        let name = || self.name.clone();
-        let count = self.points.len();
-        if !(2..=MAX_LINE_POINTS).contains(&count) {
-            return Err(LineError::Points {
-                name: name(),
-                count,
-            });
-        }
-        if !self.points.iter().flatten().all(|part| part.is_finite()) {
-            return Err(LineError::Coordinate(name()));
-        }
-        if self.points.windows(2).any(|pair| pair[0] == pair[1]) {
-            return Err(LineError::Repeated(name()));
-        }
-        if !(self.band > 0.0 && self.band.is_finite()) {
-            let band = self.band;
-            return Err(LineError::Band { name: name(), band });
-        }
-        Ok(())
+        let (count, band) = (self.points.len(), self.band);
+        let problem = if !(2..=MAX_LINE_POINTS).contains(&count) {
+            format!("has {count} points: give 2 to {MAX_LINE_POINTS}")
+        } else if !self.points.iter().flatten().all(|part| part.is_finite()) {
+            "has a coordinate that is not finite: give numbers".to_owned()
+        } else if self.points.windows(2).any(|pair| pair[0] == pair[1]) {
+            "has the same point twice in a row: leave one out".to_owned()
+        } else if !(band > 0.0 && band.is_finite()) {
+            format!("has the band {band}: give a number above 0")
+        } else {
+            return Ok(());
+        };
+        Err(LineError(format!("line `{}` {problem}", self.name)))
     }
 }
 

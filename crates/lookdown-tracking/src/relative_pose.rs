@@ -205,11 +205,7 @@ fn pairs(first: &[Walk], second: &[Walk]) -> Vec<Pair> {
     pairs
 }
 
-#[expect(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    reason = "steps of half a second"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "steps of half a second")]
 fn windows(walks: &[Walk]) -> Windows {
     let mut windows = Windows::new();
     for (at, walk) in walks.iter().enumerate() {
@@ -247,7 +243,6 @@ fn bias(range_m: f64) -> f64 {
     BIAS_M.powi(2) + (BIAS_DEG.to_radians() * slant_squared / USUAL_HEIGHT_M).powi(2)
 }
 
-#[expect(clippy::cast_precision_loss, reason = "far below 2^52")]
 fn count<T>(values: &[T]) -> f64 {
     values.len() as f64
 }

@@ -16,7 +16,6 @@ pub struct CameraPose {
 
 impl CameraPose {
     /// Returns the pose of a camera that has its floor to itself: its own axes, at the origin.
-    #[must_use]
     pub fn alone(height_m: Option<f64>) -> Self {
         Self {
             position_m: [0.0, 0.0],
@@ -27,14 +26,12 @@ impl CameraPose {
 
     /// Returns the site's coordinates of a floor place of this camera, meters. Lines and zones of
     /// a calibration reach the site's plane through this.
-    #[must_use]
     pub fn to_site(&self, floor_m: [f64; 2]) -> [f64; 2] {
         let [x, y] = self.turned_to_site(floor_m);
         [x + self.position_m[0], y + self.position_m[1]]
     }
 
     /// Returns the floor place of this camera at the site's coordinates, meters.
-    #[must_use]
     pub fn from_site(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let (x, y) = (x - self.position_m[0], y - self.position_m[1]);
         let (sin, cos) = self.yaw_deg.to_radians().sin_cos();

@@ -57,7 +57,6 @@ pub struct NumberWithBar {
 
 impl NumberWithBar {
     /// Returns the number of reports with the default bar, which is wide.
-    #[must_use]
     pub fn untaught(persons: usize) -> Self {
         let [low, high] = default_bar(to_f64(persons));
         Self::new(to_f64(persons), low, high)
@@ -75,7 +74,6 @@ impl NumberWithBar {
 }
 
 /// Returns the bar of a number without reference frames, such as the mean of a time.
-#[must_use]
 pub fn default_bar(number: f64) -> [f64; 2] {
     DEFAULT_BAR.map(|error| (number + error * scale(number)).max(0.0))
 }
@@ -95,7 +93,6 @@ pub struct TaughtNumber {
 impl TaughtNumber {
     /// Learns from reference frames in the order of their times. Returns `None` for fewer than
     /// [`MIN_FRAMES`].
-    #[must_use]
     pub fn new(frames: &[ReferenceFrame]) -> Option<Self> {
         if frames.len() < MIN_FRAMES {
             return None;
@@ -121,7 +118,6 @@ impl TaughtNumber {
     }
 
     /// Returns the number in a frame with boxes of these scores, from [`LEAST_SCORE`] on.
-    #[must_use]
     pub fn number(&self, scores: &[f32]) -> NumberWithBar {
         let found = found(scores);
         let count = self.left_out.len();
@@ -145,7 +141,6 @@ impl TaughtNumber {
     }
 
     /// Returns the mean threshold, for people to see.
-    #[must_use]
     pub fn threshold(&self) -> f64 {
         let sum: f64 = self.weights.iter().sum();
         let thresholds = self.weights.iter().zip(thresholds());
@@ -204,7 +199,6 @@ fn scale(number: f64) -> f64 {
     (number + 1.0).sqrt()
 }
 
-#[expect(clippy::cast_precision_loss, reason = "numbers of persons are small")]
 fn to_f64(number: usize) -> f64 {
     number as f64
 }

@@ -164,7 +164,9 @@ fn without_a_height_persons_are_tracked_by_bearing() {
     assert_eq!(ids(&tracker), [1]);
     let track = tracker.tracks().next().unwrap();
     assert_eq!(track.place(Plane::FloorM), None);
-    let [azimuth, off_axis] = track.bearing_deg().unwrap();
+    let direction = track.motion.direction().unwrap();
+    let azimuth = direction.y.atan2(direction.x).to_degrees();
+    let off_axis = direction.xy().norm().atan2(direction.z).to_degrees();
     assert!((azimuth - 90.0).abs() < 1.0, "{azimuth}");
     assert!(
         (off_axis - (2.8_f64 / CAMERA_M).atan().to_degrees()).abs() < 3.0,

@@ -65,7 +65,6 @@ pub struct TailPoint {
 
 impl TailPoint {
     /// Returns the place in a plane; `None` for the floor in bearing space.
-    #[must_use]
     pub fn place(&self, plane: Plane) -> Option<[f64; 2]> {
         match plane {
             Plane::FloorM => self.floor_m,
@@ -174,13 +173,11 @@ impl Track {
     }
 
     /// Returns the track's identifier.
-    #[must_use]
     pub fn id(&self) -> TrackId {
         self.id
     }
 
     /// Returns true once the track has enough evidence of a person.
-    #[must_use]
     pub fn is_confirmed(&self) -> bool {
         self.confirmed
     }
@@ -193,32 +190,27 @@ impl Track {
 
     /// Returns true if the track counts: it is confirmed, and its last person was not in the margin
     /// of an area.
-    #[must_use]
     pub fn counts(&self) -> bool {
         self.confirmed && !self.in_margin
     }
 
     /// Returns the time of the first observation, seconds since the Unix epoch.
-    #[must_use]
     pub fn first_seen_s(&self) -> f64 {
         self.first_seen_s
     }
 
     /// Returns the time of the last observation, seconds since the Unix epoch.
-    #[must_use]
     pub fn seen_s(&self) -> f64 {
         self.seen_s
     }
 
     /// Returns the person of the report that updated the track last.
-    #[must_use]
     pub fn last_person(&self) -> PersonOfReport {
         self.last_person
     }
 
     /// Returns the place at the last observation: filtered on the floor, as observed in the frame.
     /// `None` for the floor without the camera's height.
-    #[must_use]
     pub fn place(&self, plane: Plane) -> Option<[f64; 2]> {
         match plane {
             Plane::FloorM => self.motion.on_floor().map(|state| state.place().into()),
@@ -227,52 +219,32 @@ impl Track {
     }
 
     /// Returns the center of the last box in the frame that showed it, pixels.
-    #[must_use]
     pub fn center_px(&self) -> [f64; 2] {
         self.center_px
     }
 
     /// Returns the longer side of that box, pixels.
-    #[must_use]
     pub fn length_px(&self) -> f64 {
         self.length_px
     }
 
     /// Returns the posture at the last observation, with its probability: the boxes before tell the
     /// size of the person.
-    #[must_use]
     pub fn posture(&self) -> (Posture, f64) {
         self.posture.posture()
     }
 
     /// Returns the probability of a posture at the last observation.
-    #[must_use]
     pub fn posture_probability(&self, posture: Posture) -> f64 {
         self.posture.probability(posture)
     }
 
     /// Returns the velocity on the floor, meters per second; `None` without the camera's height.
-    #[must_use]
     pub fn velocity_m_s(&self) -> Option<[f64; 2]> {
         self.motion.on_floor().map(|state| state.velocity().into())
     }
 
-    /// Returns the filtered direction in the camera's frame: azimuth (as in the observations) and
-    /// angle off the axis, degrees; `None` on the floor.
-    #[must_use]
-    pub fn bearing_deg(&self) -> Option<[f64; 2]> {
-        let direction = self.motion.direction()?;
-        let azimuth = direction
-            .y
-            .atan2(direction.x)
-            .to_degrees()
-            .rem_euclid(360.0);
-        let off_axis = direction.xy().norm().atan2(direction.z).to_degrees();
-        Some([azimuth, off_axis])
-    }
-
     /// Returns the last places, oldest first, at most [`MAX_TAIL_POINTS`].
-    #[must_use]
     pub fn tail(&self) -> impl ExactSizeIterator<Item = &TailPoint> {
         self.tail.iter()
     }

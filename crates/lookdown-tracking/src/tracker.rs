@@ -112,13 +112,11 @@ impl Tracker {
     }
 
     /// Returns the things that stand in the frame of a camera.
-    #[must_use]
     pub fn furniture(&self, camera: usize) -> Option<&Furniture> {
         Some(&self.cameras.get(camera)?.furniture)
     }
 
     /// Returns the same to change it, or to restore that of another tracker.
-    #[must_use]
     pub fn furniture_mut(&mut self, camera: usize) -> Option<&mut Furniture> {
         Some(&mut self.cameras.get_mut(camera)?.furniture)
     }

@@ -25,10 +25,8 @@ const DIRECTIONS: u32 = 24;
 /// Returns the corners of the floor on which people walked and of 0.5 m around it, in meters, at
 /// most 24. `presence` has the milliseconds of presence per cell. `None` if less than
 /// [`LEAST_WALKED_M2`] are connected.
-#[must_use]
 pub fn walked_area(presence: &BTreeMap<Cell, u64>) -> Option<Vec<[f64; 2]>> {
     let cells = largest_part(presence);
-    #[expect(clippy::cast_precision_loss, reason = "at most 2^27 cells")]
     let floor_m2 = cells.len() as f64 * CELL_M.powi(2);
     (floor_m2 >= LEAST_WALKED_M2).then(|| hull(&cells))
 }

@@ -126,13 +126,11 @@ impl ZoneCounter {
     }
 
     /// Returns the zones.
-    #[must_use]
     pub fn zones(&self) -> &[Zone] {
         &self.zones
     }
 
     /// Returns the state to be stored with that of the tracker.
-    #[must_use]
     pub fn state(&self) -> &ZoneState {
         &self.state
     }
@@ -166,7 +164,6 @@ impl ZoneCounter {
     }
 
     /// Returns the number of persons in each zone.
-    #[must_use]
     pub fn occupancy(&self) -> Vec<usize> {
         let zones = 0..self.zones.len();
         zones.map(|zone| self.inside(zone).count()).collect()

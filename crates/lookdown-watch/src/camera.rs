@@ -25,13 +25,11 @@ pub struct Camera {
 
 impl Camera {
     /// Returns the shortest interval between two frames that are sent.
-    #[must_use]
     pub fn every(&self) -> Duration {
         self.operating_points.shortest_interval()
     }
 
     /// Returns the value of a parameter of `/detect`, if the camera has one.
-    #[must_use]
     pub fn parameter(&self, name: &str) -> Option<&str> {
         let mut parameters = self.parameters.iter();
         let (_, value) = parameters.find(|(known, _)| known == name)?;
@@ -77,7 +75,6 @@ pub enum Transport {
 
 impl Transport {
     /// The name of the transport.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Tcp => "tcp",

@@ -29,7 +29,6 @@ pub enum ImageFormat {
 
 impl ImageFormat {
     /// The media type of the format.
-    #[must_use]
     pub fn media_type(self) -> &'static str {
         match self {
             Self::Jpeg => "image/jpeg",

@@ -93,7 +93,6 @@ impl Location {
     }
 
     /// Returns true if the frames end, so that the source is not started again after its end.
-    #[must_use]
     pub fn is_finite(&self) -> bool {
         matches!(self, Self::Video(_) | Self::StandardInput)
     }

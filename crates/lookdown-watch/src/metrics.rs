@@ -76,11 +76,13 @@ pub(crate) struct CameraMetrics {
     camera: String,
     viewers: Arc<Viewers>,
     last_frame: Mutex<Instant>,
-    received: IntCounter,
-    sent: IntCounter,
-    skipped: IntCounter,
+    /// Whole frames of the camera.
+    pub(crate) received: IntCounter,
+    /// Frames for which the server returned a report.
+    pub(crate) sent: IntCounter,
+    pub(crate) skipped: IntCounter,
     failed: [IntCounter; Failure::ALL.len()],
-    reconnects: IntCounter,
+    pub(crate) reconnects: IntCounter,
     /// The source, without credentials.
     source: String,
     rate: Mutex<Option<Rate>>,
@@ -168,13 +170,11 @@ impl Metrics {
     }
 
     /// Returns the viewers of the cameras.
-    #[must_use]
     pub fn viewers(&self) -> &Arc<Viewers> {
         &self.viewers
     }
 
     /// Returns the states of all cameras.
-    #[must_use]
     pub fn states(&self) -> Vec<CameraState> {
         let cameras = self.cameras.lock();
         let states = cameras.iter().map(|camera| {
@@ -194,7 +194,6 @@ impl Metrics {
     }
 
     /// Returns all metrics in the text format of Prometheus.
-    #[must_use]
     pub fn text(&self) -> Vec<u8> {
         for camera in self.cameras.lock().iter() {
             let age = camera.last_frame.lock().elapsed().as_secs_f64();
@@ -226,14 +225,6 @@ impl CameraMetrics {
         self.viewers.changed(&self.camera, had_any).await;
     }
 
-    pub(crate) fn sent(&self) {
-        self.sent.inc();
-    }
-
-    pub(crate) fn skipped(&self) {
-        self.skipped.inc();
-    }
-
     pub(crate) fn failed(&self, reason: Failure) {
         let reasons = Failure::ALL.iter().zip(&self.failed);
         for (_, counter) in reasons.filter(|(other, _)| **other == reason) {
@@ -256,23 +247,9 @@ impl CameraMetrics {
         *last = Some(choice);
     }
 
-    /// The number of whole frames of the camera.
-    pub(crate) fn frames_received(&self) -> u64 {
-        self.received.get()
-    }
-
     /// Stores the reason why the source gives no frames.
     pub(crate) fn ended(&self, problem: &str) {
         *self.problem.lock() = Some(problem.to_owned());
-    }
-
-    pub(crate) fn reconnected(&self) {
-        self.reconnects.inc();
-    }
-
-    /// The number of frames for which the server returned a report.
-    pub(crate) fn reports(&self) -> u64 {
-        self.sent.get()
     }
 }
 

@@ -30,7 +30,7 @@ pub(crate) async fn run(
     let (first, longest) = PAUSES;
     let mut backoff = Backoff::new(first, longest);
     let mut log = LogOnce::default();
-    let mut meter = RateMeter::new(governor.every(), metrics.frames_received(), Instant::now());
+    let mut meter = RateMeter::new(governor.every(), metrics.received.get(), Instant::now());
     let mut is_slow = false;
     loop {
         if let Some(earliest) = pace.earliest() {
@@ -44,7 +44,7 @@ pub(crate) async fn run(
         let answer = server.detect(camera, governor.profile(), &frame).await;
         let now = Instant::now();
         let has_report = matches!(answer, Answer::Report(_));
-        if let Some(rate) = meter.add(has_report, metrics.frames_received(), now) {
+        if let Some(rate) = meter.add(has_report, metrics.received.get(), now) {
             // A folder, and a snapshot that does not change, have no rate of their own.
             let has_own_rate = matches!(camera.location, Location::Rtsp(_));
             let warning = rate.warning();
@@ -59,7 +59,7 @@ pub(crate) async fn run(
         }
         let (failure, message, pause) = match answer {
             Answer::Report(search) => {
-                metrics.sent();
+                metrics.sent.inc();
                 backoff.reset();
                 if log.clear() {
                     tracing::info!("the server accepts frames again");
@@ -69,7 +69,7 @@ pub(crate) async fn run(
                 };
                 if governor.record(search, now) {
                     pace = Pace::new(governor.every());
-                    meter = RateMeter::new(governor.every(), metrics.frames_received(), now);
+                    meter = RateMeter::new(governor.every(), metrics.received.get(), now);
                 } else if let Some(choice) = governor.choice() {
                     metrics.chose(choice);
                 }

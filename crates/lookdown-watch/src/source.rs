@@ -67,7 +67,7 @@ pub(crate) async fn supervise(
             return;
         }
         sleep(pause).await;
-        metrics.reconnected();
+        metrics.reconnects.inc();
     }
 }
 

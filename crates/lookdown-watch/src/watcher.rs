@@ -163,7 +163,7 @@ impl Watcher {
     async fn finish(&mut self) -> Result<(), WatchError> {
         for (name, running) in &mut self.running {
             let _ = (&mut running.sender).await;
-            if running.metrics.reports() == 0 {
+            if running.metrics.sent.get() == 0 {
                 return Err(WatchError::NoFrame(name.clone()));
             }
         }

@@ -82,7 +82,6 @@ impl Tally {
     /// Returns all statistics as JSON.
     pub fn summary(&self) -> Value {
         let seconds = (self.counted.end - self.counted.start).as_secs_f64();
-        #[expect(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
         let per_second = self.in_time as f64 / seconds;
         json!({
             "seconds": seconds,
@@ -127,7 +126,6 @@ impl Latencies {
         let mut seen = 0;
         for (class, count) in &self.counts {
             seen += count;
-            #[expect(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
             if seen as f64 >= share * self.count as f64 {
                 let middle = SHORTEST * (1.0 + RESOLUTION).powf(f64::from(*class) + 0.5);
                 return middle.min(longest) * 1e3;

@@ -3,7 +3,6 @@
 //! Standard input: one JSON array per sequence of `[persons, [score, …]]`, a frame each, in order
 //! of time. Reference frames are drawn from the first quarter, and the second half is scored: mean
 //! over sequences, with 20 draws each.
-#![expect(clippy::cast_precision_loss, reason = "small numbers")]
 
 use std::{error::Error, io::stdin};
 

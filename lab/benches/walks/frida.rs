@@ -270,7 +270,6 @@ pub fn add_errors(segments: &mut [Segment], detected: &[Sequence]) {
                 #[expect(
                     clippy::cast_possible_truncation,
                     clippy::cast_sign_loss,
-                    clippy::cast_precision_loss,
                     reason = "an index"
                 )]
                 let score = scores[(chance.uniform() * scores.len() as f64) as usize];
@@ -292,7 +291,6 @@ impl Chance {
             .0
             .wrapping_mul(6_364_136_223_846_793_005)
             .wrapping_add(1_442_695_040_888_963_407);
-        #[expect(clippy::cast_precision_loss, reason = "31 bits")]
         let share = (self.0 >> 33) as f64 / (1_u64 << 31) as f64;
         share
     }

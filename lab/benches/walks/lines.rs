@@ -59,7 +59,6 @@ impl Crossings {
         for number in 0..TRIED.min(busy.len()) {
             // Evenly over the steps, with directions by the golden angle.
             let middle = busy[(2 * number + 1) * busy.len() / (2 * TRIED.min(busy.len()))];
-            #[expect(clippy::cast_precision_loss, reason = "60 lines")]
             let (sin, cos) = (number as f64 * 2.399_963).sin_cos();
             let half = [cos, sin].map(|part| part * HALF_LENGTH * circle.radius);
             let ends = [-1.0, 1.0].map(|sign| [0, 1].map(|axis| middle[axis] + sign * half[axis]));

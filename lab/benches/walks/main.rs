@@ -75,7 +75,6 @@ impl Number {
     }
 }
 
-#[expect(clippy::cast_precision_loss, reason = "far below 2^52")]
 fn quotient(one: usize, other: usize) -> f64 {
     one as f64 / other.max(1) as f64
 }

@@ -288,7 +288,6 @@ impl Sums {
             let detection = matched / (self.truth + self.tracks - matched).max(1.0);
             (detection * association / matched.max(1.0)).sqrt()
         });
-        #[expect(clippy::cast_precision_loss, reason = "19 thresholds")]
         let hota = hota.sum::<f64>() / THRESHOLDS as f64;
         let published = &self.published;
         json!({
@@ -310,7 +309,6 @@ type Numbered<'a> = (Vec<usize>, Vec<usize>, &'a Vec<Vec<f64>>);
 
 fn thresholds() -> impl Iterator<Item = f64> {
     (1..=THRESHOLDS).map(|step| {
-        #[expect(clippy::cast_precision_loss, reason = "19 thresholds")]
         let step = step as f64;
         0.05 * step
     })

@@ -219,7 +219,6 @@ fn areas(calibration: &Calibration) -> impl Iterator<Item = (&'static str, Strin
     let masks = (!masks.is_empty()).then(|| {
         let (width, height) = calibration.image_size();
         let hidden = MaskedPixels::new(masks, width, height).count();
-        #[expect(clippy::cast_precision_loss, reason = "pixels of a frame")]
         let percent = 100.0 * hidden as f64 / (f64::from(width) * f64::from(height));
         let text = format!("{}, which hide {percent:.1} % of the frame", masks.len());
         ("  masks", text)

@@ -39,7 +39,6 @@ pub(super) fn run(settings_file: &SettingsFile) -> anyhow::Result<ExitCode> {
 
 /// The size of a file. `None` if it is missing.
 fn size(file: &Path) -> Option<String> {
-    #[expect(clippy::cast_precision_loss, reason = "far below 2^52 bytes")]
     let mebibytes = |bytes: u64| bytes as f64 / MEBIBYTE;
     let metadata = file.metadata().ok()?;
     Some(format!("{:.1} MiB", mebibytes(metadata.len())))

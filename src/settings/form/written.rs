@@ -30,7 +30,6 @@ impl<'a> Written<'a> {
     pub(super) fn number(self) -> Option<f64> {
         match self {
             Self::Toml(toml::Value::Float(number)) => Some(*number),
-            #[expect(clippy::cast_precision_loss, reason = "far below 2^52 in any setting")]
             Self::Toml(toml::Value::Integer(number)) => Some(*number as f64),
             _ => self.text()?.trim().parse().ok(),
         }

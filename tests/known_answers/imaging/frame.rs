@@ -1,6 +1,6 @@
 //! Construction and access of frames.
 
-use lookdown_imaging::{Frame, frame::FrameError};
+use lookdown_imaging::Frame;
 
 #[test]
 fn pixels_are_rows_of_red_green_and_blue_from_the_top() {
@@ -15,8 +15,12 @@ fn pixels_are_rows_of_red_green_and_blue_from_the_top() {
 fn a_frame_without_pixels_is_refused() {
     for (width, height) in [(0, 4), (4, 0), (0, 0)] {
         assert_eq!(
-            Frame::new(width, height, Vec::new()),
-            Err(FrameError::NoPixels { width, height })
+            Frame::new(width, height, Vec::new())
+                .unwrap_err()
+                .to_string(),
+            format!(
+                "a frame of {width}×{height} pixels has no pixels; both sides must be at least 1"
+            )
         );
     }
 }

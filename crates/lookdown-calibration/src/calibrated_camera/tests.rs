@@ -2,14 +2,16 @@ use super::*;
 
 fn calibration() -> Calibration {
     let lens = Lens::equidistant_circle(399.5, 299.5, 300.0, 1.5).unwrap();
-    Calibration::new(
-        "yard".parse().unwrap(),
-        b"",
-        800,
-        600,
+    Calibration {
+        id: "yard".parse().unwrap(),
+        revision: String::new(),
+        image_width: 800,
+        image_height: 600,
         lens,
-        Mount::default(),
-    )
+        mount: Mount::default(),
+        areas: Areas::default(),
+        site: None,
+    }
 }
 
 #[test]

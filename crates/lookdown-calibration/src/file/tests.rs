@@ -5,7 +5,7 @@ const LOBBY: &str = r#"{ "id": "lobby", "image": {"width": 1680, "height": 1680}
   "lens": {"model": "equidistant", "focal": 534.76, "cx": 839.5, "cy": 839.5, "max_theta": 1.5708},
   "mount": {"world_up": [0, 0, -1], "height_m": 2.8} }"#;
 
-fn read_text(name: &str, text: &str) -> Result<Calibration, CalibrationError> {
+fn read_text(name: &str, text: &str) -> Result<Calibration, FileError> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
     std::fs::write(&path, text).unwrap();

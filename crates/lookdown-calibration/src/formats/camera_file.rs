@@ -78,7 +78,6 @@ impl Camera {
     }
 
     /// Returns the camera as the content of a native file.
-    #[must_use]
     pub fn to_native(&self, id: String, image: NativeImage) -> NativeCalibration {
         NativeCalibration {
             mount: self.mount.clone(),

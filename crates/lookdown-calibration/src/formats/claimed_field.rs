@@ -13,8 +13,9 @@ pub(super) fn camera(
     lens: impl Fn(f64) -> LensModel,
 ) -> Camera {
     let claimed = lens(max_theta);
-    if let Err(LensError::MaxThetaOutOfRange { limit, .. } | LensError::TurnsBack { limit, .. }) =
-        Lens::new(&claimed)
+    if let Err(LensError {
+        limit: Some(limit), ..
+    }) = Lens::new(&claimed)
         && max_theta > limit
     {
         let mut camera = Camera::new(Some(image), lens(limit));

@@ -1,7 +1,7 @@
 //! Scaramuzza's model as programs after `OCamCalib` store it: x runs along the columns, so that
 //! `u = c·x + d·y + cx`, `v = e·x + y + cy`.
 
-use super::FormatError;
+use super::{FormatError, fields::Fields};
 use lookdown_lens::geometry::lens::Ocam;
 
 /// The model with its x axis along the columns.
@@ -16,6 +16,29 @@ pub(super) struct ColumnFirst {
 }
 
 impl ColumnFirst {
+    /// Reads the center and the stretch matrix of these fields, beside a polynomial whose z axis
+    /// points out of the lens.
+    pub(super) fn read(
+        fields: &Fields<'_>,
+        [center, stretch]: [&str; 2],
+        polynomial: &[f64],
+    ) -> Result<Self, FormatError> {
+        let [cx, cy] = fields.exactly(center, "column and row")?;
+        let [c, d, e, one] = fields.exactly(stretch, "[[c, d], [e, 1]]")?;
+        if one != 1.0 {
+            let problem = format!("its last number is {one}: it must be 1");
+            return Err(fields.invalid(stretch, problem));
+        }
+        Ok(Self {
+            polynomial: negated(polynomial),
+            c,
+            d,
+            e,
+            cx,
+            cy,
+        })
+    }
+
     /// The same lens with `OCamCalib`'s axes, whose affine map has its 1 in the other corner.
     ///
     /// With `rho' = c·rho` the maps agree for `c' = 1/c`, `d' = e/c`, `e' = d/c`, and the

@@ -25,7 +25,6 @@ pub enum FormatError {
 
 impl FormatError {
     /// The parameter that the client should send, or the field of the file at fault.
-    #[must_use]
     pub fn parameter(&self) -> Option<&str> {
         match self {
             Self::Malformed(_) => None,

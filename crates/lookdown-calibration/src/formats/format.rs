@@ -56,7 +56,6 @@ pub enum Format {
 
 impl Format {
     /// Returns the name under which its users know it.
-    #[must_use]
     pub fn name(self) -> &'static str {
         self.into()
     }

@@ -8,7 +8,7 @@
 
 use super::{
     Camera, FormatError,
-    column_first::{ColumnFirst, negated},
+    column_first::ColumnFirst,
     fields::{Fields, whole_pixels},
 };
 use crate::native::NativeImage;
@@ -39,20 +39,8 @@ pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
         return Ok(Camera::new(image, lens));
     }
     let [a0, a2, a3, a4] = camera.exactly(POLYNOMIAL, "a0, a2, a3, a4")?;
-    let [cx, cy] = camera.exactly("DistortionCenter", "column and row")?;
-    let [c, d, e, one] = camera.exactly("StretchMatrix", "[[c, d], [e, 1]]")?;
-    if one != 1.0 {
-        let problem = format!("its last number is {one}: it must be 1");
-        return Err(camera.invalid("StretchMatrix", problem));
-    }
-    let polynomial = negated(&[a0, 0.0, a2, a3, a4]);
-    let lens = ColumnFirst {
-        polynomial,
-        c,
-        d,
-        e,
-        cx: cx - 1.0,
-        cy: cy - 1.0,
-    };
+    let names = ["DistortionCenter", "StretchMatrix"];
+    let mut lens = ColumnFirst::read(&camera, names, &[a0, 0.0, a2, a3, a4])?;
+    (lens.cx, lens.cy) = (lens.cx - 1.0, lens.cy - 1.0);
     Ok(Camera::new(image, lens.into_lens()?))
 }

@@ -29,7 +29,6 @@ pub enum SourcedValue {
 
 impl SourcedValue {
     /// Returns true for a value of the lens or of the level, which a fit to frames finds together.
-    #[must_use]
     pub fn is_of_lens_or_level(self) -> bool {
         match self {
             Self::Lens | Self::LensModel | Self::FieldOfView | Self::Center | Self::WorldUp => true,
@@ -38,7 +37,6 @@ impl SourcedValue {
     }
 
     /// Returns the unit of the standard deviation, to follow its number.
-    #[must_use]
     pub fn unit(self) -> &'static str {
         match self {
             Self::Lens => " % of the radius",
@@ -96,7 +94,6 @@ impl NativeSource {
     }
 
     /// A measured value with its standard deviation, if that is known.
-    #[must_use]
     pub fn measured(uncertainty: Option<f64>) -> Self {
         Self {
             source: ValueSource::Measured,
@@ -105,7 +102,6 @@ impl NativeSource {
     }
 
     /// A value from people with its standard deviation.
-    #[must_use]
     pub fn from_people(uncertainty: f64) -> Self {
         Self {
             source: ValueSource::FromPeople,

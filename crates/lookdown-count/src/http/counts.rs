@@ -274,10 +274,6 @@ fn step_counts(
     }
 }
 
-#[expect(
-    clippy::cast_precision_loss,
-    reason = "exact for centuries of milliseconds"
-)]
 fn ratio(value: u64, of: u64) -> f64 {
     if of == 0 {
         0.0

@@ -59,7 +59,6 @@ fn drawn(cells: &BTreeMap<Cell, u64>, definition: &Arc<CameraDefinition>) -> (Ve
     let height = (f64::from(key.height) / scale)
         .round()
         .clamp(1.0, 16.0 * f64::from(WIDTH)) as u32;
-    #[expect(clippy::cast_precision_loss, reason = "exact for centuries")]
     let seconds = |milliseconds: u64| milliseconds as f64 / 1000.0;
     let most = cells.values().copied().max().map_or(0.0, seconds);
     let mut pixels = Vec::with_capacity(WIDTH as usize * height as usize * 4);

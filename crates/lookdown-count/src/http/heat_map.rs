@@ -172,13 +172,8 @@ fn grid(cells: &BTreeMap<Cell, u64>) -> (Cell, Vec<Vec<f64>>) {
     let (top, bottom) = range(|cell| cell.row);
     let rows = (top..=bottom).map(|row| {
         let columns = (left..=right).map(|column| {
-            let milliseconds = cells
-                .get(&Cell { column, row })
-                .copied()
-                .unwrap_or_default();
-            #[expect(clippy::cast_precision_loss, reason = "exact for centuries")]
-            let seconds = milliseconds as f64 / 1000.0;
-            seconds
+            let milliseconds = cells.get(&Cell { column, row });
+            milliseconds.map_or(0.0, |milliseconds| *milliseconds as f64 / 1000.0)
         });
         columns.collect()
     });

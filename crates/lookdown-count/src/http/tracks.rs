@@ -34,7 +34,7 @@ const TAIL_S: f64 = 5.0;
 const OUTLINE_SEGMENTS: u32 = 16;
 
 /// The current tracks of a camera or a site.
-#[derive(Serialize, ToSchema)]
+#[derive(Default, Serialize, ToSchema)]
 #[expect(clippy::struct_field_names, reason = "names of the answer")]
 pub(super) struct Tracks {
     /// Time of the last frame; null before the first.
@@ -117,10 +117,9 @@ pub(super) async fn camera_tracks(
 ) -> Result<Json<Tracks>, Problem> {
     check_known(&api, &Owner::Camera(camera.clone())).await?;
     let counter = api.counter.lock();
-    let answer = counter
-        .scene_of(&camera)
-        .map(|scene| tracks(&counter, scene, Some(&camera)));
-    Ok(Json(answer.unwrap_or_else(Tracks::none)))
+    let scene = counter.scene_of(&camera);
+    let answer = scene.map(|scene| tracks(&counter, scene, Some(&camera)));
+    Ok(Json(answer.unwrap_or_default()))
 }
 
 /// Get the tracks of a site
@@ -136,10 +135,9 @@ pub(super) async fn site_tracks(
 ) -> Result<Json<Tracks>, Problem> {
     check_known(&api, &Owner::Site(site.clone())).await?;
     let counter = api.counter.lock();
-    let answer = counter
-        .site(&site)
-        .map(|scene| tracks(&counter, scene, None));
-    Ok(Json(answer.unwrap_or_else(Tracks::none)))
+    let scene = counter.site(&site);
+    let answer = scene.map(|scene| tracks(&counter, scene, None));
+    Ok(Json(answer.unwrap_or_default()))
 }
 
 fn tracks(counter: &Counter, scene: &Scene, camera: Option<&str>) -> Tracks {
@@ -176,21 +174,6 @@ fn tracks(counter: &Counter, scene: &Scene, camera: Option<&str>) -> Tracks {
             .map_or_else(Vec::new, |(_, camera)| {
                 camera.floor.alerts().map(PersonOnFloor::from).collect()
             }),
-    }
-}
-
-impl Tracks {
-    /// A camera that was followed before.
-    fn none() -> Self {
-        Self {
-            last_report: None,
-            is_current: false,
-            tracks: Vec::new(),
-            lines: Vec::new(),
-            zones: Vec::new(),
-            furniture: Vec::new(),
-            floor_alerts: Vec::new(),
-        }
     }
 }
 

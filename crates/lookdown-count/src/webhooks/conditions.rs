@@ -12,6 +12,9 @@ use crate::{
     scene_camera::NamedCrossing,
 };
 
+/// The messages of a camera that becomes silent, and that sends reports again.
+const SILENCE: [&str; 2] = ["camera.silent", "camera.back"];
+
 /// The conditions and whether they hold.
 pub(crate) struct Conditions {
     webhooks: Vec<Webhook>,
@@ -86,7 +89,7 @@ impl Conditions {
                     .as_deref()
                     .is_none_or(|camera| camera == name)
             };
-            match &webhook.condition {
+            let (holds, names, data) = match &webhook.condition {
                 Condition::Crossing { line, direction } => {
                     let fits = |crossing: &&NamedCrossing| {
                         let of = &crossing.of;
@@ -102,39 +105,28 @@ impl Conditions {
                         let id = format!("msg_{event}_{index}_{number}");
                         messages.push(message(id, webhook, "crossing", crossing.at_ms, &data));
                     }
+                    continue;
                 }
-                Condition::Occupancy { zone, at_least } if is_of(camera) => {
-                    let Some((_, of)) = scene.camera(camera) else {
-                        continue;
-                    };
-                    let persons = match zone {
-                        Some(zone) => of.occupancy().find(|(name, _)| name == zone),
-                        None => usize::try_from(of.presence().persons)
-                            .ok()
-                            .map(|count| ("", count)),
-                    };
-                    let Some((_, persons)) = persons else {
+                _ if !is_of(camera) => continue,
+                Condition::Occupancy { zone, at_least } => {
+                    let persons = scene.camera(camera).and_then(|(_, of)| match zone {
+                        Some(zone) => {
+                            let mut zones = of.occupancy().filter(|(name, _)| name == zone);
+                            zones.next().map(|(_, persons)| persons as u64)
+                        }
+                        None => Some(of.presence().persons),
+                    });
+                    let Some(persons) = persons else {
                         continue;
                     };
                     let data = json!({
                         "camera": camera, "zone": zone, "persons": persons, "at_least": at_least,
                     });
-                    let holds = persons as u64 >= *at_least;
                     let names = ["occupancy.reached", "occupancy.ended"];
-                    let id = format!("msg_{event}_{index}");
-                    let changed = change(&mut self.holding, (index, camera), holds, names);
-                    self.is_changed |= changed.is_some();
-                    messages.extend(changed.map(|name| message(id, webhook, name, at_ms, &data)));
+                    (persons >= *at_least, names, data)
                 }
-                Condition::Silent { .. } if is_of(camera) => {
-                    let data = json!({ "camera": camera });
-                    let names = ["camera.silent", "camera.back"];
-                    let id = format!("msg_{event}_{index}");
-                    let changed = change(&mut self.holding, (index, camera), false, names);
-                    self.is_changed |= changed.is_some();
-                    messages.extend(changed.map(|name| message(id, webhook, name, at_ms, &data)));
-                }
-                Condition::FloorAlert if is_of(camera) => {
+                Condition::Silent { .. } => (false, SILENCE, json!({ "camera": camera })),
+                Condition::FloorAlert => {
                     let Some((_, of)) = scene.camera(camera) else {
                         continue;
                     };
@@ -145,16 +137,15 @@ impl Conditions {
                         })
                     });
                     let alerts: Vec<_> = alerts.collect();
-                    let holds = !alerts.is_empty();
-                    let data = json!({ "camera": camera, "persons": alerts });
                     let names = ["floor_alert.began", "floor_alert.ended"];
-                    let id = format!("msg_{event}_{index}");
-                    let changed = change(&mut self.holding, (index, camera), holds, names);
-                    self.is_changed |= changed.is_some();
-                    messages.extend(changed.map(|name| message(id, webhook, name, at_ms, &data)));
+                    let holds = !alerts.is_empty();
+                    (holds, names, json!({ "camera": camera, "persons": alerts }))
                 }
-                Condition::Occupancy { .. } | Condition::Silent { .. } | Condition::FloorAlert => {}
-            }
+            };
+            let changed = change(&mut self.holding, (index, camera), holds, names);
+            self.is_changed |= changed.is_some();
+            let id = format!("msg_{event}_{index}");
+            messages.extend(changed.map(|name| message(id, webhook, name, at_ms, &data)));
         }
         self.reports
             .insert(camera.to_owned(), at_ms.min(now.unix_ms));
@@ -176,9 +167,8 @@ impl Conditions {
                     continue;
                 }
                 let data = json!({ "camera": camera, "last_report": time_of(*last_ms) });
-                let names = ["camera.silent", "camera.back"];
                 let id = format!("msg_{last_ms}_{index}_silent");
-                let changed = change(&mut self.holding, (index, camera), true, names);
+                let changed = change(&mut self.holding, (index, camera), true, SILENCE);
                 self.is_changed |= changed.is_some();
                 messages.extend(changed.map(|name| message(id, webhook, name, now_ms, &data)));
             }

@@ -129,7 +129,6 @@ pub fn walks(camera: &str, seconds: i64, gap: std::ops::Range<i64>) -> Vec<(u64,
         }
         let mut persons = Vec::new();
         for walker in 0..=(at_ms / 6000) {
-            #[expect(clippy::cast_precision_loss, reason = "small")]
             let walked = (at_ms - walker * 6000) as f64 / 1000.0 * 1.2;
             random = random
                 .wrapping_mul(6_364_136_223_846_793_005)

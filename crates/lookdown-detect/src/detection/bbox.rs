@@ -40,7 +40,6 @@ pub struct BBox<S> {
 
 impl BBox<FramePixels> {
     /// The box that covers a whole frame.
-    #[must_use]
     pub fn for_frame(width: u32, height: u32) -> Self {
         Self::from_ordered([0.0, 0.0, f64::from(width), f64::from(height)])
     }
@@ -76,56 +75,47 @@ impl<S> BBox<S> {
     }
 
     /// Left edge, pixels.
-    #[must_use]
     pub fn x_min(&self) -> f64 {
         self.x_min
     }
 
     /// Top edge, pixels.
-    #[must_use]
     pub fn y_min(&self) -> f64 {
         self.y_min
     }
 
     /// Right edge, pixels.
-    #[must_use]
     pub fn x_max(&self) -> f64 {
         self.x_max
     }
 
     /// Bottom edge, pixels.
-    #[must_use]
     pub fn y_max(&self) -> f64 {
         self.y_max
     }
 
     /// `[x_min, y_min, x_max, y_max]`, pixels.
-    #[must_use]
     pub fn corners(&self) -> [f64; 4] {
         [self.x_min, self.y_min, self.x_max, self.y_max]
     }
 
     /// Extent along x, pixels, at least 0.
-    #[must_use]
     pub fn width(&self) -> f64 {
         self.x_max - self.x_min
     }
 
     /// Extent along y, pixels, at least 0.
-    #[must_use]
     pub fn height(&self) -> f64 {
         self.y_max - self.y_min
     }
 
     /// Width times height, in square pixels. Coordinates are continuous, so no pixel is added to
     /// the sides.
-    #[must_use]
     pub fn area(&self) -> f64 {
         self.width() * self.height()
     }
 
     /// The center `[x, y]`, in pixels.
-    #[must_use]
     pub fn center(&self) -> [f64; 2] {
         [
             f64::midpoint(self.x_min, self.x_max),
@@ -134,7 +124,6 @@ impl<S> BBox<S> {
     }
 
     /// The area shared with `other`, in square pixels. 0 for boxes that only touch.
-    #[must_use]
     pub fn intersection_area(&self, other: &Self) -> f64 {
         // Each side is clamped separately, so that two negative overlaps do not multiply to a
         // positive area.
@@ -144,7 +133,6 @@ impl<S> BBox<S> {
     }
 
     /// Intersection over union, 0 to 1. 0 when neither box has an area.
-    #[must_use]
     pub fn iou(&self, other: &Self) -> f64 {
         let intersection = self.intersection_area(other);
         let union = self.area() + other.area() - intersection;
@@ -156,7 +144,6 @@ impl<S> BBox<S> {
     }
 
     /// Returns the part inside `bounds`, or `None` when that part has no area.
-    #[must_use]
     pub fn clipped_to(&self, bounds: &Self) -> Option<Self> {
         (self.intersection_area(bounds) > 0.0).then(|| {
             Self::from_ordered([

@@ -190,9 +190,7 @@ impl Cluster {
                 sum += vote;
             }
         }
-        #[expect(clippy::cast_precision_loss, reason = "at most three views")]
-        let mean = sum / required as f64;
-        mean
+        sum / required as f64
     }
 
     fn required_votes(&self) -> usize {

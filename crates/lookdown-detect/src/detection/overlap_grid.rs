@@ -185,7 +185,6 @@ impl Axis {
         let extent = end - start;
         // Without boxes or without extent the quotient is NaN, which gives one cell.
         let cells = to_cell(cells_per_box * extent * count / sides).clamp(1, MAX_CELLS_PER_AXIS);
-        #[expect(clippy::cast_precision_loss, reason = "at most 128 cells")]
         let cells_per_pixel = cells as f64 / extent;
         Self {
             origin: start,

@@ -6,7 +6,6 @@ use super::{Candidate, MergedDetection, Refinement, RefinementParameters, fusion
 ///
 /// `members` of the result are indices into `candidates`. Candidates with a field out of range are
 /// ignored (see [`Candidate`]). The result is finite and in range for any input.
-#[must_use]
 pub fn refine(candidates: &[Candidate], parameters: &RefinementParameters) -> Vec<MergedDetection> {
     let RefinementParameters {
         iou_threshold,

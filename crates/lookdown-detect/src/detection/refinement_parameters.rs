@@ -30,7 +30,6 @@ pub enum Refinement {
 
 impl Refinement {
     /// Returns the name, as in requests and reports.
-    #[must_use]
     pub fn name(self) -> &'static str {
         self.into()
     }

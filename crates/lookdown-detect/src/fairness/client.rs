@@ -22,14 +22,12 @@ pub enum Client {
 
 impl Client {
     /// Returns the client with the API key of this name.
-    #[must_use]
     pub fn with_key(name: &str) -> Self {
         Self::Key(name.into())
     }
 
     /// Returns the client at an address. A host has at least a /64 of IPv6 addresses, so such a
     /// prefix is one client.
-    #[must_use]
     pub fn at(address: IpAddr) -> Self {
         Self::Address(match address.to_canonical() {
             IpAddr::V6(address) => {

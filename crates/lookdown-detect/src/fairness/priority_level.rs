@@ -15,7 +15,6 @@ impl PriorityLevel {
     pub const DEFAULT: &str = "5";
 
     /// Creates a level. Returns `None` for a number that is none.
-    #[must_use]
     pub fn new(level: u32) -> Option<Self> {
         (Self::HIGHEST..=Self::LOWEST)
             .contains(&level)
@@ -23,7 +22,6 @@ impl PriorityLevel {
     }
 
     /// The level as a number.
-    #[must_use]
     pub fn get(self) -> u32 {
         self.0
     }

@@ -42,13 +42,11 @@ pub enum BudgetError {
 
 impl SharedBudget {
     /// Creates a budget of `total` permits.
-    #[must_use]
     pub fn new(total: usize) -> Self {
         Self::with_least_share(total, 1)
     }
 
     /// Creates a budget of `total` permits, of which each client may use at least `least_share`.
-    #[must_use]
     pub fn with_least_share(total: usize, least_share: usize) -> Self {
         Self(Arc::new(Shared {
             total,
@@ -84,13 +82,11 @@ impl SharedBudget {
     }
 
     /// The number of permits.
-    #[must_use]
     pub fn total(&self) -> usize {
         self.0.total
     }
 
     /// The largest number of permits that one of several clients may use.
-    #[must_use]
     pub fn share(&self) -> usize {
         self.0.share
     }

@@ -45,13 +45,11 @@ pub struct UnknownDevice;
 
 impl Device {
     /// Returns true if the networks share the processor with the rest of the program.
-    #[must_use]
     pub fn is_processor(self) -> bool {
         matches!(self, Self::Cpu | Self::OpenVino(OpenVinoDevice::Cpu))
     }
 
     /// Returns the name of the Python package whose ONNX Runtime can use this device.
-    #[must_use]
     pub fn package(self) -> &'static str {
         match self {
             Self::Cpu => "onnxruntime",
@@ -61,7 +59,6 @@ impl Device {
     }
 
     /// Returns what the device needs, for messages: "check …".
-    #[must_use]
     pub fn requirements(self) -> &'static str {
         match self {
             Self::Cpu | Self::OpenVino(OpenVinoDevice::Cpu) => "the library",

@@ -83,7 +83,6 @@ const fn row(family: &'static str, length: i64, table: &'static str) -> GuessedH
 }
 
 /// Returns the head that can read these outputs, first one with the 80 classes of COCO.
-#[must_use]
 pub fn guess_head(outputs: &[OnnxTensor], size: (u32, u32)) -> Option<GuessedHead> {
     let shapes: Vec<_> = float_shapes(outputs).collect();
     let has_length = |row: &&GuessedHead| {
@@ -101,7 +100,6 @@ fn can_read(table: &str, shapes: &[OutputShape<'_>], size: (u32, u32)) -> bool {
 }
 
 /// Returns width and height of the image that a network takes, and true if it leaves them open.
-#[must_use]
 pub fn guess_size(inputs: &[OnnxTensor]) -> ((u32, u32), bool) {
     let sides = inputs.iter().find_map(|input| match input.shape[..] {
         [_, 3, height, width] | [_, height, width, 3] => Some([width, height]),

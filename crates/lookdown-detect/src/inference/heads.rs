@@ -22,7 +22,9 @@ mod yolox;
 use serde::Deserialize;
 use strum::IntoStaticStr;
 
-use self::{candidate_collector::CandidateCollector, decoder::Decoder, shape::Batch};
+use self::{
+    candidate_collector::CandidateCollector, decoder::Decoder, shape::Batch, tensor::Output,
+};
 use super::{HeadOutput, InferenceError};
 use lookdown_imaging::NetworkInput;
 
@@ -52,7 +54,6 @@ macro_rules! heads {
 
         impl Head {
             /// Returns the outputs that the head expects, as a phrase.
-            #[must_use]
             pub fn description(&self) -> &'static str {
                 match self {
                     $(Self::$variant(_) => concat!($($description),+).trim_ascii_start(),)+
@@ -104,7 +105,6 @@ impl CandidateOptions {
 
 impl Head {
     /// Returns the name, as in manifests.
-    #[must_use]
     pub fn name(&self) -> &'static str {
         self.into()
     }
@@ -120,7 +120,8 @@ impl Head {
             width: input.0,
             height: input.1,
         };
-        self.decoder().check(outputs, &batch)
+        let outputs = Output::all(outputs.iter().map(|output| (output.name, output.shape)));
+        self.decoder().select(&outputs, &batch).map(drop)
     }
 
     /// Decodes the persons in `views` views with a score of at least `floor` (0 to 1).
@@ -140,12 +141,20 @@ impl Head {
             width: input.width,
             height: input.height,
         };
+        let known = Output::all(outputs.iter().map(|output| (output.name, output.shape)));
         let mut collector = CandidateCollector::new(views, input, floor);
         outputs
             .iter()
             .try_for_each(TensorView::check_len)
-            .and_then(|()| self.decoder().decode(outputs, &batch, &mut collector))
-            .and_then(|()| collector.finish())
+            .and_then(|()| self.decoder().select(&known, &batch))
+            .and_then(|selected| {
+                let tensors: Vec<_> = selected
+                    .iter()
+                    .map(|output| &outputs[output.index])
+                    .collect();
+                self.decoder().decode(&tensors, &batch, &mut collector);
+                collector.finish()
+            })
             .map_err(InferenceError::Run)
     }
 }

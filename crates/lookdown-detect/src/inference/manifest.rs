@@ -136,7 +136,6 @@ pub(super) fn is_name(name: &str) -> bool {
 }
 
 /// Makes a valid name from a file name.
-#[must_use]
 pub fn name_from(stem: &str) -> String {
     let usable = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-');
     let name: String = stem

@@ -29,13 +29,11 @@ pub(super) struct ModelFiles {
 
 impl Model {
     /// A model with one session.
-    #[must_use]
     pub fn new(session: Box<dyn Detector>) -> Self {
         Self::from_boxed(session, Vec::new())
     }
 
     /// Returns a model with several sessions of the same network.
-    #[must_use]
     pub fn from_sessions<D: Detector + 'static>(first: D, others: Vec<D>) -> Self {
         let others = others.into_iter();
         let others = others.map(|session| Box::new(session) as Box<dyn Detector>);
@@ -69,26 +67,22 @@ impl Model {
     }
 
     /// Name of the model.
-    #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
     /// Identifier that changes with the model.
-    #[must_use]
     pub fn revision(&self) -> &str {
         &self.revision
     }
 
     /// Input format of the network.
-    #[must_use]
     pub fn input(&self) -> &NetworkInput {
         &self.input
     }
 
     /// The largest useful batch of at most `max_views` views. It is at least the number of views
     /// per run, and a multiple of it where that number is fixed.
-    #[must_use]
     pub fn batch_of(&self, max_views: NonZeroUsize) -> NonZeroUsize {
         let fixed = self.views_per_run.unwrap_or(NonZeroUsize::MIN);
         let runs = (max_views.get() / fixed.get()).max(1);

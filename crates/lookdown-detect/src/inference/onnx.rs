@@ -160,7 +160,6 @@ impl OnnxDetector {
     }
 
     /// Description of the model, from its manifest and its ONNX file.
-    #[must_use]
     pub fn description(&self) -> &ModelDescription {
         &self.description
     }

@@ -21,14 +21,12 @@ pub struct RegistryFull;
 
 impl ModelRegistry {
     /// Returns the model with that name.
-    #[must_use]
     pub fn get(&self, name: &str) -> Option<Arc<Model>> {
         let models = self.0.read();
         models.get(name).cloned()
     }
 
     /// Returns every model, sorted by name.
-    #[must_use]
     pub fn all(&self) -> Vec<Arc<Model>> {
         let models = self.0.read();
         models.values().cloned().collect()

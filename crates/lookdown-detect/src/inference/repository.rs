@@ -60,7 +60,6 @@ struct Memory {
 
 impl ModelRepository {
     /// A repository with these options, without any loaded model.
-    #[must_use]
     pub fn new(
         options: RepositoryOptions,
         loader: ModelLoader,
@@ -78,7 +77,6 @@ impl ModelRepository {
     }
 
     /// Sets the server on which the networks run.
-    #[must_use]
     pub fn on(self, remote: Arc<RemoteServer>) -> Self {
         Self {
             remote: Some(remote),
@@ -87,13 +85,11 @@ impl ModelRepository {
     }
 
     /// The server on which the networks run, or `None` if they run locally.
-    #[must_use]
     pub fn remote(&self) -> Option<&Arc<RemoteServer>> {
         self.remote.as_ref()
     }
 
     /// Returns false while the inference server is unavailable.
-    #[must_use]
     pub fn is_remote_available(&self) -> bool {
         self.remote
             .as_ref()
@@ -101,7 +97,6 @@ impl ModelRepository {
     }
 
     /// The loaded models.
-    #[must_use]
     pub fn registry(&self) -> &Arc<ModelRegistry> {
         &self.registry
     }
@@ -118,7 +113,6 @@ impl ModelRepository {
     }
 
     /// Returns true while a model is being loaded or checked.
-    #[must_use]
     pub fn is_loading(&self) -> bool {
         self.try_lock().is_err()
     }

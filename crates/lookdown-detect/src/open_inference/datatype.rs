@@ -19,7 +19,6 @@ pub enum Datatype {
 
 impl Datatype {
     /// Returns the name, as the protocol writes it.
-    #[must_use]
     pub fn name(self) -> &'static str {
         self.into()
     }

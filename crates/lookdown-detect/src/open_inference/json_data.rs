@@ -18,7 +18,6 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
 );
 
 /// Most bytes that [`byte_elements`] returns for data of this length: three of four letters.
-#[must_use]
 pub fn bytes_at_most(json: &str) -> usize {
     // With the quotes and the separator around it, each element has at least three letters more
     // than are decoded.
@@ -166,12 +165,10 @@ impl<'de, E: Elements<'de>> Visitor<'de> for Reading<'_, E> {
     }
 
     fn visit_u64<F: Error>(self, number: u64) -> Result<(), F> {
-        #[expect(clippy::cast_precision_loss, reason = "the target format is FP32")]
         self.visit_f64(number as f64)
     }
 
     fn visit_i64<F: Error>(self, number: i64) -> Result<(), F> {
-        #[expect(clippy::cast_precision_loss, reason = "the target format is FP32")]
         self.visit_f64(number as f64)
     }
 

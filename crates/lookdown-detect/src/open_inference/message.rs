@@ -130,7 +130,6 @@ impl Message {
 
     /// Splits the message into its JSON and the bytes after it; `None` if it is shorter than its
     /// JSON should be.
-    #[must_use]
     pub fn split(&self) -> Option<(Bytes, Bytes)> {
         let length = self.head_length.unwrap_or(self.body.len());
         (length <= self.body.len()).then(|| (self.body.slice(..length), self.body.slice(length..)))

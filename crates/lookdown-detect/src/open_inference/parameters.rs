@@ -29,7 +29,6 @@ pub enum Parameter {
 
 impl Parameters {
     /// Returns one parameter, or none.
-    #[must_use]
     pub fn only(name: &str, value: Option<Parameter>) -> Self {
         Self(
             value
@@ -40,13 +39,11 @@ impl Parameters {
     }
 
     /// Returns `true` if there are no parameters.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
     /// Removes and returns the parameter of this name; the last one if it is repeated.
-    #[must_use]
     pub fn take(&mut self, name: &str) -> Option<Parameter> {
         let mut taken = self.0.extract_if(.., |(given, _)| given == name);
         taken.by_ref().last().map(|(_, value)| value)

@@ -44,7 +44,6 @@ impl<'a> TensorData<'a> {
 
     /// Returns the largest memory that the elements of a tensor of `BYTES` need besides the
     /// message, in bytes, before they are read.
-    #[must_use]
     pub fn unpacked_bytes(&self) -> usize {
         match self {
             Self::Json(text) => json_data::bytes_at_most(text),

@@ -23,7 +23,6 @@ pub enum TensorValues<'a> {
 
 impl TensorValues<'_> {
     /// Returns the datatype.
-    #[must_use]
     pub fn datatype(&self) -> Datatype {
         match self {
             Self::Floats(_) => Datatype::Fp32,
@@ -33,7 +32,6 @@ impl TensorValues<'_> {
     }
 
     /// Returns the number of bytes of the values as bytes.
-    #[must_use]
     pub fn byte_count(&self) -> usize {
         match self {
             Self::Floats(values) => size_of_val(*values),

@@ -38,7 +38,6 @@ impl DetectDefaults {
     }
 
     /// Returns the default of the parameter `follow` for a frame of a camera.
-    #[must_use]
     pub fn follow(&self) -> bool {
         let camera = [(DetectParameters::CAMERA, "camera")];
         let parameters = DetectParameters::parse_with(camera, &[(DefaultSource::Server, self)]);

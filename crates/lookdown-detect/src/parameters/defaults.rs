@@ -15,7 +15,6 @@ pub enum DefaultSource {
 
 impl DefaultSource {
     /// Returns the name, as in reports.
-    #[must_use]
     pub fn name(self) -> &'static str {
         self.into()
     }
@@ -48,7 +47,6 @@ impl DetectDefaults {
     }
 
     /// Returns whether the parameter `name` has a default.
-    #[must_use]
     pub fn has(&self, name: &str) -> bool {
         self.values().any(|(known, _)| known == name)
     }

@@ -289,7 +289,6 @@ impl DetectParameters {
     }
 
     /// Returns the name of the camera, if the request gave it one.
-    #[must_use]
     pub fn camera_name(&self) -> Option<&str> {
         let calibration = self.calibration.as_ref().map(CalibrationId::as_str);
         self.camera.as_deref().or(calibration)

@@ -43,7 +43,6 @@ impl<'a> GivenParameters<'a> {
     }
 
     /// Adds defaults, those with precedence first, for the parameters that the request omits.
-    #[must_use]
     pub fn with_defaults(mut self, layers: &[(DefaultSource, &'a DetectDefaults)]) -> Self {
         for (source, defaults) in layers {
             for (name, value) in defaults.values() {
@@ -62,7 +61,6 @@ impl<'a> GivenParameters<'a> {
     }
 
     /// Returns the defaults that complete the request.
-    #[must_use]
     pub fn defaults_used(&self) -> Vec<DefaultUsed> {
         let used = self
             .defaults
@@ -76,7 +74,6 @@ impl<'a> GivenParameters<'a> {
     }
 
     /// Returns the text of a parameter in the request or in the defaults.
-    #[must_use]
     pub fn text(&self, spec: &ParameterSpec) -> Option<&'a str> {
         let defaults = self.defaults.iter().map(|(name, value, _)| (*name, *value));
         let mut given = self.request.iter().copied().chain(defaults);

@@ -29,26 +29,22 @@ pub enum ParameterFault {
 
 impl ParameterError {
     /// Creates the error for an unknown name. `problem` lists the known names.
-    #[must_use]
     pub fn unknown(name: &str, problem: String) -> Self {
         Self::new(name, problem, ParameterFault::UnknownName)
     }
 
     /// Creates the error for a parameter given more than once.
-    #[must_use]
     pub fn repeated(name: &str) -> Self {
         let problem = "it is given twice: give it once".to_owned();
         Self::new(name, problem, ParameterFault::Repeated)
     }
 
     /// Creates the error for a bad value with its reason.
-    #[must_use]
     pub fn bad_value(name: &str, problem: String) -> Self {
         Self::new(name, problem, ParameterFault::BadValue)
     }
 
     /// Creates the error for a value that breaks `rule`, which completes "… is not".
-    #[must_use]
     pub fn is_not(name: &str, value: &str, rule: &str) -> Self {
         Self::bad_value(name, format!("{} is not {rule}", Quoted(value)))
     }

@@ -104,7 +104,6 @@ pub enum JsonType {
 
 impl ParameterSpec {
     /// Returns whether an interface offers the parameter.
-    #[must_use]
     pub fn is_offered_by(&self, interface: Interface) -> bool {
         self.interfaces.contains(&interface)
     }
@@ -126,7 +125,6 @@ impl ParameterSpec {
 
 impl ParameterKind {
     /// Describes the values so that the text completes "… is not".
-    #[must_use]
     pub fn rule(&self) -> String {
         match *self {
             Self::Text => "a text".to_owned(),
@@ -150,7 +148,6 @@ impl ParameterKind {
     }
 
     /// Returns the type of the values in JSON.
-    #[must_use]
     pub fn json_type(&self) -> JsonType {
         match self {
             Self::Text
@@ -188,7 +185,6 @@ impl ParameterKind {
 
 impl JsonType {
     /// Returns the name of the type so that the text completes "… is needed".
-    #[must_use]
     pub fn described(self) -> &'static str {
         match self {
             Self::Text => "a text",

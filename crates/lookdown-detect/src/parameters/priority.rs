@@ -14,7 +14,6 @@ pub enum Priority {
 
 impl Priority {
     /// Returns the priority of a level in a request: 1 to 3 are high, 4 to 6 normal, 7 to 9 low.
-    #[must_use]
     pub fn from_level(level: u32) -> Self {
         match level {
             ..=3 => Self::High,
@@ -24,7 +23,6 @@ impl Priority {
     }
 
     /// Returns the smallest level of the priority.
-    #[must_use]
     pub fn highest_level(self) -> u32 {
         match self {
             Self::High => 1,

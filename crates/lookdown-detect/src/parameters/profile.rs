@@ -46,13 +46,11 @@ pub enum Profile {
 
 impl Profile {
     /// Returns the name, as in requests and reports.
-    #[must_use]
     pub fn name(self) -> &'static str {
         self.into()
     }
 
     /// Returns the view plan; `None` for [`Profile::Direct`].
-    #[must_use]
     pub fn view_plan(self) -> Option<ViewPlan> {
         match self {
             Self::Paper => Some(ViewPlan::paper(FieldOfViewReading::default())),
@@ -63,7 +61,6 @@ impl Profile {
     }
 
     /// Returns true if a pass through upright crops follows the views of the plan.
-    #[must_use]
     pub fn has_crops(self) -> bool {
         self.max_crops() > 0
     }
@@ -95,7 +92,6 @@ impl Profile {
     }
 
     /// Returns the method that projects boxes back to the frame.
-    #[must_use]
     pub fn back_projection(self) -> BackProjection {
         match self {
             Self::Paper => BackProjection::CornerHull,
@@ -104,7 +100,6 @@ impl Profile {
     }
 
     /// Returns the constants for the default models.
-    #[must_use]
     pub fn tuning(self) -> Tuning {
         let (even_odds, crop_vote) = match self {
             Self::Fast => (0.26, 1.0),
@@ -120,7 +115,6 @@ impl Profile {
     }
 
     /// Returns the refinement for requests without one.
-    #[must_use]
     pub fn default_refinement(self) -> Refinement {
         match self {
             Self::Paper => Refinement::SoftNmsGaussian,

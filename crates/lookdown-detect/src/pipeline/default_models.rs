@@ -17,7 +17,6 @@ pub struct DefaultModels {
 impl DefaultModels {
     /// Returns our own networks in the form for a device: INT8 for the integer kernels of ONNX
     /// Runtime, which the CPU alone has, and weights in half precision for other devices.
-    #[must_use]
     pub fn for_device(device: Device) -> Self {
         let ending = if device == Device::Cpu { "" } else { "_fp16" };
         Self {
@@ -27,7 +26,6 @@ impl DefaultModels {
     }
 
     /// Uses one model for the views and the crops of all profiles.
-    #[must_use]
     pub fn one(model: String) -> Self {
         Self {
             model,
@@ -36,13 +34,11 @@ impl DefaultModels {
     }
 
     /// Returns the model of the views of all profiles.
-    #[must_use]
     pub fn model(&self) -> &str {
         &self.model
     }
 
     /// Returns the model of a profile's upright crops, if it differs from that of its views.
-    #[must_use]
     pub fn crop_model(&self, profile: Profile) -> Option<&str> {
         match profile {
             Profile::Paper | Profile::Direct => None,
@@ -51,7 +47,6 @@ impl DefaultModels {
     }
 
     /// Returns the models that a request needs.
-    #[must_use]
     pub fn needed_by<'a>(&'a self, request: &'a DetectParameters) -> Vec<&'a str> {
         match &request.model {
             Some(name) => vec![name],

@@ -69,7 +69,6 @@ impl EngineOptions {
     pub const RIG_CACHE_BYTES: usize = 256 << 20;
 
     /// Returns options with `threads` sessions and as many threads that render, a view in each run.
-    #[must_use]
     pub fn new(default_models: DefaultModels, threads: NonZeroUsize) -> Self {
         Self {
             decode_limits: DecodeLimits::default(),
@@ -85,7 +84,6 @@ impl EngineOptions {
     }
 
     /// Returns options for tests: `model` for all profiles, one session, large batches.
-    #[must_use]
     pub fn for_testing(model: &str) -> Self {
         let mut options = Self::new(DefaultModels::one(model.to_owned()), NonZeroUsize::MIN);
         options.batches.max_views = NonZeroUsize::MIN.saturating_add(127);
@@ -146,7 +144,6 @@ impl Engine {
     }
 
     /// Returns the default models.
-    #[must_use]
     pub fn default_models(&self) -> &DefaultModels {
         &self.options.default_models
     }
@@ -305,7 +302,6 @@ impl Engine {
     }
 
     /// Merges the detections of an observed frame into persons.
-    #[must_use]
     pub fn persons(
         &self,
         observation: &Observation,
@@ -330,7 +326,6 @@ impl Engine {
     }
 
     /// Returns the options.
-    #[must_use]
     pub fn options(&self) -> &EngineOptions {
         &self.options
     }

@@ -53,7 +53,6 @@ pub struct DetectJob {
 
 impl DetectJob {
     /// Creates the job for a frame of a client.
-    #[must_use]
     pub fn sent(
         image: Bytes,
         parameters: DetectParameters,
@@ -74,7 +73,6 @@ impl DetectJob {
 
     /// Creates the job for a frame of this process, such as a file, named `name` in the report.
     /// `calibration` replaces the lookup of the parameter.
-    #[must_use]
     pub fn local(
         name: String,
         image: JobImage,
@@ -112,7 +110,6 @@ pub struct DetectedFrame {
 impl DetectedFrame {
     /// Returns the outlines of the views in corner-origin frame pixels: the plan's views, then the
     /// views and crops of the later passes. Empty if the detector processed the whole frame.
-    #[must_use]
     pub fn view_outlines(&self) -> Vec<Vec<Pixel>> {
         let rigs = self.rigs.iter();
         rigs.flat_map(|rig| rig.view_outlines()).collect()
@@ -120,7 +117,6 @@ impl DetectedFrame {
 
     /// Returns the boxes (corner-origin frame pixels) that hide people who are in no result: those
     /// that were found, and all pixels in which none are looked for.
-    #[must_use]
     pub fn boxes_of_others(&self) -> Vec<[f64; 4]> {
         let margin = self.report.margin.iter().flatten();
         let found = margin.chain(&self.outside);
@@ -132,14 +128,12 @@ impl DetectedFrame {
     }
 
     /// Returns the camera of the frame: its lens, mount and areas in pixels of the frame.
-    #[must_use]
     pub fn camera(&self) -> Option<&CameraGeometry> {
         // All rigs belong to one camera.
         self.rigs.first().map(|rig| rig.geometry())
     }
 
     /// Returns the outlines of the calibration's zones in the frame.
-    #[must_use]
     pub fn zone_outlines(&self) -> Vec<ZoneOutline> {
         let outlines = self.camera().into_iter().flat_map(|camera| {
             let outline = |zone| ZoneOutline::new(zone, &camera.lens, &camera.mount);

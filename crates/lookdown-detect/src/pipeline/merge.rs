@@ -45,7 +45,6 @@ impl Mapped {
             .extremities()
             .and_then(|extremities| extremities.height_ratio(mount));
         let holding = views_holding(passes, &self.footprint);
-        #[expect(clippy::cast_precision_loss, reason = "at most a few hundred views")]
         let expected_views = holding.max(1) as f64;
         let (vote, weight) = if self.is_exact {
             (crop_vote, 1.0)

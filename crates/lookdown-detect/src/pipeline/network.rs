@@ -110,7 +110,6 @@ fn serve(queue: &ViewQueue, session: usize, remappers: &ThreadPool, metrics: &De
 }
 
 /// Records the size of a batch that starts now, and how long its first view has waited.
-#[expect(clippy::cast_precision_loss, reason = "far below 2^52 views")]
 fn record(metrics: &DetectMetrics, claims: &[Claim]) {
     let views: usize = claims.iter().map(|claim| claim.views.len()).sum();
     let waits = claims.iter().map(|claim| claim.task.queued.elapsed());

@@ -60,7 +60,6 @@ pub struct PlannedView {
 impl PlannedView {
     /// Returns the nodes of a grid of `cells` × `cells` over the view, row by row from its top left
     /// corner, in corner-origin frame pixels. Nodes beyond the lens image are `None`.
-    #[must_use]
     pub fn grid(&self, lens: &Lens, cells: u32) -> Vec<Option<Pixel>> {
         let place =
             |index: u32, side: u32| f64::from(index) / f64::from(cells) * f64::from(side) - 0.5;

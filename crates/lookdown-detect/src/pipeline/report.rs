@@ -81,7 +81,6 @@ pub enum Search {
 
 impl Search {
     /// Returns the name, as in reports and metrics.
-    #[must_use]
     pub fn name(self) -> &'static str {
         self.into()
     }
@@ -214,7 +213,6 @@ pub struct StageTimings {
 
 impl StageTimings {
     /// Returns the processing time: all stages except the queue.
-    #[must_use]
     pub fn worked(&self) -> Duration {
         self.decode + self.calibrate + self.remap + self.inference + self.refine
     }

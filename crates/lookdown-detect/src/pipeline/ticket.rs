@@ -25,7 +25,6 @@ pub struct Ticket {
 
 impl Ticket {
     /// Creates a ticket that is not withdrawn.
-    #[must_use]
     pub fn new(priority: Priority) -> Self {
         Self {
             priority,

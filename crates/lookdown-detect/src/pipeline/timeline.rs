@@ -31,7 +31,6 @@ pub enum Stage {
 
 impl Stage {
     /// Returns the name, as in reports.
-    #[must_use]
     pub fn name(self) -> &'static str {
         self.into()
     }
@@ -88,7 +87,6 @@ impl Stages {
 
 impl Timeline {
     /// Returns the stages so far. The current stage ends at `until`.
-    #[must_use]
     pub fn spans(&self, until: Instant) -> Vec<StageSpan> {
         let stages = self.lock();
         let now = stages.now.map(|(stage, began)| StageSpan {

@@ -93,7 +93,6 @@ impl WorkerPool {
     }
 
     /// Returns the engine that processes the frames.
-    #[must_use]
     pub fn engine(&self) -> &Engine {
         &self.shared.engine
     }
@@ -188,19 +187,16 @@ impl WorkerPool {
     }
 
     /// Returns the number of frames queued or in progress.
-    #[must_use]
     pub fn pending(&self) -> usize {
         self.shared.pending()
     }
 
     /// Returns the stall of the pool: there is work, and for at least `limit` none has progressed.
-    #[must_use]
     pub fn stall(&self, now: Instant, limit: Duration) -> Option<Stall> {
         self.shared.in_flight.stall(now, limit)
     }
 
     /// Returns a stall like [`WorkerPool::stall`], but each only once, for the log.
-    #[must_use]
     pub fn new_stall(&self, now: Instant, limit: Duration) -> Option<Stall> {
         let stall = self.shared.in_flight.new_stall(now, limit)?;
         self.shared.metrics.worker_stalls.inc();
@@ -208,7 +204,6 @@ impl WorkerPool {
     }
 
     /// Returns the time since the last progress. Zero without work.
-    #[must_use]
     pub fn quiet_for(&self, now: Instant) -> Duration {
         self.shared.in_flight.quiet_for(now)
     }

@@ -11,11 +11,12 @@ use std::{
     sync::Arc,
 };
 
-use lookdown_calibration::{Calibration, CalibrationError, CalibrationId};
+use lookdown_calibration::{Calibration, CalibrationId};
+use lookdown_common::files::FileError;
 use lookdown_detect::detection::BBox;
 use serde::Deserialize;
 
-use super::{DataSet, DataSetError, DataSetImage, ImageFileIndex, ImageId, text::read_text};
+use super::{DataSet, DataSetImage, ImageFileIndex, ImageId, text::read_text};
 use crate::{AnnotatedPerson, Outline, RotatedBox, Scoring};
 
 /// The largest common file, that of COCO's training set, has 450 MB.
@@ -56,7 +57,7 @@ struct CocoCategory {
 
 /// Reads the annotations of a folder with `calibrations/`, whose images are in `images/` or beside
 /// the annotations.
-pub(super) fn read_own_folder(folder: &Path, file: &Path) -> Result<DataSet, DataSetError> {
+pub(super) fn read_own_folder(folder: &Path, file: &Path) -> Result<DataSet, FileError> {
     let mut calibrations = Calibrations::new(folder.join("calibrations"));
     let place = |name: &Path| {
         let [inside, beside] = [folder.join("images").join(name), folder.join(name)];
@@ -72,7 +73,7 @@ pub(super) fn read_own_folder(folder: &Path, file: &Path) -> Result<DataSet, Dat
 pub(super) fn read_files(
     files: &[PathBuf],
     image_files: &ImageFileIndex,
-) -> Result<DataSet, DataSetError> {
+) -> Result<DataSet, FileError> {
     let mut reader = Reader::default();
     for file in files {
         reader.read(file, None, |name| image_files.by_file_name(name))?;
@@ -93,7 +94,7 @@ impl Calibrations {
     }
 
     /// Returns the calibration with this ID, or `None` without a file.
-    fn get(&mut self, id: &CalibrationId) -> Result<Option<Arc<Calibration>>, CalibrationError> {
+    fn get(&mut self, id: &CalibrationId) -> Result<Option<Arc<Calibration>>, FileError> {
         if let Some(known) = self.read.get(id) {
             return Ok(Some(Arc::clone(known)));
         }
@@ -121,11 +122,8 @@ impl Reader {
         path: &Path,
         mut calibrations: Option<&mut Calibrations>,
         image_file: impl Fn(&Path) -> Result<PathBuf, String>,
-    ) -> Result<(), DataSetError> {
-        let wrong = |problem: String| DataSetError::Annotations {
-            path: path.to_owned(),
-            problem,
-        };
+    ) -> Result<(), FileError> {
+        let wrong = |problem: String| FileError::new(path, problem);
         let file: CocoFile = serde_json::from_str(&read_text(path, MAX_BYTES)?)
             .map_err(|error| wrong(format!("not a COCO annotation file: {error}")))?;
         for image in &file.images {

@@ -40,7 +40,6 @@ impl DataSet {
     /// Returns the outline that is compared with the ground truth of `image` for a person detected
     /// with this box and this oriented box. A data set of rotated boxes has the size of every
     /// frame.
-    #[must_use]
     pub fn outline(
         &self,
         image: &DataSetImage,
@@ -52,7 +51,6 @@ impl DataSet {
     }
 
     /// Returns the same data set with `calibration` for every image.
-    #[must_use]
     pub fn with_calibration(mut self, calibration: &Arc<Calibration>) -> Self {
         for image in &mut self.images {
             image.calibration = Some(Arc::clone(calibration));
@@ -113,7 +111,6 @@ impl DataSetImage {
     }
 
     /// `[width, height]` in pixels as annotated, or else as calibrated. `None` if neither is known.
-    #[must_use]
     pub fn frame_size(&self) -> Option<[u32; 2]> {
         let calibrated = || {
             let (width, height) = self.calibration.as_ref()?.image_size();
@@ -126,7 +123,6 @@ impl DataSetImage {
     /// It uses the calibrated lens, or else the equidistant lens of 180° with the largest circle in
     /// the frame. Beyond the lens image it is the angle of the rim. `None` if the frame's size is
     /// unknown.
-    #[must_use]
     pub fn off_axis_deg(&self, [x, y]: [f64; 2]) -> Option<f64> {
         let [width, height] = self.frame_size()?;
         let Some(calibration) = &self.calibration else {

@@ -7,9 +7,9 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{
-    DataSet, DataSetError, DataSetImage, ImageId, image_files::image_files_in, text::read_text,
-};
+use lookdown_common::files::FileError;
+
+use super::{DataSet, DataSetImage, ImageId, image_files::image_files_in, text::read_text};
 use crate::{AnnotatedPerson, Outline, Scoring};
 
 const MAX_BYTES: u64 = 64 * 1024 * 1024;
@@ -27,7 +27,7 @@ fn sequence(path: &Path) -> Option<&str> {
 }
 
 /// Reads one file per sequence.
-pub(super) fn read_files(files: &[PathBuf]) -> Result<DataSet, DataSetError> {
+pub(super) fn read_files(files: &[PathBuf]) -> Result<DataSet, FileError> {
     let mut images = Vec::new();
     for path in files {
         read(path, &mut images)?;
@@ -38,11 +38,8 @@ pub(super) fn read_files(files: &[PathBuf]) -> Result<DataSet, DataSetError> {
     })
 }
 
-fn read(path: &Path, images: &mut Vec<DataSetImage>) -> Result<(), DataSetError> {
-    let wrong = |problem| DataSetError::Annotations {
-        path: path.to_owned(),
-        problem,
-    };
+fn read(path: &Path, images: &mut Vec<DataSetImage>) -> Result<(), FileError> {
+    let wrong = |problem: String| FileError::new(path, problem);
     let sequence = sequence(path).unwrap_or_default();
     let beside = path.ancestors().skip(1).take(2);
     let folder = beside

@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::DataSetError;
+use lookdown_common::files::FileError;
 
 /// Extensions of images that can be decoded, in lower case.
 const IMAGE_ENDINGS: [&str; 4] = ["jpg", "jpeg", "png", "webp"];
@@ -25,27 +25,24 @@ pub(super) struct ImageFileIndex {
 
 impl Files {
     /// Lists the files below `root`.
-    pub(super) fn below(root: &Path) -> Result<Self, DataSetError> {
+    pub(super) fn below(root: &Path) -> Result<Self, FileError> {
         let mut files = Vec::new();
         let mut folders = vec![(root.to_owned(), 0)];
         let mut entries = 0;
         while let Some((folder, depth)) = folders.pop() {
-            let unreadable = |source| DataSetError::Unreadable {
-                path: folder.clone(),
-                source,
-            };
+            let unreadable = |error| FileError::unreadable(&folder, &error);
             for entry in std::fs::read_dir(&folder).map_err(unreadable)? {
                 let path = entry.map_err(unreadable)?.path();
                 entries += 1;
                 let is_folder = path.is_dir();
                 if entries > MAX_ENTRIES || (is_folder && depth == MAX_DEPTH) {
-                    return Err(DataSetError::Annotations {
-                        path: root.to_owned(),
-                        problem: format!(
+                    return Err(FileError::new(
+                        root,
+                        format!(
                             "has more than {MAX_ENTRIES} files or {MAX_DEPTH} levels of folders; \
                              name the data set's own folder"
                         ),
-                    });
+                    ));
                 }
                 if is_folder {
                     folders.push((path, depth + 1));
@@ -151,7 +148,7 @@ impl ImageFileIndex {
 }
 
 /// The images directly in `folder`, by name.
-pub(super) fn image_files_in(folder: &Path) -> Result<Vec<PathBuf>, DataSetError> {
+pub(super) fn image_files_in(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
     let mut image_files = Files::below(folder)?.named(is_image_file);
     image_files.retain(|path| path.parent() == Some(folder));
     Ok(image_files)

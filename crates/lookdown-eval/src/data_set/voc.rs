@@ -7,11 +7,12 @@
 
 use std::path::{Path, PathBuf};
 
+use lookdown_common::files::FileError;
 use lookdown_detect::detection::BBox;
 use quick_xml::{Reader, events::Event};
 use serde::Deserialize;
 
-use super::{DataSet, DataSetError, DataSetImage, ImageFileIndex, ImageId, text::read_text};
+use super::{DataSet, DataSetImage, ImageFileIndex, ImageId, text::read_text};
 use crate::{AnnotatedPerson, Outline, Scoring};
 
 /// The file of a crowded image has some 100 kB.
@@ -59,14 +60,11 @@ pub(super) fn read_files(
     root: &Path,
     files: &[PathBuf],
     image_files: &ImageFileIndex,
-) -> Result<DataSet, DataSetError> {
+) -> Result<DataSet, FileError> {
     let mut images = Vec::with_capacity(files.len());
     let mut is_anything_annotated = false;
     for path in files {
-        let wrong = |problem| DataSetError::Annotations {
-            path: path.clone(),
-            problem,
-        };
+        let wrong = |problem: String| FileError::new(path, problem);
         let text = read_text(path, MAX_BYTES)?;
         check_root(&text).map_err(wrong)?;
         let annotation: Annotation = quick_xml::de::from_str(&text)
@@ -80,10 +78,10 @@ pub(super) fn read_files(
         .iter()
         .any(|image: &DataSetImage| !image.truth.persons.is_empty());
     match files.first() {
-        Some(first) if is_anything_annotated && !has_persons => Err(DataSetError::Annotations {
-            path: first.clone(),
-            problem: "no object in any file is named person; give the persons that name".to_owned(),
-        }),
+        Some(first) if is_anything_annotated && !has_persons => Err(FileError::new(
+            first,
+            "no object in any file is named person; give the persons that name",
+        )),
         _ => Ok(DataSet {
             images,
             scoring: Scoring::AxisParallel,

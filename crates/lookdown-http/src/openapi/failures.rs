@@ -30,7 +30,7 @@ pub(super) fn describe(document: &mut OpenApi) {
     }
 }
 
-fn operations(path: &mut PathItem) -> impl Iterator<Item = &mut Operation> {
+pub(super) fn operations(path: &mut PathItem) -> impl Iterator<Item = &mut Operation> {
     let operations = [
         &mut path.get,
         &mut path.put,

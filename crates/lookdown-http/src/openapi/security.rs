@@ -10,6 +10,8 @@ use utoipa::{
     },
 };
 
+use super::failures::operations;
+
 /// The two ways to send a key.
 #[derive(Debug, Clone, Copy)]
 pub struct Keys;
@@ -30,16 +32,8 @@ impl Modify for Keys {
 
 /// States that the operations without a required key need none.
 pub(super) fn state_public_operations(document: &mut OpenApi) {
-    for item in document.paths.paths.values_mut() {
-        let operations = [
-            &mut item.get,
-            &mut item.put,
-            &mut item.post,
-            &mut item.delete,
-        ];
-        for operation in operations.into_iter().flatten() {
-            let no_key = || vec![SecurityRequirement::default()];
-            operation.security.get_or_insert_with(no_key);
-        }
+    for operation in document.paths.paths.values_mut().flat_map(operations) {
+        let no_key = || vec![SecurityRequirement::default()];
+        operation.security.get_or_insert_with(no_key);
     }
 }

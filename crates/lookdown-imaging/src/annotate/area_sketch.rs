@@ -32,7 +32,6 @@ pub struct ZoneOutline {
 
 impl ZoneOutline {
     /// The outline of a zone given in frame pixels, or on the floor and projected through `lens`.
-    #[must_use]
     pub fn new(zone: &Zone, lens: &Lens, mount: &Mount) -> Self {
         Self::in_pieces(&zone.name, &zone.outline(lens, mount, POINTS_PER_EDGE))
     }

@@ -67,7 +67,7 @@ impl Outline {
         for y in pixels(top, bottom, frame.height()) {
             let row = f64::from(y) + 0.5;
             let mut spans = edges.map(|edge| {
-                let [from, to] = edge_span(edge, row, reach);
+                let [from, to] = edge_span(edge, row, reach).unwrap_or_default();
                 (pixels(from, to, frame.width()), edge)
             });
             spans.sort_unstable_by_key(|(span, _)| span.start);
@@ -120,7 +120,7 @@ impl Stroke {
         let [[_, from], [_, to]] = self.edge;
         for y in pixels(from.min(to) - reach, from.max(to) + reach, frame.height()) {
             let row = f64::from(y) + 0.5;
-            let [left, right] = edge_span(self.edge, row, reach);
+            let [left, right] = edge_span(self.edge, row, reach).unwrap_or_default();
             for x in pixels(left, right, frame.width()) {
                 let distance = squared_edge_distance(self.edge, [f64::from(x) + 0.5, row]).sqrt();
                 let coverage = reach - distance;
@@ -133,11 +133,11 @@ impl Stroke {
 }
 
 /// The column range outside of which a row has no point within `reach` of an edge.
-fn edge_span([a, b]: [[f64; 2]; 2], row: f64, reach: f64) -> [f64; 2] {
+pub(super) fn edge_span([a, b]: [[f64; 2]; 2], row: f64, reach: f64) -> Option<[f64; 2]> {
     let [upper, lower] = if a[1] <= b[1] { [a, b] } else { [b, a] };
     let (from, to) = ((row - reach).max(upper[1]), (row + reach).min(lower[1]));
     if from > to {
-        return [0.0, 0.0];
+        return None;
     }
     let drop = lower[1] - upper[1];
     let column = |y: f64| upper[0] + (lower[0] - upper[0]) * (y - upper[1]) / drop;
@@ -146,7 +146,7 @@ fn edge_span([a, b]: [[f64; 2]; 2], row: f64, reach: f64) -> [f64; 2] {
     } else {
         (upper[0], lower[0])
     };
-    [first.min(last) - reach, first.max(last) + reach]
+    Some([first.min(last) - reach, first.max(last) + reach])
 }
 
 fn squared_edge_distance([a, b]: [[f64; 2]; 2], point: [f64; 2]) -> f64 {

@@ -47,7 +47,6 @@ impl Caption<'_> {
         }
         let line_height = text.height();
         let mut line_top = top + VERTICAL_PADDING * line_height;
-        #[expect(clippy::cast_precision_loss, reason = "a few lines")]
         let height = (self.lines.len() as f64 + 2.0 * VERTICAL_PADDING) * line_height;
         let plate = Plate {
             left,

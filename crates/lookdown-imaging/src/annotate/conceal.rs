@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 use super::{
-    canvas::{Rgb, pixels},
+    canvas::{Rgb, edge_span, pixels},
     effort::Cancelled,
     mark::Mark,
 };
@@ -118,40 +118,25 @@ impl Area {
 
     /// The columns that it touches in a row.
     fn span(&self, y: u32, width: u32) -> Range<u32> {
-        let (from, to) = (f64::from(y), f64::from(y) + 1.0);
         let corners = self.corners;
         let edges = [0, 1, 2, 3].map(|index| [corners[index], corners[(index + 1) % 4]]);
-        let mut columns = [f64::INFINITY, f64::NEG_INFINITY];
-        for [one, other] in edges {
-            let [upper, lower] = if one[1] <= other[1] {
-                [one, other]
-            } else {
-                [other, one]
-            };
-            let rows = [from.max(upper[1]), to.min(lower[1])];
-            if rows[0] > rows[1] {
-                continue;
-            }
-            let drop = lower[1] - upper[1];
-            let column = |row: f64| upper[0] + (lower[0] - upper[0]) * (row - upper[1]) / drop;
-            let ends = if drop > 0.0 {
-                rows.map(column)
-            } else {
-                [upper[0], lower[0]]
-            };
-            let [left, right] = bounds(ends);
-            columns = [columns[0].min(left), columns[1].max(right)];
-        }
-        let span = pixels(columns[0] - 0.5, columns[1] + 0.5, width);
+        let spans = edges.map(|edge| edge_span(edge, f64::from(y) + 0.5, 0.5));
+        let [left, right] = bounds_of(spans.into_iter().flatten());
+        let span = pixels(left, right, width);
         span.start..span.end.max(span.start)
     }
 }
 
 fn bounds<const N: usize>(values: [f64; N]) -> [f64; 2] {
-    [
-        values.into_iter().fold(f64::INFINITY, f64::min),
-        values.into_iter().fold(f64::NEG_INFINITY, f64::max),
-    ]
+    bounds_of(values.into_iter().map(|value| [value, value]))
+}
+
+/// The least and the greatest end of ranges.
+fn bounds_of(ranges: impl Iterator<Item = [f64; 2]>) -> [f64; 2] {
+    ranges.fold(
+        [f64::INFINITY, f64::NEG_INFINITY],
+        |[least, most], [from, to]| [least.min(from), most.max(to)],
+    )
 }
 
 /// The mean colors of square blocks of a frame.

@@ -46,7 +46,6 @@ pub struct Head {
 
 impl Mark {
     /// The mark for the same frame scaled by `factor`.
-    #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
         Self {
             bbox: self.bbox.map(|side| side * factor),

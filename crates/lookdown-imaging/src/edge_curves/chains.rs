@@ -61,7 +61,6 @@ fn maxima(gradient: &Gradient, is_used: &dyn Fn([f64; 2]) -> bool) -> Vec<bool> 
             }
             let step = dominant_step(gradient, at);
             if size > gradient.size[at - step] && size >= gradient.size[at + step] {
-                #[expect(clippy::cast_precision_loss, reason = "a position in a frame")]
                 let point = [x as f64, y as f64];
                 maxima[at] = is_used(point);
             }
@@ -128,7 +127,6 @@ fn position(gradient: &Gradient, at: usize, width: usize) -> [f64; 2] {
     } else {
         0.0
     };
-    #[expect(clippy::cast_precision_loss, reason = "a position in a frame")]
     let (x, y) = ((at % width) as f64, (at / width) as f64);
     if step == 1 {
         [x + shift, y]

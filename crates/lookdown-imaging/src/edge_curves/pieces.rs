@@ -36,7 +36,6 @@ pub(super) fn smooth(chain: &[[f64; 2]]) -> Vec<&[[f64; 2]]> {
     pieces
 }
 
-#[expect(clippy::cast_precision_loss, reason = "a number of pixels")]
 fn count(length: usize) -> f64 {
     length as f64
 }

@@ -20,7 +20,6 @@ impl Plane {
         let line = 3 * frame.width() as usize;
         let pixels = frame.pixels();
         let mut values = vec![0.0; width * height];
-        #[expect(clippy::cast_precision_loss, reason = "a small number")]
         let share = 1.0 / (step * step) as f32;
         for (y, row) in values.chunks_exact_mut(width).enumerate() {
             for inner in 0..step {

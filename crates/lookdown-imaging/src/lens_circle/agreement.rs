@@ -15,7 +15,6 @@ pub struct AgreedCircle {
 }
 
 /// Returns the circle on which most frames agree, or `None` without any frame.
-#[must_use]
 pub fn agreed_circle(circles: &[LensCircle]) -> Option<AgreedCircle> {
     let median = |coordinate: fn(&LensCircle) -> f64| {
         let mut values: Vec<f64> = circles.iter().map(coordinate).collect();

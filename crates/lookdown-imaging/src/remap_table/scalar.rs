@@ -47,7 +47,6 @@ impl Block {
 
     /// The position in the frame (pixel centers) that one of its pixels samples.
     pub(super) fn position(&self, lane: usize) -> [f32; 2] {
-        #[expect(clippy::cast_precision_loss, reason = "below 8")]
         let lane = lane as f32;
         [0, 1].map(|axis| self.start[axis] + self.step[axis] * lane)
     }
@@ -92,11 +91,7 @@ impl Sample {
         let mix = |pixel: usize| {
             let [left, right] =
                 [0, 3].map(|next| i32::from(source.pixels[3 * pixel + channel + next]));
-            let sum =
-                left * (i32::from(WEIGHT_ONE) - self.right_weight) + right * self.right_weight;
-            #[expect(clippy::cast_precision_loss, reason = "below 2^24")]
-            let sum = sum as f32;
-            sum
+            (left * (i32::from(WEIGHT_ONE) - self.right_weight) + right * self.right_weight) as f32
         };
         let above = mix(self.first_pixel);
         above + (mix(self.first_pixel + source.width) - above) * self.lower_weight
@@ -107,7 +102,6 @@ impl Sample {
 /// last pixel is reached with full weight from its neighbor, so both always exist.
 #[expect(
     clippy::cast_possible_truncation,
-    clippy::cast_precision_loss,
     clippy::cast_sign_loss,
     reason = "clamped to the frame first; a frame's side is far below 2^24"
 )]

@@ -18,10 +18,6 @@ impl WholePatches {
         frame_width: u32,
         frame_height: u32,
     ) -> Self {
-        #[expect(
-            clippy::cast_precision_loss,
-            reason = "a frame's side is far below 2^24"
-        )]
         let within = |place: f32, count: u32| (1.0..=count as f32 - 2.0).contains(&place);
         let node_is_within = |row: usize, column: usize| {
             let nodes = grid.nodes(row);

@@ -30,7 +30,6 @@ pub enum LineEnds {
 
 impl CountingLine {
     /// Returns the same line in frames `scale_x`, `scale_y` times as large. The floor is unchanged.
-    #[must_use]
     pub fn scaled(&self, scale_x: f64, scale_y: f64) -> Self {
         let ends = match self.ends {
             LineEnds::Frame(ends) => {
@@ -46,7 +45,6 @@ impl CountingLine {
 
     /// Returns points along the line in corner-origin frame pixels, `None` where the lens does not
     /// see the floor. A straight line on the floor is a curve in the frame.
-    #[must_use]
     pub fn outline(&self, lens: &Lens, mount: &Mount, segments: u32) -> Vec<Option<Pixel>> {
         let (LineEnds::Frame([from, to]) | LineEnds::Floor([from, to])) = self.ends;
         let shares = (0..=segments).map(|point| f64::from(point) / f64::from(segments.max(1)));

@@ -39,7 +39,6 @@ pub struct CropTarget {
 
 impl CropTarget {
     /// Returns the middle of the box.
-    #[must_use]
     pub fn center(&self) -> Pixel {
         let [x_min, y_min, x_max, y_max] = self.bbox;
         Pixel::new(f64::midpoint(x_min, x_max), f64::midpoint(y_min, y_max))
@@ -57,7 +56,6 @@ impl CropTarget {
 /// Targets come best first. Each one that no earlier crop serves gets a crop of its own turn, in
 /// which its larger side fills the share `fill`. That crop is moved to where it serves the
 /// greatest sum of scores of further targets of about the same size and direction.
-#[must_use]
 pub fn place_crops(targets: &[CropTarget], most: usize, fill: f64, side: u32) -> Vec<FrameCrop> {
     let mut crops = Vec::with_capacity(most);
     let mut unserved: Vec<&CropTarget> = targets.iter().collect();
@@ -72,7 +70,6 @@ pub fn place_crops(targets: &[CropTarget], most: usize, fill: f64, side: u32) ->
 
 /// Returns the crop of `side` × `side` pixels around the point straight below the camera. `None` if
 /// the lens does not show it.
-#[must_use]
 pub fn nadir_crop(lens: &Lens, mount: &Mount, side: u32) -> Option<FrameCrop> {
     let nadir = mount.nadir();
     let center = lens.project(&nadir)?;

@@ -29,7 +29,6 @@ pub struct FloorPosition {
 }
 
 /// The bearing of `point` (corner-origin frame pixels); `None` outside the lens image.
-#[must_use]
 pub fn bearing(point: Pixel, lens: &Lens) -> Option<Bearing> {
     let ray = lens.unproject(&cross_half_pixel(point, PixelConvention::PixelCenter))?;
     Some(Bearing {
@@ -41,7 +40,6 @@ pub fn bearing(point: Pixel, lens: &Lens) -> Option<Bearing> {
 /// Returns the place at which the ray through `point` (corner-origin frame pixels) meets the floor;
 /// `None` when the height is unknown, the point lies outside the lens image, or the ray does not
 /// fall.
-#[must_use]
 pub fn floor_position(point: Pixel, lens: &Lens, mount: &Mount) -> Option<FloorPosition> {
     let height_m = mount.height_m()?;
     let ray = lens.unproject(&cross_half_pixel(point, PixelConvention::PixelCenter))?;
@@ -54,7 +52,6 @@ pub fn floor_position(point: Pixel, lens: &Lens, mount: &Mount) -> Option<FloorP
 
 /// Returns the pixel at which the lens shows a place on the floor, corner-origin frame pixels;
 /// `None` when the height is unknown or the lens does not see it.
-#[must_use]
 pub fn pixel_of(place: FloorPosition, lens: &Lens, mount: &Mount) -> Option<Pixel> {
     let levelled = Ray::new(place.x_m, place.y_m, mount.height_m()?);
     let pixel = lens.project(&(mount.camera_from_floor() * levelled))?;

@@ -35,13 +35,11 @@ pub enum FootPlace {
 
 impl FootFilter {
     /// Returns true if everyone counts.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.areas.is_empty() && self.ignore.is_empty()
     }
 
     /// Returns the place of a foot at `foot` (corner-origin frame pixels), which is `floor`.
-    #[must_use]
     pub fn place(&self, foot: Pixel, floor: Option<FloorPosition>) -> FootPlace {
         let holds = |area: &ZoneArea| area.holds(foot, floor);
         if self.ignore.iter().any(holds) {
@@ -57,7 +55,6 @@ impl FootFilter {
 
     /// Returns true if a foot is in an area or at most `margins` times the margin away from it.
     /// Ignored places have no effect.
-    #[must_use]
     pub fn is_near(&self, foot: Pixel, floor: Option<FloorPosition>, margins: f64) -> bool {
         let is_near = |area: &ZoneArea| match area {
             ZoneArea::Frame(area) => area.holds_within(foot, margins * self.margin_px),
@@ -69,7 +66,6 @@ impl FootFilter {
     }
 
     /// The same places in frames `scale_x`, `scale_y` times as large.
-    #[must_use]
     pub fn scaled(&self, scale_x: f64, scale_y: f64) -> Self {
         let scaled = |areas: &[ZoneArea]| {
             let areas = areas.iter().map(|area| area.scaled(scale_x, scale_y));

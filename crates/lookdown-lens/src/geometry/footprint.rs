@@ -15,7 +15,6 @@ const ELLIPSE_POINTS: usize = 32;
 /// Sine and cosine of the angles at which these points lie: thousands of ellipses have the same.
 static ELLIPSE_ANGLES: LazyLock<[(f64, f64); ELLIPSE_POINTS]> = LazyLock::new(|| {
     std::array::from_fn(|index| {
-        #[expect(clippy::cast_precision_loss, reason = "at most 32")]
         let share = TAU * index as f64 / ELLIPSE_POINTS as f64;
         share.sin_cos()
     })
@@ -53,7 +52,6 @@ impl Footprint {
     /// Maps the box `[x_min, y_min, x_max, y_max]` (corner-origin view pixels) to the frame.
     /// Outline points beyond the lens image are pulled to its rim. `None` when most of the
     /// outline lies beyond it.
-    #[must_use]
     pub fn from_view_box(
         view_box: [f64; 4],
         back_projection: BackProjection,
@@ -97,7 +95,6 @@ impl Footprint {
                 });
             }
         }
-        #[expect(clippy::cast_precision_loss, reason = "at most 32 points")]
         let inside_share = inside as f64 / POINTS as f64;
         (inside_share >= MIN_INSIDE_SHARE && !outline.is_empty()).then_some(Self {
             outline,
@@ -109,7 +106,6 @@ impl Footprint {
     /// Maps the box `[x_min, y_min, x_max, y_max]` of a crop to the frame. Its bounds are exact:
     /// the outline is the inscribed ellipse, which touches all four sides. `None` when the middle
     /// of the box lies beyond the lens image.
-    #[must_use]
     pub fn from_crop_box(crop_box: [f64; 4], crop: &FrameCrop, lens: &Lens) -> Option<Self> {
         let [x_min, y_min, x_max, y_max] = crop.frame_box(crop_box);
         let center = Pixel::new(f64::midpoint(x_min, x_max), f64::midpoint(y_min, y_max));
@@ -131,7 +127,6 @@ impl Footprint {
     }
 
     /// The footprint of a box found in the frame itself: its corners.
-    #[must_use]
     pub fn from_frame_box(frame_box: [f64; 4]) -> Self {
         Self {
             outline: corners(frame_box).to_vec(),
@@ -141,27 +136,23 @@ impl Footprint {
     }
 
     /// The outline's points, corner-origin frame pixels.
-    #[must_use]
     pub fn outline(&self) -> &[Pixel] {
         &self.outline
     }
 
     /// Some of the outline's points as rays (camera frame, any length); none of a box found in the
     /// frame itself.
-    #[must_use]
     pub fn rays(&self) -> &[Ray] {
         &self.rays
     }
 
     /// The ends of the outline along the vertical and across it; `None` for corner hulls, which
     /// know no vertical.
-    #[must_use]
     pub fn extremities(&self) -> Option<&Extremities> {
         self.extremities.as_ref()
     }
 
     /// The axis-parallel hull `[x_min, y_min, x_max, y_max]`, corner-origin frame pixels.
-    #[must_use]
     pub fn bounds(&self) -> [f64; 4] {
         let first = self.outline[0];
         self.outline

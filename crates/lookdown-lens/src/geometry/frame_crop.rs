@@ -27,7 +27,6 @@ impl QuarterTurn {
     pub const ALL: [Self; 4] = [Self::None, Self::Right, Self::Half, Self::Left];
 
     /// The quarter turn whose up is closest to `up` (frame pixels, any length).
-    #[must_use]
     pub fn nearest(up: Vector2<f64>) -> Self {
         match (up.x.abs() > up.y.abs(), up.x > 0.0, up.y > 0.0) {
             (true, true, _) => Self::Right,
@@ -38,13 +37,11 @@ impl QuarterTurn {
     }
 
     /// The direction in the frame that is up in the crop.
-    #[must_use]
     pub fn up(self) -> Vector2<f64> {
         self.turned(-Vector2::y())
     }
 
     /// A vector of the crop as a vector of the frame. Exact: no value is rounded.
-    #[must_use]
     pub fn turned(self, vector: Vector2<f64>) -> Vector2<f64> {
         let (x, y) = (vector.x, vector.y);
         match self {
@@ -56,7 +53,6 @@ impl QuarterTurn {
     }
 
     /// The turn back.
-    #[must_use]
     pub fn inverse(self) -> Self {
         match self {
             Self::Right => Self::Left,
@@ -85,21 +81,18 @@ pub struct FrameCrop {
 
 impl FrameCrop {
     /// The position in the frame of a position in the crop.
-    #[must_use]
     pub fn frame_from_crop(&self, position: &Pixel) -> Pixel {
         let offset = self.mirrored_back((position - self.middle()) / self.scale);
         self.center + self.turn.turned(offset)
     }
 
     /// The position in the crop of a position in the frame.
-    #[must_use]
     pub fn crop_from_frame(&self, position: &Pixel) -> Pixel {
         let offset = self.turn.inverse().turned(position - self.center);
         self.middle() + self.mirrored_back(offset) * self.scale
     }
 
     /// The crop of the same part of the frame with left and right exchanged.
-    #[must_use]
     pub fn mirrored(&self) -> Self {
         Self {
             is_mirrored: !self.is_mirrored,
@@ -108,25 +101,21 @@ impl FrameCrop {
     }
 
     /// The box in the frame of a box in the crop, both `[x_min, y_min, x_max, y_max]`.
-    #[must_use]
     pub fn frame_box(&self, crop_box: [f64; 4]) -> [f64; 4] {
         mapped(crop_box, |corner| self.frame_from_crop(corner))
     }
 
     /// The box in the crop of a box in the frame, both `[x_min, y_min, x_max, y_max]`.
-    #[must_use]
     pub fn crop_box(&self, frame_box: [f64; 4]) -> [f64; 4] {
         mapped(frame_box, |corner| self.crop_from_frame(corner))
     }
 
     /// The part of the frame's plane that the crop shows, also beyond the frame's borders.
-    #[must_use]
     pub fn bounds(&self) -> [f64; 4] {
         self.frame_box([0.0, 0.0, f64::from(self.width), f64::from(self.height)])
     }
 
     /// Returns true when a position in the frame lies in the crop.
-    #[must_use]
     pub fn holds(&self, position: &Pixel) -> bool {
         let Pixel { coords } = self.crop_from_frame(position);
         (0.0..=f64::from(self.width)).contains(&coords.x)

@@ -37,7 +37,6 @@ pub struct HeightRatio {
 impl Extremities {
     /// Returns the size ratios of a standing person with this outline; `None` when the outline
     /// reaches across the nadir, where heights cannot be measured.
-    #[must_use]
     pub fn height_ratio(&self, mount: &Mount) -> Option<HeightRatio> {
         let nadir = mount.nadir();
         let horizontal = |ray: &Ray| ray - nadir * ray.dot(&nadir);

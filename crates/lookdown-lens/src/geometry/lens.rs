@@ -77,9 +77,11 @@ impl Lens {
         let max_radius = curve.radius(max_theta.min(limit));
         let rises = limit > 0.0 && max_radius.is_finite();
         if !rises {
-            return Err(LensError::NotRising {
-                model: curve.model(),
-            });
+            return Err(LensError::new(format!(
+                "the lens curve of {} does not rise at the optical axis: check the order and sign \
+                 of its parameters",
+                curve.model()
+            )));
         }
         let is_within = max_theta > 0.0 && max_theta <= limit + RIM_TOLERANCE;
         if !is_within {
@@ -109,26 +111,22 @@ impl Lens {
     }
 
     /// The name of the model, as in calibration files.
-    #[must_use]
     pub fn model(&self) -> &'static str {
         self.curve.model()
     }
 
     /// Returns the end of the lens image: the largest angle from the optical axis, in radians.
-    #[must_use]
     pub fn max_theta(&self) -> f64 {
         self.max_theta
     }
 
     /// The principal point: where the optical axis meets the image, pixel centers.
-    #[must_use]
     pub fn principal_point(&self) -> Pixel {
         Pixel::new(self.plane.cx, self.plane.cy)
     }
 
     /// The pixel (pixel centers) that sees `ray` (camera frame, any length above 0), or `None`
     /// beyond `max_theta`, exactly behind the camera, or for a ray that is not finite.
-    #[must_use]
     pub fn project(&self, ray: &Ray) -> Option<Pixel> {
         let off_axis = ray.xy().norm();
         let theta = off_axis.atan2(ray.z);
@@ -143,7 +141,6 @@ impl Lens {
 
     /// Like [`Lens::project`], but a ray beyond `max_theta` is pulled to the rim of the lens image
     /// along its own azimuth. `None` only where there is no azimuth or nothing finite to map.
-    #[must_use]
     pub fn project_to_rim(&self, ray: &Ray) -> Option<Pixel> {
         let off_axis = ray.xy().norm();
         if off_axis.atan2(ray.z) <= self.max_theta || off_axis == 0.0 {
@@ -168,7 +165,6 @@ impl Lens {
 
     /// The unit ray in the camera frame that `pixel` (pixel centers) sees, or `None` outside the
     /// lens image.
-    #[must_use]
     pub fn unproject(&self, pixel: &Pixel) -> Option<Ray> {
         let (x, y) = self.plane.normalized_from_pixel(pixel);
         let (x, y) = match &self.distortion {
@@ -191,13 +187,11 @@ impl Lens {
     }
 
     /// The affine map from the normalized plane to pixels.
-    #[must_use]
     pub fn image_plane(&self) -> &ImagePlane {
         &self.plane
     }
 
     /// Returns true for a lens that is the same in every azimuth, apart from its image plane.
-    #[must_use]
     pub fn is_symmetric(&self) -> bool {
         self.distortion
             .is_none_or(|distortion| distortion.is_radial())
@@ -205,7 +199,6 @@ impl Lens {
 
     /// The same lens for a frame `scale_x`, `scale_y` times as large. Pixel centers move with
     /// their corners: the frame's edges stay its edges.
-    #[must_use]
     pub fn scaled(&self, scale_x: f64, scale_y: f64) -> Self {
         Self {
             plane: self.plane.scaled(scale_x, scale_y),
@@ -214,7 +207,6 @@ impl Lens {
     }
 
     /// The same lens with its image ending at `max_theta`, when that is less than now.
-    #[must_use]
     pub fn limited_to(&self, max_theta: f64) -> Self {
         let max_theta = max_theta.min(self.max_theta);
         Self {
@@ -231,18 +223,18 @@ fn beyond_limit(curve: &AnyCurve, value: f64, limit: f64) -> LensError {
     let model = curve.model();
     let turns_back = curve.is_polynomial() && value > limit && limit < PI;
     let limit = (limit * 1e4).floor() / 1e4;
-    if turns_back {
-        return LensError::TurnsBack {
-            model,
-            value,
-            limit,
-        };
-    }
-    LensError::MaxThetaOutOfRange {
-        model,
-        value,
-        limit,
-    }
+    let problem = if turns_back {
+        format!(
+            "max_theta is {value} rad, but the curve of this {model} lens turns back at {limit} \
+             rad: check its coefficients, or give at most that"
+        )
+    } else {
+        format!(
+            "max_theta is {value} rad, but this {model} lens is one-to-one only up to {limit} rad: \
+             give a value above 0 and at most that"
+        )
+    };
+    LensError::beyond(limit, problem)
 }
 
 #[cfg(test)]

@@ -27,39 +27,33 @@ impl Default for Mount {
 impl Mount {
     /// A mount with the direction of up in the camera frame (a ceiling camera looking straight
     /// down: `(0, 0, -1)`) and the height above the floor in meters, when known.
-    #[must_use]
     pub fn new(world_up: Unit<Vector3<f64>>, height_m: Option<f64>) -> Self {
         Self { world_up, height_m }
     }
 
     /// Up, in the camera frame.
-    #[must_use]
     pub fn world_up(&self) -> Ray {
         *self.world_up
     }
 
     /// Straight down, in the camera frame.
-    #[must_use]
     pub fn nadir(&self) -> Ray {
         -*self.world_up
     }
 
     /// Height of the camera above the floor, meters.
-    #[must_use]
     pub fn height_m(&self) -> Option<f64> {
         self.height_m
     }
 
     /// Returns true when the camera looks down to within 30°: view plans are then centered on the
     /// nadir.
-    #[must_use]
     pub fn is_near_nadir(&self) -> bool {
         self.nadir().angle(&Ray::z()) <= NEAR_NADIR
     }
 
     /// The frame in which view plans are laid out: its z axis is the nadir for a camera that
     /// looks down to within 30°, otherwise the optical axis.
-    #[must_use]
     pub fn camera_from_plan(&self) -> Rotation3<f64> {
         if self.is_near_nadir() {
             self.camera_from_floor()
@@ -70,7 +64,6 @@ impl Mount {
 
     /// The leveled camera frame: z straight down, x and y as image right and image down would be
     /// if the camera were turned to look straight down by the smallest rotation.
-    #[must_use]
     pub fn camera_from_floor(&self) -> Rotation3<f64> {
         Rotation3::rotation_between(&Ray::z(), &self.nadir()).unwrap_or_else(|| {
             // A camera that looks straight up: any half turn will do.

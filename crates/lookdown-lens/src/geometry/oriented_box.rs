@@ -28,7 +28,6 @@ pub struct OrientedBox {
 impl OrientedBox {
     /// The box of these extents whose height axis is turned clockwise from image up by `angle`,
     /// radians; its head is at the upper end, which the axis alone leaves open.
-    #[must_use]
     pub fn turned(center: Pixel, width: f64, height: f64, angle: f64) -> Self {
         Self {
             center,
@@ -41,7 +40,6 @@ impl OrientedBox {
 
     /// Returns the box with its head at the end of its axis that is nearer to `vertical`, a
     /// direction in the frame.
-    #[must_use]
     pub fn with_head_toward(&self, vertical: &Vector2<f64>) -> Self {
         let is_turned = self.up.dot(vertical) < 0.0;
         let up = if is_turned { -self.up } else { self.up };
@@ -49,7 +47,6 @@ impl OrientedBox {
     }
 
     /// Returns the box in the same frame `factor` times as large.
-    #[must_use]
     pub fn scaled(&self, factor: f64) -> Self {
         Self {
             center: self.center * factor,
@@ -61,7 +58,6 @@ impl OrientedBox {
 
     /// Returns the corners, clockwise from the upper left one at no rotation, corner-origin frame
     /// pixels.
-    #[must_use]
     pub fn corners(&self) -> [Pixel; 4] {
         let (sin, cos) = self.angle.sin_cos();
         let right = Vector2::new(cos, sin) * (0.5 * self.width);
@@ -70,7 +66,6 @@ impl OrientedBox {
     }
 
     /// The middle of the lower short side: where the feet are. Corner-origin frame pixels.
-    #[must_use]
     pub fn foot(&self) -> Pixel {
         self.center - self.up * (self.height / 2.0)
     }
@@ -83,7 +78,6 @@ impl OrientedBox {
     /// `(p² − q²) cos(2a) = h² − w²`, which says nothing at 45°. So the sum is taken from the
     /// bounds, and the difference from the bounds in the share `cos²(2a)` and from this box's own
     /// proportions in the rest. `docs/geometry.md` has the derivation.
-    #[must_use]
     pub fn fitted_to(&self, [x_min, y_min, x_max, y_max]: [f64; 4]) -> Self {
         let (half_width, half_height) = ((x_max - x_min) / 2.0, (y_max - y_min) / 2.0);
         let (w2, h2) = (half_width.powi(2), half_height.powi(2));
@@ -110,7 +104,6 @@ impl OrientedBox {
 
     /// The box with its height axis along `up` that averages the extents of several outlines.
     /// Weights must be positive; `None` without outlines.
-    #[must_use]
     pub fn averaging<'a>(
         up: Vector2<f64>,
         weighted_outlines: impl IntoIterator<Item = (f64, &'a [Pixel])>,
@@ -143,7 +136,6 @@ impl OrientedBox {
 
 /// The direction (unit length, frame pixels) in which a vertical pole seen at `point`
 /// (corner-origin) rises; image up where the camera looks along the vertical.
-#[must_use]
 pub fn vertical_in_frame(point: Pixel, lens: &Lens, mount: &Mount) -> Vector2<f64> {
     let image_up = Vector2::new(0.0, -1.0);
     let pixel = cross_half_pixel(point, PixelConvention::PixelCenter);

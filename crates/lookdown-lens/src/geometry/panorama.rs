@@ -22,7 +22,6 @@ impl Panorama {
     /// width, both in radians; azimuths are 0 toward image right and grow to the right. `tilt` is
     /// the angle of its upper border from straight down, above 0 and below 180°. The angle of the
     /// lower border follows from the proportions.
-    #[must_use]
     pub fn new(azimuth: f64, span: f64, tilt: f64, mount: &Mount, width: u32, height: u32) -> Self {
         Self {
             camera_from_floor: mount.camera_from_floor(),
@@ -35,19 +34,16 @@ impl Panorama {
     }
 
     /// Width, pixels.
-    #[must_use]
     pub fn width(&self) -> u32 {
         self.width
     }
 
     /// Height, pixels.
-    #[must_use]
     pub fn height(&self) -> u32 {
         self.height
     }
 
     /// The ray (camera frame, unit length) through a pixel (pixel centers).
-    #[must_use]
     pub fn ray_in_camera(&self, pixel: &Pixel) -> Ray {
         let right = pixel.x + 0.5 - f64::from(self.width) / 2.0;
         let (azimuth_sin, azimuth_cos) = (self.azimuth + right * self.radians_per_pixel).sin_cos();
@@ -58,7 +54,6 @@ impl Panorama {
 
     /// Returns the point at which a ray (camera frame) meets the panorama (pixel centers), within
     /// half a turn of its middle, also beyond its borders; `None` along the vertical.
-    #[must_use]
     pub fn project(&self, ray_in_camera: &Ray) -> Option<Pixel> {
         let ray = self
             .camera_from_floor

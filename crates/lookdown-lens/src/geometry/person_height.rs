@@ -31,7 +31,6 @@ pub struct PersonHeight {
 impl PersonHeight {
     /// Returns the height of a person who stands on the floor with this box. `None` without the
     /// height of the camera, below the camera, and where the angles say too little.
-    #[must_use]
     pub fn new(person: &OrientedBox, lens: &Lens, mount: &Mount) -> Option<Self> {
         let camera_m = mount.height_m()?;
         let nadir = mount.nadir();

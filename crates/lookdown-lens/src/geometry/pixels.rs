@@ -16,7 +16,6 @@ pub enum PixelConvention {
 }
 
 /// Crosses the half pixel: `point` is given in the other convention and returned in `target`.
-#[must_use]
 pub fn cross_half_pixel(point: Pixel, target: PixelConvention) -> Pixel {
     let shift = match target {
         PixelConvention::CornerOrigin => HALF_PIXEL,

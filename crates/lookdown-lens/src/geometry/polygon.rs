@@ -18,37 +18,9 @@ pub struct Polygon {
 pub type Edge = [Point2<f64>; 2];
 
 /// Corners that bound no area. They are counted from 1.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum PolygonError {
-    /// Too few corners, or too many.
-    #[error("it has {0} corners: give 3 to {MAX_CORNERS}")]
-    Count(usize),
-    /// A corner at no place.
-    #[error(
-        "corner {number} is [{x}, {y}]: give two finite numbers of at most a million on either \
-         side of 0"
-    )]
-    Coordinate {
-        /// The index of the corner.
-        number: usize,
-        /// Its first coordinate.
-        x: f64,
-        /// Its second one.
-        y: f64,
-    },
-    /// Two neighboring corners in one place.
-    #[error(
-        "corners {0} and {1} are the same: leave one out (the last corner is joined to the first \
-         by itself)"
-    )]
-    Repeated(usize, usize),
-    /// An outline that meets itself.
-    #[error(
-        "the edge from corner {0} to {1} meets the one from corner {2} to {3}: list the corners in \
-         the order in which a walk along the outline passes them"
-    )]
-    Crossing(usize, usize, usize, usize),
-}
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{0}")]
+pub struct PolygonError(String);
 
 impl Polygon {
     /// The area within `corners`, which follow each other along its outline, either way around.
@@ -58,14 +30,19 @@ impl Polygon {
     /// is not finite or beyond a million, or the outline meets itself.
     pub fn new(corners: &[[f64; 2]]) -> Result<Self, PolygonError> {
         if !(3..=MAX_CORNERS).contains(&corners.len()) {
-            return Err(PolygonError::Count(corners.len()));
+            let count = corners.len();
+            let problem = format!("it has {count} corners: give 3 to {MAX_CORNERS}");
+            return Err(PolygonError(problem));
         }
         for (index, &[x, y]) in corners.iter().enumerate() {
             // Not so where it is not a number either.
             let is_near = x.abs() <= MAX_COORDINATE && y.abs() <= MAX_COORDINATE;
             if !is_near {
                 let number = index + 1;
-                return Err(PolygonError::Coordinate { number, x, y });
+                return Err(PolygonError(format!(
+                    "corner {number} is [{x}, {y}]: give two finite numbers of at most a million \
+                     on either side of 0"
+                )));
             }
         }
         let polygon = Self {
@@ -76,7 +53,6 @@ impl Polygon {
     }
 
     /// A frame of `width` × `height` pixels, corner-origin.
-    #[must_use]
     pub fn for_frame(width: u32, height: u32) -> Self {
         let (width, height) = (f64::from(width), f64::from(height));
         let corners = [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)];
@@ -86,7 +62,6 @@ impl Polygon {
     }
 
     /// The corners along the outline.
-    #[must_use]
     pub fn corners(&self) -> &[Point2<f64>] {
         &self.corners
     }
@@ -99,7 +74,6 @@ impl Polygon {
 
     /// Returns true for a point inside: a ray from it toward growing x crosses the outline an odd
     /// number of times (the even-odd rule). Of areas with a common edge, one holds a point on it.
-    #[must_use]
     pub fn holds(&self, point: Point2<f64>) -> bool {
         let crossed = self
             .edges()
@@ -109,20 +83,17 @@ impl Polygon {
     }
 
     /// Returns true for a point inside, or at most `margin` away from the outline.
-    #[must_use]
     pub fn holds_within(&self, point: Point2<f64>, margin: f64) -> bool {
         self.holds(point) || self.edges().any(|edge| distance(edge, point) <= margin)
     }
 
     /// Returns true when two areas have a point in common, be it one of their outlines.
-    #[must_use]
     pub fn meets(&self, other: &Self) -> bool {
         let crosses = |edge: Edge| other.edges().any(|another| meet(edge, another));
         self.edges().any(crosses) || self.holds(other.corners[0]) || other.holds(self.corners[0])
     }
 
     /// Returns the width and the height of the bounding box.
-    #[must_use]
     pub fn extent(&self) -> Vector2<f64> {
         let corners = self.corners.iter();
         let (least, most) = corners.fold(
@@ -134,7 +105,6 @@ impl Polygon {
 
     /// Returns the share of a frame of `width` × `height` pixels that the area covers, 0 to 1. The
     /// outline is cut at each side of the frame (Sutherland and Hodgman, 1974).
-    #[must_use]
     pub fn share_of_frame(&self, width: u32, height: u32) -> f64 {
         let mut corners = self.corners.clone();
         for [from, to] in Self::for_frame(width, height).edges() {
@@ -166,7 +136,6 @@ impl Polygon {
     }
 
     /// The same area with its coordinates multiplied by two factors above 0.
-    #[must_use]
     pub fn scaled(&self, scale_x: f64, scale_y: f64) -> Self {
         let corners = self.corners.iter();
         Self {
@@ -182,7 +151,12 @@ impl Polygon {
         let edges: Vec<Edge> = self.edges().collect();
         for (index, [from, to]) in edges.iter().enumerate() {
             if from == to {
-                return Err(PolygonError::Repeated(index + 1, following(index) + 1));
+                return Err(PolygonError(format!(
+                    "corners {} and {} are the same: leave one out (the last corner is joined to \
+                     the first by itself)",
+                    index + 1,
+                    following(index) + 1
+                )));
             }
         }
         for (one, edge) in edges.iter().enumerate() {
@@ -195,12 +169,14 @@ impl Polygon {
                     meet(*edge, *another)
                 };
                 if is_met {
-                    return Err(PolygonError::Crossing(
+                    return Err(PolygonError(format!(
+                        "the edge from corner {} to {} meets the one from corner {} to {}: list \
+                         the corners in the order in which a walk along the outline passes them",
                         one + 1,
                         following(one) + 1,
                         other + 1,
-                        following(other) + 1,
-                    ));
+                        following(other) + 1
+                    )));
                 }
             }
         }
@@ -210,7 +186,6 @@ impl Polygon {
 
 /// Returns the place at which an edge passes the height `y`, if it does; its upper end belongs to
 /// it, its lower one does not, so that of two edges which meet there one passes.
-#[must_use]
 pub fn crossing([a, b]: Edge, y: f64) -> Option<f64> {
     // The same number whichever way the edge leads: areas side by side have it both ways.
     let [upper, lower] = if a.y <= b.y { [a, b] } else { [b, a] };

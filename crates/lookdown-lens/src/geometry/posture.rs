@@ -34,7 +34,6 @@ pub enum Posture {
 
 impl Posture {
     /// Returns the name, as in reports.
-    #[must_use]
     pub fn name(self) -> &'static str {
         self.into()
     }
@@ -147,7 +146,6 @@ pub struct BoxAngles {
 impl BoxAngles {
     /// Returns the angles of a box; `None` where a side is outside the lens image, or the floor is
     /// too far away.
-    #[must_use]
     pub fn new(person: &OrientedBox, lens: &Lens, mount: &Mount) -> Option<Self> {
         let ray = |end: Pixel| lens.unproject(&cross_half_pixel(end, PixelConvention::PixelCenter));
         let aside = nalgebra::Vector2::new(-person.up.y, person.up.x) * (person.width / 2.0);
@@ -279,7 +277,6 @@ pub struct PostureBelief {
 impl PostureBelief {
     /// Returns the belief about a person without a box. `has_height` is true if the height of the
     /// camera is known.
-    #[must_use]
     pub fn new(has_height: bool) -> Self {
         let sizes = sizes(has_height);
         Self {
@@ -324,7 +321,6 @@ impl PostureBelief {
     }
 
     /// Returns the probability of a posture; of any other for [`Posture::Unknown`], 0.
-    #[must_use]
     pub fn probability(&self, posture: Posture) -> f64 {
         self.weights
             .get(posture as usize)
@@ -332,7 +328,6 @@ impl PostureBelief {
     }
 
     /// Returns the most likely posture with its probability, [`Posture::Unknown`] below .6.
-    #[must_use]
     pub fn posture(&self) -> (Posture, f64) {
         use Posture::{Low, Lying, Seated, Unknown, Upright};
         let likely =
@@ -364,9 +359,7 @@ fn sizes(has_height: bool) -> [f64; SIZES] {
 }
 
 fn float(number: usize) -> f64 {
-    #[expect(clippy::cast_precision_loss, reason = "small numbers")]
-    let number = number as f64;
-    number
+    number as f64
 }
 
 #[cfg(test)]

@@ -25,7 +25,6 @@ pub enum FieldOfViewReading {
 
 impl FieldOfViewReading {
     /// The full horizontal opening angle, radians.
-    #[must_use]
     pub fn radians(self) -> f64 {
         let focal_per_width = match self {
             Self::Horizontal => 1.0,
@@ -72,7 +71,6 @@ pub struct ViewPlan {
 impl ViewPlan {
     /// The 128 views of the paper: elevations 0, 0.3, 0.6, 0.9 rad, each at the 32 azimuths
     /// −3.14, −2.94 … 3.06 rad (Seidel et al., section IV).
-    #[must_use]
     pub fn paper(reading: FieldOfViewReading) -> Self {
         let elevations = [0.0, 0.3, 0.6, 0.9];
         let directions = elevations.iter().flat_map(|&elevation| {
@@ -94,7 +92,6 @@ impl ViewPlan {
     }
 
     /// Evenly filled rings.
-    #[must_use]
     pub fn rings(rings: &[Ring]) -> Self {
         let directions = rings.iter().flat_map(|ring| {
             (0..ring.count).map(|index| ViewDirection {
@@ -115,21 +112,18 @@ impl ViewPlan {
 
     /// Five wide views: one more than the least that sees everything from close to the nadir to the
     /// rim.
-    #[must_use]
     pub fn fast() -> Self {
         Self::rings(&[Ring::from_degrees(0.9, 5, 90.0)])
     }
 
     /// Eight wide views from the nadir to the rim, and eight narrow detail views at the rim, where
     /// people are small.
-    #[must_use]
     pub fn balanced() -> Self {
         let wide = Self::rings(&[Ring::from_degrees(0.8, 8, 90.0)]);
         wide.with_details(&[Ring::from_degrees(1.25, 8, 45.0)])
     }
 
     /// The same plan with each azimuth larger by `angle`, radians.
-    #[must_use]
     pub fn turned(mut self, angle: f64) -> Self {
         for direction in &mut self.directions {
             direction.azimuth += angle;
@@ -139,19 +133,16 @@ impl ViewPlan {
 
     /// The number of views in which every frame is looked at. They come first; the others are
     /// detail views.
-    #[must_use]
     pub fn constant_count(&self) -> usize {
         self.constant_count
     }
 
     /// The directions, in plan order: detail views last.
-    #[must_use]
     pub fn directions(&self) -> &[ViewDirection] {
         &self.directions
     }
 
     /// The plan's views for a mount, `width` × `height` pixels each, in plan order.
-    #[must_use]
     pub fn views(&self, mount: &Mount, width: u32, height: u32) -> Vec<VirtualView> {
         self.directions
             .iter()

@@ -36,7 +36,6 @@ impl VirtualView {
     /// with a camera that looks straight down, image up in the view points outward and up: people
     /// stand upright. Under any mount that the plan is not centered on, the view is rolled until
     /// the projected `world_up` points up.
-    #[must_use]
     pub fn new(direction: &ViewDirection, mount: &Mount, width: u32, height: u32) -> Self {
         let spin = Rotation3::from_axis_angle(&Vector3::z_axis(), direction.azimuth);
         let tilt = Rotation3::from_axis_angle(&Vector3::x_axis(), direction.elevation);
@@ -57,7 +56,6 @@ impl VirtualView {
     /// A view that is upright under any mount: its axis is `tilt` from straight down, toward
     /// `azimuth` (0 toward image right, clockwise on the screen). All angles in radians,
     /// `field_of_view` horizontal and below 180°.
-    #[must_use]
     pub fn leveled(
         azimuth: f64,
         tilt: f64,
@@ -78,7 +76,6 @@ impl VirtualView {
 
     /// A view along a ray (camera frame), `focal` in pixels, with the projected `world_up` as image
     /// up; along the vertical itself, image up is that of the frame.
-    #[must_use]
     pub fn looking_along(axis: &Ray, focal: f64, mount: &Mount, width: u32, height: u32) -> Self {
         let axis = axis.normalize();
         let across = |up: Ray| (up - axis * axis.dot(&up)).try_normalize(UPRIGHT_MIN_SINE);
@@ -95,31 +92,26 @@ impl VirtualView {
     }
 
     /// Rotation from the view frame to the camera frame.
-    #[must_use]
     pub fn camera_from_view(&self) -> &Rotation3<f64> {
         &self.camera_from_view
     }
 
     /// Focal length, pixels.
-    #[must_use]
     pub fn focal(&self) -> f64 {
         self.focal
     }
 
     /// Width, pixels.
-    #[must_use]
     pub fn width(&self) -> u32 {
         self.width
     }
 
     /// Height, pixels.
-    #[must_use]
     pub fn height(&self) -> u32 {
         self.height
     }
 
     /// Full horizontal opening angle, radians.
-    #[must_use]
     pub fn field_of_view(&self) -> f64 {
         2.0 * (f64::from(self.width) / 2.0 / self.focal).atan()
     }
@@ -138,13 +130,11 @@ impl VirtualView {
     }
 
     /// The ray (camera frame, not of unit length) through a view pixel (pixel centers).
-    #[must_use]
     pub fn ray_in_camera(&self, pixel: &Pixel) -> Ray {
         self.camera_from_view * self.ray_in_view(pixel)
     }
 
     /// The ray (view frame, z = 1) through a view pixel (pixel centers).
-    #[must_use]
     pub fn ray_in_view(&self, pixel: &Pixel) -> Ray {
         let principal = self.principal_point();
         Ray::new(
@@ -156,7 +146,6 @@ impl VirtualView {
 
     /// Returns the point at which a ray (camera frame) meets the view (pixel centers), also beyond
     /// its borders; `None` for rays that point away from it.
-    #[must_use]
     pub fn project(&self, ray_in_camera: &Ray) -> Option<Pixel> {
         let ray = self
             .camera_from_view
@@ -171,7 +160,6 @@ impl VirtualView {
     }
 
     /// Returns true when a ray (camera frame) meets the view within its borders.
-    #[must_use]
     pub fn holds(&self, ray_in_camera: &Ray) -> bool {
         let (right, bottom) = (f64::from(self.width) - 0.5, f64::from(self.height) - 0.5);
         self.project(ray_in_camera).is_some_and(|pixel| {
@@ -181,7 +169,6 @@ impl VirtualView {
 
     /// The turn about the optical axis (radians, clockwise on the screen) that makes `other` this
     /// view, if there is one.
-    #[must_use]
     pub fn turned_from(&self, other: &Self) -> Option<f64> {
         let is_alike =
             (self.focal, self.width, self.height) == (other.focal, other.width, other.height);
@@ -193,7 +180,6 @@ impl VirtualView {
 
     /// The direction (unit length, view pixels) in which a vertical pole seen at `pixel` (pixel
     /// centers) rises; `None` where the view looks along the vertical.
-    #[must_use]
     pub fn vertical_at(&self, pixel: &Pixel, mount: &Mount) -> Option<Vector2<f64>> {
         let up = self
             .camera_from_view
@@ -205,7 +191,6 @@ impl VirtualView {
     }
 
     /// Returns the point at which the axis meets the view: its middle, pixel centers.
-    #[must_use]
     pub fn principal_point(&self) -> Pixel {
         Pixel::new(
             f64::from(self.width - 1) / 2.0,

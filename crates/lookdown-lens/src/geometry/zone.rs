@@ -31,13 +31,11 @@ pub enum ZoneArea {
 impl Zone {
     /// Returns true when a person stands in it whose foot is seen at `foot` (corner-origin frame
     /// pixels), which is `floor`. What meets no floor is in no zone of it.
-    #[must_use]
     pub fn holds(&self, foot: Pixel, floor: Option<FloorPosition>) -> bool {
         self.area.holds(foot, floor)
     }
 
     /// The same zone in frames `scale_x`, `scale_y` times as large; the floor stays as it is.
-    #[must_use]
     pub fn scaled(&self, scale_x: f64, scale_y: f64) -> Self {
         Self {
             name: self.name.clone(),
@@ -49,7 +47,6 @@ impl Zone {
     /// Points along its outline, `points_per_edge` on each edge and the first one once more at the
     /// end, corner-origin frame pixels; `None` where the lens does not see the floor. Straight
     /// edges on the floor are curves in the frame.
-    #[must_use]
     pub fn outline(&self, lens: &Lens, mount: &Mount, points_per_edge: u32) -> Vec<Option<Pixel>> {
         self.area.outline(lens, mount, points_per_edge)
     }
@@ -58,7 +55,6 @@ impl Zone {
 impl ZoneArea {
     /// Returns true when it contains a foot at `foot` (corner-origin frame pixels), which is
     /// `floor`.
-    #[must_use]
     pub fn holds(&self, foot: Pixel, floor: Option<FloorPosition>) -> bool {
         match self {
             Self::Frame(area) => area.holds(foot),
@@ -69,7 +65,6 @@ impl ZoneArea {
     }
 
     /// The same area in frames `scale_x`, `scale_y` times as large; the floor stays as it is.
-    #[must_use]
     pub fn scaled(&self, scale_x: f64, scale_y: f64) -> Self {
         match self {
             Self::Frame(area) => Self::Frame(area.scaled(scale_x, scale_y)),
@@ -78,7 +73,6 @@ impl ZoneArea {
     }
 
     /// Points along its outline, as of [`Zone::outline`].
-    #[must_use]
     pub fn outline(&self, lens: &Lens, mount: &Mount, points_per_edge: u32) -> Vec<Option<Pixel>> {
         let (Self::Frame(area) | Self::Floor(area)) = self;
         let along = area.edges().flat_map(|[a, b]| {

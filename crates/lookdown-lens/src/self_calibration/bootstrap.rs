@@ -35,7 +35,6 @@ pub(super) fn bootstrap(
         found.map(|found| found.right - own)
     });
     let slopes: Vec<_> = slopes.collect::<Option<_>>()?;
-    #[expect(clippy::cast_precision_loss, reason = "a few groups")]
     let count = slopes.len() as f64;
     let mean = slopes.iter().sum::<Parameters>() / count;
     let scatter: Normal = slopes

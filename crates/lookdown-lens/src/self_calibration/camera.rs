@@ -150,7 +150,6 @@ impl Angles {
         let mut thetas = Vec::with_capacity(ENTRIES + 2);
         let mut theta = 0.0_f64;
         for entry in 0..ENTRIES + 2 {
-            #[expect(clippy::cast_precision_loss, reason = "a small index")]
             let target = end * entry as f64 / ENTRIES as f64;
             for _ in 0..2 {
                 let (value, slope) = curve(shape, theta);
@@ -164,7 +163,6 @@ impl Angles {
             }
             thetas.push(theta);
         }
-        #[expect(clippy::cast_precision_loss, reason = "a small constant")]
         let entries_per_focal = ENTRIES as f64 / end;
         Some(Self {
             shape,
@@ -182,7 +180,6 @@ impl Angles {
             reason = "not negative"
         )]
         let entry = (at as usize).min(self.thetas.len() - 2);
-        #[expect(clippy::cast_precision_loss, reason = "a small index")]
         let share = (at - entry as f64).min(1.0);
         let theta = self.thetas[entry] + share * (self.thetas[entry + 1] - self.thetas[entry]);
         let (value, slope) = curve(self.shape, theta);

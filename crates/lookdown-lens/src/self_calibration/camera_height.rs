@@ -99,7 +99,6 @@ pub enum HeightRefusal {
 
 impl HeightRefusal {
     /// Returns the name of the reason, for programs: the variant in snake case.
-    #[must_use]
     pub fn reason(&self) -> &'static str {
         self.into()
     }
@@ -154,7 +153,6 @@ impl CameraHeight {
 /// Returns the mean and the standard deviation of the height, meters.
 fn posterior(ratios: &[(f64, f64)]) -> (f64, f64) {
     let (least, most) = (HEIGHTS_M.0.ln(), HEIGHTS_M.1.ln());
-    #[expect(clippy::cast_precision_loss, reason = "a few thousand boxes")]
     let weight = (MAX_INDEPENDENT / ratios.len() as f64).min(1.0);
     let points: Vec<(f64, f64)> = (0..=STEPS)
         .map(|step| {

@@ -113,7 +113,6 @@ fn fit_directions(
     blur: f64,
     fits: &mut Vec<Fitted>,
 ) -> f64 {
-    #[expect(clippy::cast_precision_loss, reason = "a few points")]
     let count = rays.len() as f64;
     let lever = curve.length() / 12.0_f64.sqrt();
     let (across, turned) = (SIGMA_PIXELS * curve.scale, SIGMA_DIRECTION * lever);

@@ -101,7 +101,6 @@ pub struct RoomFit {
 impl RoomFit {
     /// Returns the camera without a lens circle, whose image reaches to a distance from the center,
     /// in pixels, and to 100° from the axis at most.
-    #[must_use]
     pub fn without_circle(self, distance: f64) -> Self {
         let [k1, k2, k3, _] = self.k;
         let is_within = |theta: &f64| {
@@ -135,7 +134,6 @@ impl RoomFit {
             return Err(FitRefusal::TooFewEdges { edges });
         }
         // Frames of one camera show the same edges, so they are not independent evidence.
-        #[expect(clippy::cast_precision_loss, reason = "a few frames")]
         let weight = 1.0 / frames.len() as f64;
         let mut best: Option<(Vec<Maximum>, Prior)> = None;
         let mut others: Vec<Maximum> = Vec::new();
@@ -291,7 +289,6 @@ fn checked(
     if !has_order(explained, evaluation.evidence) {
         return Err(FitRefusal::NoDirections { explained });
     }
-    #[expect(clippy::cast_precision_loss, reason = "a few thousand edges")]
     let edges = weight * curves.len() as f64;
     let is_missing = |share: &f64| *share < MIN_SHARE && share * edges < MIN_ALONG;
     if evaluation.shares.iter().any(is_missing) {

@@ -12,7 +12,6 @@ use super::{
 impl RoomFit {
     /// Returns the edges that follow each of the directions, in the order of the directions. Edges
     /// that follow none of them are left out.
-    #[must_use]
     pub fn edges_along<'a>(&self, edges: &'a [EdgeCurve]) -> [Vec<&'a EdgeCurve>; 3] {
         let mut along: [Vec<&EdgeCurve>; 3] = Default::default();
         let camera = RoomCamera::from(self);

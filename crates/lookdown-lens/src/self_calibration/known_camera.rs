@@ -33,7 +33,6 @@ pub enum IdealLens {
 
 impl IdealLens {
     /// Returns the lens with a focal length and a center in pixels, up to an angle in radians.
-    #[must_use]
     pub fn with(self, focal: f64, cx: f64, cy: f64, max_theta: f64) -> LensModel {
         match self {
             Self::Equidistant => Equidistant::with_focal(focal, cx, cy, max_theta).into(),
@@ -90,13 +89,11 @@ impl FieldOfView {
     }
 
     /// Returns the field of view in degrees.
-    #[must_use]
     pub fn degrees(self) -> f64 {
         self.degrees
     }
 
     /// Returns the angle between the axis and the circle, radians.
-    #[must_use]
     pub fn max_theta(self) -> f64 {
         self.degrees.to_radians() / 2.0
     }

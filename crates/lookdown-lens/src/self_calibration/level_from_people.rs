@@ -72,7 +72,6 @@ impl LevelFromPeople {
                 scatter = (squares / total).sqrt().max(LEAST_SCATTER);
             }
         }
-        #[expect(clippy::cast_precision_loss, reason = "a few thousand boxes")]
         let repeated = (rows.len() as f64 / MAX_INDEPENDENT).max(1.0);
         let covariance = information.try_inverse()? * scatter * scatter * repeated;
         let sd_deg = (covariance[(1, 1)] + covariance[(2, 2)]).sqrt();
@@ -83,7 +82,6 @@ impl LevelFromPeople {
     }
 
     /// Returns true if the level of the camera, known to `sd_deg`, is not that of the people.
-    #[must_use]
     pub fn contradicts(&self, sd_deg: f64) -> bool {
         self.difference_deg > CONTRADICTION * self.sd_deg.hypot(sd_deg)
     }

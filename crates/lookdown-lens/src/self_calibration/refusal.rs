@@ -101,7 +101,6 @@ pub enum FitRefusal {
 impl FitRefusal {
     /// Returns the share of the edges along three directions, or `None` if another reason came
     /// first.
-    #[must_use]
     pub fn explained(&self) -> Option<f64> {
         match self {
             Self::NoDirections { explained }
@@ -118,7 +117,6 @@ impl FitRefusal {
     }
 
     /// Returns the name of the reason, for programs: the variant in snake case.
-    #[must_use]
     pub fn reason(&self) -> &'static str {
         self.into()
     }

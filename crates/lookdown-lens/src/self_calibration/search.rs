@@ -206,7 +206,6 @@ fn heading(planes: &[Plane], down: Ray, total: f64) -> (Rotation3<f64>, f64) {
     let second = down.cross(&first);
     let mut best = (Rotation3::identity(), f64::NEG_INFINITY);
     for index in 0..HEADINGS {
-        #[expect(clippy::cast_precision_loss, reason = "a small index")]
         let angle = FRAC_PI_2 * index as f64 / HEADINGS as f64;
         let x = first * angle.cos() + second * angle.sin();
         let y = down.cross(&x);

@@ -51,7 +51,6 @@ impl Triples {
                 let first = Ray::y().cross(down).normalize();
                 let second = down.cross(&first);
                 std::array::from_fn(|heading| {
-                    #[expect(clippy::cast_precision_loss, reason = "a small index")]
                     let angle = FRAC_PI_2 * heading as f64 / HEADINGS as f64;
                     let (sin, cos) = angle.sin_cos();
                     [first * cos + second * sin, second * cos - first * sin]
@@ -92,7 +91,6 @@ fn nearest(starts: &[usize], ray: &Ray) -> usize {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
         reason = "a small index"
     )]
     let index = (turn * count as f64).round() as usize % count;

@@ -11,7 +11,6 @@ pub(super) fn hull(one: [f64; 4], other: [f64; 4]) -> [f64; 4] {
 }
 
 /// Returns a box with a margin (pixels) on all sides.
-#[must_use]
 pub fn widened([x_min, y_min, x_max, y_max]: [f64; 4], margin: f64) -> [f64; 4] {
     [
         x_min - margin,
@@ -22,7 +21,6 @@ pub fn widened([x_min, y_min, x_max, y_max]: [f64; 4], margin: f64) -> [f64; 4] 
 }
 
 /// Returns true if two boxes share more than a border.
-#[must_use]
 pub fn overlap(one: &[f64; 4], other: &[f64; 4]) -> bool {
     one[0] < other[2] && other[0] < one[2] && one[1] < other[3] && other[1] < one[3]
 }

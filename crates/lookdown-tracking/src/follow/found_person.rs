@@ -11,6 +11,5 @@ pub trait FoundPerson: Clone {
     /// The score, a probability.
     fn score(&self) -> f64;
     /// Returns the person with another score.
-    #[must_use]
     fn with_score(self, score: f64) -> Self;
 }

@@ -4,14 +4,12 @@
 const LEAST: f64 = 1e-6;
 
 /// Returns the logit of a probability.
-#[must_use]
 pub fn logit(score: f64) -> f64 {
     let score = score.clamp(LEAST, 1.0 - LEAST);
     (score / (1.0 - score)).ln()
 }
 
 /// Returns the probability of a logit.
-#[must_use]
 pub fn from_logit(logit: f64) -> f64 {
     1.0 / (1.0 + (-logit).exp())
 }

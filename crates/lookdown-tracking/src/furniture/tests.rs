@@ -18,7 +18,6 @@ fn seen([right, down]: [f64; 2], [wider, higher]: [f64; 2], score: f64) -> Obser
 fn noise(step: u64, which: u64) -> f64 {
     let mixed = (step * 4 + which).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     let mixed = (mixed ^ (mixed >> 32)).wrapping_mul(0xD6E8_FEB8_6659_FD93);
-    #[expect(clippy::cast_precision_loss, reason = "32 bits are exact")]
     let value = (mixed >> 32) as f64 / f64::from(1_u32 << 31);
     value - 1.0
 }
@@ -32,7 +31,6 @@ fn thing(second: u64) -> Observation {
 /// Reports of one person or thing at each of these seconds.
 fn report(tracker: &mut Tracker, seconds: std::ops::Range<u64>, of: impl Fn(u64) -> Observation) {
     for second in seconds {
-        #[expect(clippy::cast_precision_loss, reason = "small")]
         let at_s = second as f64;
         tracker.update(0, at_s, &[of(second)]).unwrap();
     }
@@ -87,7 +85,6 @@ fn a_person_who_types_is_not_furniture() {
 #[test]
 fn a_person_who_was_seen_to_arrive_is_not_furniture() {
     let mut tracker = floor_tracker();
-    #[expect(clippy::cast_precision_loss, reason = "small")]
     let walked = |second: u64| seen([9.0 - second as f64, 0.0], [0.0, 0.0], 0.9);
     report(&mut tracker, 0..9, walked);
     report(&mut tracker, 9..20_000, thing);

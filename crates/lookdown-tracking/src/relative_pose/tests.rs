@@ -15,7 +15,6 @@ impl Chance {
             .0
             .wrapping_mul(6_364_136_223_846_793_005)
             .wrapping_add(1_442_695_040_888_963_407);
-        #[expect(clippy::cast_precision_loss, reason = "31 bits")]
         let share = (self.0 >> 33) as f64 / f64::from(1_u32 << 30);
         share - 1.0
     }

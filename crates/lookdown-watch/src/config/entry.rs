@@ -95,7 +95,6 @@ impl Scalar {
 
 impl CameraEntry {
     /// Returns the entry with absent values filled by those of another one.
-    #[must_use]
     pub fn or(self, defaults: &Self) -> Self {
         let mut parameters = defaults.parameters.clone();
         parameters.extend(self.parameters);

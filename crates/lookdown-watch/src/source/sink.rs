@@ -58,7 +58,7 @@ impl<'a> Sink<'a> {
         self.metrics.received(&frame);
         self.alive();
         if self.slot.put(frame).is_some() {
-            self.metrics.skipped();
+            self.metrics.skipped.inc();
         }
         if self.is_failing.lock().clear() {
             tracing::info!("the camera sends frames again");

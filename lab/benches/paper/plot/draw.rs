@@ -121,7 +121,6 @@ fn style(index: usize, count: usize, scale: u32) -> ShapeStyle {
     if count <= COLORS.len() {
         return COLORS[index].stroke_width(width);
     }
-    #[expect(clippy::cast_precision_loss, reason = "a few dozen lines")]
     let hue = index as f64 / count as f64;
     let lightness = if index.is_multiple_of(2) { 0.35 } else { 0.55 };
     HSLColor(hue, 0.8, lightness).stroke_width(width)

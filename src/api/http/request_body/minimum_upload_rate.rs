@@ -32,7 +32,6 @@ impl MinimumUploadRate {
     }
 
     /// Records received bytes.
-    #[expect(clippy::cast_precision_loss, reason = "a duration, not an exact count")]
     pub(in crate::api) fn came(&mut self, bytes: usize) {
         let Some(least) = self.least_bytes_per_second else {
             return;

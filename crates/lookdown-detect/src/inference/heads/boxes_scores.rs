@@ -3,12 +3,12 @@
 use serde::Deserialize;
 
 use super::{
-    Decoder,
     candidate_collector::{CandidateCollector, four},
+    decoder::{Decoder, Selected},
     outputs::named,
     score::Activation,
     shape::{Axis, Batch},
-    tensor::{Output, OutputShape, TensorView},
+    tensor::{Output, TensorView},
 };
 
 /// Boxes `[views, candidates, 4]` (`x_min, y_min, x_max, y_max`, view pixels) and scores
@@ -38,13 +38,13 @@ impl Default for BoxesScoresHead {
     }
 }
 
-impl BoxesScoresHead {
-    fn select<'o, T: Output>(&self, outputs: &'o [T], batch: &Batch) -> Result<[&'o T; 2], String> {
+impl Decoder for BoxesScoresHead {
+    fn select<'o>(&self, outputs: &'o [Output<'o>], batch: &Batch) -> Selected<'o> {
         let boxes = named(outputs, &self.boxes)?;
         let scores = named(outputs, &self.scores)?;
         let candidates = Axis::AtLeast(0, "candidates");
         let one_class = [Axis::Views, candidates, Axis::Exactly(1)];
-        let has_classes = scores.dimensions().len() == one_class.len();
+        let has_classes = scores.dimensions.len() == one_class.len();
         let scores_axes = if has_classes {
             &one_class[..]
         } else {
@@ -54,28 +54,21 @@ impl BoxesScoresHead {
             (boxes, &[Axis::Views, candidates, Axis::Exactly(4)]),
             (scores, scores_axes),
         ])?;
-        Ok([boxes, scores])
-    }
-}
-
-impl Decoder for BoxesScoresHead {
-    fn check(&self, outputs: &[OutputShape<'_>], batch: &Batch) -> Result<(), String> {
-        self.select(outputs, batch).map(drop)
+        Ok(vec![boxes, scores])
     }
 
     fn decode(
         &self,
-        outputs: &[TensorView<'_>],
-        batch: &Batch,
+        tensors: &[&TensorView<'_>],
+        _batch: &Batch,
         collector: &mut CandidateCollector,
-    ) -> Result<(), String> {
-        let [boxes, scores] = self.select(outputs, batch)?;
+    ) {
+        let (boxes, scores) = (tensors[0], tensors[1]);
         for (view, (boxes, scores)) in boxes.views().zip(scores.views()).enumerate() {
             for (corners, &raw) in boxes.chunks_exact(4).zip(scores) {
                 let score = Activation::None.score(raw, collector.floor);
                 collector.offer(view, score, || four(corners));
             }
         }
-        Ok(())
     }
 }

@@ -3,19 +3,22 @@
 use super::{
     candidate_collector::CandidateCollector,
     shape::Batch,
-    tensor::{OutputShape, TensorView},
+    tensor::{Output, TensorView},
 };
 
-/// Interface of all heads. `batch.views` is known in [`Decoder::decode`] only.
-pub(super) trait Decoder {
-    /// Checks that outputs of these shapes can be decoded. The error is a sentence.
-    fn check(&self, outputs: &[OutputShape<'_>], batch: &Batch) -> Result<(), String>;
+/// The outputs that a head reads, or a sentence about those that it cannot read.
+pub(super) type Selected<'o> = Result<Vec<&'o Output<'o>>, String>;
 
-    /// Checks the outputs, then passes every candidate to `collector`.
+/// Interface of all heads. `batch.views` is known in a run only.
+pub(super) trait Decoder {
+    /// Selects the outputs that are decoded, and checks their shapes.
+    fn select<'o>(&self, outputs: &'o [Output<'o>], batch: &Batch) -> Selected<'o>;
+
+    /// Passes every candidate of the selected outputs to `collector`.
     fn decode(
         &self,
-        outputs: &[TensorView<'_>],
+        tensors: &[&TensorView<'_>],
         batch: &Batch,
         collector: &mut CandidateCollector,
-    ) -> Result<(), String>;
+    );
 }

@@ -3,12 +3,12 @@
 use serde::Deserialize;
 
 use super::{
-    Decoder,
     candidate_collector::{CandidateCollector, corners_around, four},
+    decoder::{Decoder, Selected},
     outputs::boxes_and_scores,
     score::ClassActivation,
     shape::{Axis, Batch},
-    tensor::{Output, OutputShape, TensorView},
+    tensor::{Output, TensorView},
 };
 
 /// DETR and its successors (RT-DETR, D-FINE, RF-DETR) before decoding: class logits `[views,
@@ -45,8 +45,8 @@ pub struct DetrHead {
     pub scores: Option<String>,
 }
 
-impl DetrHead {
-    fn select<'o, T: Output>(&self, outputs: &'o [T], batch: &Batch) -> Result<[&'o T; 2], String> {
+impl Decoder for DetrHead {
+    fn select<'o>(&self, outputs: &'o [Output<'o>], batch: &Batch) -> Selected<'o> {
         let names = [self.boxes.as_deref(), self.scores.as_deref()];
         let [boxes, scores] = boxes_and_scores(outputs, names)?;
         let queries = Axis::AtLeast(0, "queries");
@@ -55,22 +55,16 @@ impl DetrHead {
             (boxes, &[Axis::Views, queries, Axis::Exactly(4)]),
             (scores, &[Axis::Views, queries, classes]),
         ])?;
-        Ok([boxes, scores])
-    }
-}
-
-impl Decoder for DetrHead {
-    fn check(&self, outputs: &[OutputShape<'_>], batch: &Batch) -> Result<(), String> {
-        self.select(outputs, batch).map(drop)
+        Ok(vec![boxes, scores])
     }
 
     fn decode(
         &self,
-        outputs: &[TensorView<'_>],
+        tensors: &[&TensorView<'_>],
         batch: &Batch,
         collector: &mut CandidateCollector,
-    ) -> Result<(), String> {
-        let [boxes, scores] = self.select(outputs, batch)?;
+    ) {
+        let (boxes, scores) = (tensors[0], tensors[1]);
         let person = usize::from(self.person_class);
         let [view_width, view_height] = [batch.width, batch.height].map(f64::from);
         for (view, (boxes, all_scores)) in boxes.views().zip(scores.views()).enumerate() {
@@ -86,6 +80,5 @@ impl Decoder for DetrHead {
                 });
             }
         }
-        Ok(())
     }
 }

@@ -6,12 +6,12 @@ use serde::Deserialize;
 
 use self::columns::Indices;
 use super::{
-    Decoder,
     candidate_collector::CandidateCollector,
+    decoder::{Decoder, Selected},
     outputs::named_or_only,
     score::Activation,
     shape::{Axis, Batch},
-    tensor::{Output, OutputShape, TensorView},
+    tensor::{Output, TensorView},
 };
 
 pub use columns::Column;
@@ -60,35 +60,13 @@ pub enum EndToEndUnit {
 }
 
 impl EndToEndHead {
-    fn select<'o, T: Output>(
-        &self,
-        outputs: &'o [T],
-        batch: &Batch,
-    ) -> Result<(&'o T, Indices), String> {
-        let rows = named_or_only(outputs, self.name.as_deref())?;
-        let dimensions = rows.dimensions();
-        let columns = match (&self.columns, dimensions.last().copied().flatten()) {
-            (Some(columns), _) => columns,
-            (None, None | Some(6)) => &columns::SIX[..],
-            (None, Some(found)) => {
-                return Err(format!(
-                    "its output {:?} has rows of {found}; list their content as `columns` in the \
-                     manifest's [output]",
-                    rows.name()
-                ));
-            }
-        };
-        let indices = Indices::new(columns)?;
-        let mut axes = match indices.view {
-            None => vec![Axis::Views],
-            Some(_) => vec![Axis::Any; dimensions.len().saturating_sub(2)],
-        };
-        axes.extend([
-            Axis::AtLeast(0, "rows"),
-            Axis::AtLeast(columns.len(), "columns"),
-        ]);
-        batch.require(&[(rows, &axes)])?;
-        Ok((rows, indices))
+    /// The columns of rows of this length, or of rows of a length that is not known yet.
+    fn columns(&self, length: Option<usize>) -> Option<&[Column]> {
+        match (&self.columns, length) {
+            (Some(columns), _) => Some(columns),
+            (None, None | Some(6)) => Some(&columns::SIX),
+            (None, Some(_)) => None,
+        }
     }
 
     fn offer(
@@ -131,25 +109,47 @@ fn view_number(raw: f32, views: usize) -> Option<usize> {
 }
 
 impl Decoder for EndToEndHead {
-    fn check(&self, outputs: &[OutputShape<'_>], batch: &Batch) -> Result<(), String> {
-        self.select(outputs, batch).map(drop)
+    fn select<'o>(&self, outputs: &'o [Output<'o>], batch: &Batch) -> Selected<'o> {
+        let rows = named_or_only(outputs, self.name.as_deref())?;
+        let length = rows.dimensions.last().copied().flatten();
+        let columns = self.columns(length).ok_or_else(|| {
+            format!(
+                "its output {:?} has rows of {}; list their content as `columns` in the \
+                 manifest's [output]",
+                rows.name,
+                length.unwrap_or_default()
+            )
+        })?;
+        let mut axes = match Indices::new(columns)?.view {
+            None => vec![Axis::Views],
+            Some(_) => vec![Axis::Any; rows.dimensions.len().saturating_sub(2)],
+        };
+        axes.extend([
+            Axis::AtLeast(0, "rows"),
+            Axis::AtLeast(columns.len(), "columns"),
+        ]);
+        batch.require(&[(rows, &axes)])?;
+        Ok(vec![rows])
     }
 
     fn decode(
         &self,
-        outputs: &[TensorView<'_>],
+        tensors: &[&TensorView<'_>],
         batch: &Batch,
         collector: &mut CandidateCollector,
-    ) -> Result<(), String> {
-        let (rows, indices) = self.select(outputs, batch)?;
+    ) {
+        let rows = tensors[0];
         let columns = rows.shape[rows.shape.len() - 1];
+        let Some(Ok(indices)) = self.columns(Some(columns)).map(Indices::new) else {
+            return;
+        };
         let Some(index) = indices.view else {
             for (view, values) in rows.views().enumerate() {
                 for row in values.chunks_exact(columns) {
                     self.offer(row, &indices, view, batch, collector);
                 }
             }
-            return Ok(());
+            return;
         };
         for row in rows.values.chunks_exact(columns) {
             if !row[index].is_finite() {
@@ -158,6 +158,5 @@ impl Decoder for EndToEndHead {
                 self.offer(row, &indices, view, batch, collector);
             }
         }
-        Ok(())
     }
 }

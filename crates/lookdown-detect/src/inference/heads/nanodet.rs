@@ -5,13 +5,13 @@ use std::num::NonZeroU32;
 use serde::Deserialize;
 
 use super::{
-    Decoder,
     candidate_collector::CandidateCollector,
+    decoder::{Decoder, Selected},
     grid::{Grid, pyramid, pyramid_len},
     outputs::named_or_only,
     score::Activation,
     shape::{Axis, Batch},
-    tensor::{Output, OutputShape, TensorView},
+    tensor::{Output, TensorView},
 };
 
 /// `NanoDet`: `[views, cells, classes + 4 (reg_max + 1)]`. Each cell has the class scores, then
@@ -81,15 +81,6 @@ impl NanodetHead {
         usize::from(self.reg_max) + 1
     }
 
-    fn select<'o, T: Output>(&self, outputs: &'o [T], batch: &Batch) -> Result<&'o T, String> {
-        let candidates = named_or_only(outputs, self.name.as_deref())?;
-        let cells = Axis::Exactly(pyramid_len(&self.strides, batch));
-        let classes = usize::from(self.person_class) + 1;
-        let columns = Axis::AtLeast(classes + 4 * self.bins(), "columns");
-        batch.require(&[(candidates, &[Axis::Views, cells, columns])])?;
-        Ok(candidates)
-    }
-
     fn corners(&self, logits: &[f32], grid: Grid, [column, row]: [f64; 2]) -> [f64; 4] {
         let shift = match self.prior {
             PriorPosition::Corner => 0.0,
@@ -118,17 +109,22 @@ fn expected_bin(logits: &[f32]) -> f64 {
 }
 
 impl Decoder for NanodetHead {
-    fn check(&self, outputs: &[OutputShape<'_>], batch: &Batch) -> Result<(), String> {
-        self.select(outputs, batch).map(drop)
+    fn select<'o>(&self, outputs: &'o [Output<'o>], batch: &Batch) -> Selected<'o> {
+        let candidates = named_or_only(outputs, self.name.as_deref())?;
+        let cells = Axis::Exactly(pyramid_len(&self.strides, batch));
+        let classes = usize::from(self.person_class) + 1;
+        let columns = Axis::AtLeast(classes + 4 * self.bins(), "columns");
+        batch.require(&[(candidates, &[Axis::Views, cells, columns])])?;
+        Ok(vec![candidates])
     }
 
     fn decode(
         &self,
-        outputs: &[TensorView<'_>],
+        tensors: &[&TensorView<'_>],
         batch: &Batch,
         collector: &mut CandidateCollector,
-    ) -> Result<(), String> {
-        let candidates = self.select(outputs, batch)?;
+    ) {
+        let candidates = tensors[0];
         let columns = candidates.shape[2];
         let classes = columns - 4 * self.bins();
         let person = usize::from(self.person_class);
@@ -139,6 +135,5 @@ impl Decoder for NanodetHead {
                 collector.offer(view, score, || self.corners(&values[classes..], grid, cell));
             }
         }
-        Ok(())
     }
 }

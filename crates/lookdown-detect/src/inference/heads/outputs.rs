@@ -8,8 +8,8 @@ use super::tensor::Output;
 const MAX_NAMES: usize = 16;
 
 /// Returns the output with that name.
-pub(super) fn named<'o, T: Output>(outputs: &'o [T], name: &str) -> Result<&'o T, String> {
-    let found = outputs.iter().find(|output| output.name() == name);
+pub(super) fn named<'o>(outputs: &'o [Output<'o>], name: &str) -> Result<&'o Output<'o>, String> {
+    let found = outputs.iter().find(|output| output.name == name);
     found.ok_or_else(|| {
         format!(
             "it has no output {name:?}, only {}; name the right one in the manifest's [output]",
@@ -19,10 +19,10 @@ pub(super) fn named<'o, T: Output>(outputs: &'o [T], name: &str) -> Result<&'o T
 }
 
 /// Returns the output with that name. Without a name, the only output.
-pub(super) fn named_or_only<'o, T: Output>(
-    outputs: &'o [T],
+pub(super) fn named_or_only<'o>(
+    outputs: &'o [Output<'o>],
     name: Option<&str>,
-) -> Result<&'o T, String> {
+) -> Result<&'o Output<'o>, String> {
     match (name, outputs) {
         (Some(name), _) => named(outputs, name),
         (None, [only]) => Ok(only),
@@ -35,21 +35,21 @@ pub(super) fn named_or_only<'o, T: Output>(
 
 /// Returns the outputs with boxes and with the scores of all classes, by name or else by shape.
 /// Both have three axes, and the last axis of the boxes is 4.
-pub(super) fn boxes_and_scores<'o, T: Output>(
-    outputs: &'o [T],
+pub(super) fn boxes_and_scores<'o>(
+    outputs: &'o [Output<'o>],
     [boxes, scores]: [Option<&str>; 2],
-) -> Result<[&'o T; 2], String> {
+) -> Result<[&'o Output<'o>; 2], String> {
     let find = |name: Option<&str>, last_axis_is_four: bool| {
         if let Some(name) = name {
             return named(outputs, name).map(Some);
         }
         // An axis of unknown length could be either.
         let mut fitting = outputs.iter().filter(|output| {
-            let dimensions = output.dimensions();
+            let dimensions = &output.dimensions;
             let last = dimensions.last().copied().flatten();
             dimensions.len() == 3
                 && last.is_none_or(|last| last_axis_is_four == (last == 4))
-                && ![boxes, scores].contains(&Some(output.name()))
+                && ![boxes, scores].contains(&Some(output.name))
         });
         Ok(fitting.next().filter(|_| fitting.next().is_none()))
     };
@@ -64,9 +64,9 @@ pub(super) fn boxes_and_scores<'o, T: Output>(
 }
 
 /// Lists the first names of the outputs.
-pub(super) fn names<T: Output>(outputs: &[T]) -> String {
+pub(super) fn names(outputs: &[Output<'_>]) -> String {
     let names = outputs.iter().take(MAX_NAMES);
-    let mut names: Vec<_> = names.map(|o| Quoted(o.name()).to_string()).collect();
+    let mut names: Vec<_> = names.map(|o| Quoted(o.name).to_string()).collect();
     if outputs.len() > MAX_NAMES {
         names.push("…".to_owned());
     }

@@ -74,10 +74,10 @@ impl fmt::Display for Axis {
 
 impl Batch {
     /// Checks outputs against the requirements on their axes.
-    pub(super) fn require<T: Output>(&self, wanted: &[(&T, &[Axis])]) -> Result<(), String> {
+    pub(super) fn require(&self, wanted: &[(&Output<'_>, &[Axis])]) -> Result<(), String> {
         let mut known: Vec<(&str, usize)> = Vec::new();
         for &(output, axes) in wanted {
-            let found = output.dimensions();
+            let found = &output.dimensions;
             // A graph may leave the number of axes open. Each run checks it.
             if self.views.is_none() && found.is_empty() {
                 continue;
@@ -91,21 +91,16 @@ impl Batch {
                 axis.admits(dimension, self) && known.iter().all(agrees)
             };
             if found.len() != axes.len() || !axes_found().all(fits) {
-                return Err(self.misfit(output, &found, axes, &known));
+                return Err(self.misfit(output, axes, &known));
             }
             known.extend(axes_found().filter_map(|(axis, found)| axis.name().zip(found)));
         }
         Ok(())
     }
 
-    fn misfit<T: Output>(
-        &self,
-        output: &T,
-        found: &[Option<usize>],
-        axes: &[Axis],
-        known: &[(&str, usize)],
-    ) -> String {
-        let found = found
+    fn misfit(&self, output: &Output<'_>, axes: &[Axis], known: &[(&str, usize)]) -> String {
+        let found = output
+            .dimensions
             .iter()
             .map(|dimension| dimension.map_or("?".to_owned(), |d| d.to_string()));
         let wanted = axes.iter().map(|axis| {
@@ -121,7 +116,7 @@ impl Batch {
         format!(
             "its output {:?} is [{}]; [{}] is needed for an input of {}×{} pixels (is [output] in \
              the manifest right for this model?)",
-            output.name(),
+            output.name,
             found.collect::<Vec<_>>().join(", "),
             wanted.collect::<Vec<_>>().join(", "),
             self.width,

@@ -22,33 +22,25 @@ pub struct TensorView<'a> {
 }
 
 /// Properties of an output for shape checks before and after a run.
-pub(super) trait Output {
-    fn name(&self) -> &str;
-
+pub(super) struct Output<'a> {
+    /// Its place among the outputs of the model.
+    pub(super) index: usize,
+    pub(super) name: &'a str,
     /// The dimensions. `None` for one that is not known yet.
-    fn dimensions(&self) -> Vec<Option<usize>>;
+    pub(super) dimensions: Vec<Option<usize>>,
 }
 
-impl Output for OutputShape<'_> {
-    fn name(&self) -> &str {
-        self.name
-    }
-
-    fn dimensions(&self) -> Vec<Option<usize>> {
-        self.shape
-            .iter()
-            .map(|&d| usize::try_from(d).ok())
-            .collect()
-    }
-}
-
-impl Output for TensorView<'_> {
-    fn name(&self) -> &str {
-        self.name
-    }
-
-    fn dimensions(&self) -> Vec<Option<usize>> {
-        self.shape.iter().copied().map(Some).collect()
+impl<'a> Output<'a> {
+    /// The outputs with these names and dimensions, in the order of the model.
+    pub(super) fn all<D: TryInto<usize> + Copy + 'a>(
+        outputs: impl Iterator<Item = (&'a str, &'a [D])>,
+    ) -> Vec<Self> {
+        let outputs = outputs.enumerate().map(|(index, (name, shape))| Self {
+            index,
+            name,
+            dimensions: shape.iter().map(|&side| side.try_into().ok()).collect(),
+        });
+        outputs.collect()
     }
 }
 

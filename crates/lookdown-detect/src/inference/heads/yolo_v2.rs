@@ -3,13 +3,13 @@
 use serde::Deserialize;
 
 use super::{
-    Decoder,
     candidate_collector::{CandidateCollector, corners_around},
+    decoder::{Decoder, Selected},
     grid::Grid,
     outputs::named_or_only,
     score::sigmoid,
     shape::{Axis, Batch, check_positive},
-    tensor::{Output, OutputShape, TensorView},
+    tensor::{Output, TensorView},
 };
 
 /// `YOLOv2`'s region layer before decoding: `[views, anchors × (5 + classes), rows, columns]`, with
@@ -40,8 +40,8 @@ pub struct YoloV2Head {
     pub name: Option<String>,
 }
 
-impl YoloV2Head {
-    fn select<'o, T: Output>(&self, outputs: &'o [T], batch: &Batch) -> Result<&'o T, String> {
+impl Decoder for YoloV2Head {
+    fn select<'o>(&self, outputs: &'o [Output<'o>], batch: &Batch) -> Selected<'o> {
         check_positive("anchors", self.anchors.as_flattened())?;
         let map = named_or_only(outputs, self.name.as_deref())?;
         let channels = Axis::PerAnchor {
@@ -50,22 +50,16 @@ impl YoloV2Head {
         };
         let [rows, columns] = Grid::axes(batch);
         batch.require(&[(map, &[Axis::Views, channels, rows, columns])])?;
-        Ok(map)
-    }
-}
-
-impl Decoder for YoloV2Head {
-    fn check(&self, outputs: &[OutputShape<'_>], batch: &Batch) -> Result<(), String> {
-        self.select(outputs, batch).map(drop)
+        Ok(vec![map])
     }
 
     fn decode(
         &self,
-        outputs: &[TensorView<'_>],
+        tensors: &[&TensorView<'_>],
         batch: &Batch,
         collector: &mut CandidateCollector,
-    ) -> Result<(), String> {
-        let map = self.select(outputs, batch)?;
+    ) {
+        let map = tensors[0];
         let grid = Grid::from_map(map, batch);
         let channels = map.shape[1] / self.anchors.len();
         let person = usize::from(self.person_class);
@@ -92,6 +86,5 @@ impl Decoder for YoloV2Head {
                 }
             }
         }
-        Ok(())
     }
 }

@@ -5,13 +5,13 @@ use std::num::NonZeroU32;
 use serde::Deserialize;
 
 use super::{
-    Decoder,
     candidate_collector::{CandidateCollector, corners_around},
+    decoder::{Decoder, Selected},
     grid::{default_strides, pyramid_len},
     outputs::named_or_only,
     score::Activation,
     shape::{Axis, Batch},
-    tensor::{Output, OutputShape, TensorView},
+    tensor::{Output, TensorView},
 };
 
 /// `YOLOv8`, YOLO11 and relatives, exported without suppression: `[views, 4 + classes, cells]`.
@@ -60,8 +60,8 @@ pub enum YoloV8Layout {
     CellsFirst,
 }
 
-impl YoloV8Head {
-    fn select<'o, T: Output>(&self, outputs: &'o [T], batch: &Batch) -> Result<&'o T, String> {
+impl Decoder for YoloV8Head {
+    fn select<'o>(&self, outputs: &'o [Output<'o>], batch: &Batch) -> Selected<'o> {
         let candidates = named_or_only(outputs, self.name.as_deref())?;
         let cells = Axis::Exactly(pyramid_len(&self.strides, batch));
         let channels = Axis::AtLeast(5 + usize::from(self.person_class), "channels");
@@ -70,22 +70,16 @@ impl YoloV8Head {
             YoloV8Layout::CellsFirst => [Axis::Views, cells, channels],
         };
         batch.require(&[(candidates, &axes)])?;
-        Ok(candidates)
-    }
-}
-
-impl Decoder for YoloV8Head {
-    fn check(&self, outputs: &[OutputShape<'_>], batch: &Batch) -> Result<(), String> {
-        self.select(outputs, batch).map(drop)
+        Ok(vec![candidates])
     }
 
     fn decode(
         &self,
-        outputs: &[TensorView<'_>],
-        batch: &Batch,
+        tensors: &[&TensorView<'_>],
+        _batch: &Batch,
         collector: &mut CandidateCollector,
-    ) -> Result<(), String> {
-        let candidates = self.select(outputs, batch)?;
+    ) {
+        let candidates = tensors[0];
         let (cells, per_channel, per_cell) = match self.layout {
             YoloV8Layout::ChannelsFirst => (candidates.shape[2], candidates.shape[2], 1),
             YoloV8Layout::CellsFirst => (candidates.shape[1], 1, candidates.shape[2]),
@@ -101,6 +95,5 @@ impl Decoder for YoloV8Head {
                 });
             }
         }
-        Ok(())
     }
 }

@@ -5,13 +5,13 @@ use std::num::NonZeroU32;
 use serde::Deserialize;
 
 use super::{
-    Decoder,
     candidate_collector::{CandidateCollector, corners_around, four},
+    decoder::{Decoder, Selected},
     grid::{Grid, default_strides, pyramid, pyramid_len},
     outputs::named_or_only,
     score::Activation,
     shape::{Axis, Batch},
-    tensor::{Output, OutputShape, TensorView},
+    tensor::{Output, TensorView},
 };
 
 /// YOLOX: `[views, cells, 5 + classes]`, with `t_x, t_y, t_w, t_h`, objectness and class scores per
@@ -51,14 +51,6 @@ pub struct YoloxHead {
 }
 
 impl YoloxHead {
-    fn select<'o, T: Output>(&self, outputs: &'o [T], batch: &Batch) -> Result<&'o T, String> {
-        let candidates = named_or_only(outputs, self.name.as_deref())?;
-        let cells = Axis::Exactly(pyramid_len(&self.strides, batch));
-        let columns = Axis::AtLeast(6 + usize::from(self.person_class), "columns");
-        batch.require(&[(candidates, &[Axis::Views, cells, columns])])?;
-        Ok(candidates)
-    }
-
     fn corners(&self, values: &[f32], grid: Grid, [column, row]: [f64; 2]) -> [f64; 4] {
         let [x, y, width, height] = four(values);
         if self.decode_in_graph {
@@ -70,17 +62,21 @@ impl YoloxHead {
 }
 
 impl Decoder for YoloxHead {
-    fn check(&self, outputs: &[OutputShape<'_>], batch: &Batch) -> Result<(), String> {
-        self.select(outputs, batch).map(drop)
+    fn select<'o>(&self, outputs: &'o [Output<'o>], batch: &Batch) -> Selected<'o> {
+        let candidates = named_or_only(outputs, self.name.as_deref())?;
+        let cells = Axis::Exactly(pyramid_len(&self.strides, batch));
+        let columns = Axis::AtLeast(6 + usize::from(self.person_class), "columns");
+        batch.require(&[(candidates, &[Axis::Views, cells, columns])])?;
+        Ok(vec![candidates])
     }
 
     fn decode(
         &self,
-        outputs: &[TensorView<'_>],
+        tensors: &[&TensorView<'_>],
         batch: &Batch,
         collector: &mut CandidateCollector,
-    ) -> Result<(), String> {
-        let candidates = self.select(outputs, batch)?;
+    ) {
+        let candidates = tensors[0];
         let person = 5 + usize::from(self.person_class);
         let floor = collector.floor;
         for (view, values) in candidates.views().enumerate() {
@@ -93,6 +89,5 @@ impl Decoder for YoloxHead {
                 collector.offer(view, score, || self.corners(values, grid, cell));
             }
         }
-        Ok(())
     }
 }

@@ -72,7 +72,6 @@ impl RemoteServer {
     }
 
     /// Returns true if requests are sent to the server, that is, the breaker is closed.
-    #[must_use]
     pub fn is_available(&self) -> bool {
         !self.breaker.is_open()
     }

@@ -48,7 +48,6 @@ pub enum RepositoryError {
 
 impl RepositoryError {
     /// Returns true if a retry after a short time may succeed without a change.
-    #[must_use]
     pub fn is_passing(&self) -> bool {
         matches!(
             self,
@@ -62,7 +61,6 @@ impl RepositoryError {
 
     /// Returns true if the error is caused by the model itself, so that it persists until the files
     /// change.
-    #[must_use]
     pub fn is_of_model(&self) -> bool {
         let is_denied = matches!(
             self,

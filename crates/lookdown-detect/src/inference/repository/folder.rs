@@ -53,7 +53,6 @@ impl ModelFolder {
 }
 
 /// Returns the names of the models in a folder, sorted.
-#[must_use]
 pub fn model_names(folder: &Path) -> Vec<String> {
     let folder = ModelFolder {
         path: folder.to_owned(),
@@ -63,7 +62,6 @@ pub fn model_names(folder: &Path) -> Vec<String> {
 }
 
 /// Returns true if a model's ONNX file exists. Weights are fetched, manifests are not.
-#[must_use]
 pub fn is_fetched(model: &Path) -> bool {
     ModelManifest::locate(model).is_ok_and(|manifest| manifest.onnx.is_file())
 }

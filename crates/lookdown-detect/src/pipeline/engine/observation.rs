@@ -41,7 +41,6 @@ pub struct Observation {
 impl Observation {
     /// Returns the number of views with detections, from this frame's inference or from the motion
     /// cache.
-    #[must_use]
     pub fn view_count(&self) -> usize {
         let left_out = usize::from(!self.is_searched);
         let passes = self.passes.iter().skip(left_out);
@@ -83,13 +82,11 @@ impl Observation {
     }
 
     /// Returns the stage timings so far, without `refine` and `total`.
-    #[must_use]
     pub fn timings(&self) -> StageTimings {
         self.timeline.timings()
     }
 
     /// Returns the model of the first pass.
-    #[must_use]
     pub fn model(&self) -> &Model {
         &self.model
     }

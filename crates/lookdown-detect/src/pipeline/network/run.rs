@@ -130,7 +130,6 @@ impl Run {
         let mut undivided = (usize::from(self.ran), self.non_finite);
         for claim in claims {
             let seen: Vec<_> = views.by_ref().take(claim.views.len()).collect();
-            #[expect(clippy::cast_precision_loss, reason = "far below 2^52 views")]
             let share = seen.len() as f64 / total as f64;
             let (runs, non_finite) = std::mem::take(&mut undivided);
             let cost = BatchCost {

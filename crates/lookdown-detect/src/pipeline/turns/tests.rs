@@ -1,5 +1,4 @@
 #![expect(
-    clippy::cast_precision_loss,
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
     reason = "ticks and counts of a simulation are small"

@@ -41,7 +41,6 @@ pub struct AreaReach {
 
 impl AreaReach {
     /// Returns the reach of the areas in frames of `width` × `height` pixels; `None` without areas.
-    #[must_use]
     pub fn new(
         filter: &FootFilter,
         lens: &Lens,
@@ -81,14 +80,12 @@ impl AreaReach {
 
     /// Returns true if a position of the frame (corner-origin pixels) can show a person of the
     /// areas.
-    #[must_use]
     pub fn holds(&self, at: Pixel) -> bool {
         let cell = cell(at.y, self.cell_height) * CELLS + cell(at.x, self.cell_width);
         self.cells[cell as usize]
     }
 
     /// Returns boxes (corner-origin pixels) that cover all positions out of reach.
-    #[must_use]
     pub fn boxes_outside(&self) -> Vec<[f64; 4]> {
         let rows = (0_u32..).zip(self.cells.chunks_exact(CELLS as usize));
         let boxes = rows.flat_map(|(row, cells)| {
@@ -102,7 +99,6 @@ impl AreaReach {
     }
 
     /// Memory held, bytes.
-    #[must_use]
     pub fn bytes(&self) -> usize {
         self.cells.len()
     }

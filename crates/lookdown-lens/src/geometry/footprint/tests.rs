@@ -88,7 +88,6 @@ fn mean_overlap(back_projection: BackProjection, distance_m: f64, azimuth: f64) 
         !overlaps.is_empty(),
         "no view holds a person at {distance_m} m"
     );
-    #[expect(clippy::cast_precision_loss, reason = "at most 128 views")]
     let count = overlaps.len() as f64;
     overlaps.iter().sum::<f64>() / count
 }

@@ -9,7 +9,9 @@ pub(super) fn finite(name: &'static str, value: f64) -> Result<f64, LensError> {
 
 pub(super) fn all_finite(name: &'static str, values: &[f64]) -> Result<(), LensError> {
     match values.iter().find(|value| !value.is_finite()) {
-        Some(&value) => Err(LensError::NotFinite { name, value }),
+        Some(&value) => Err(LensError::new(format!(
+            "{name} is {value}: a finite number is needed"
+        ))),
         None => Ok(()),
     }
 }
@@ -18,7 +20,9 @@ pub(super) fn positive(name: &'static str, value: f64) -> Result<f64, LensError>
     if finite(name, value)? > 0.0 {
         return Ok(value);
     }
-    Err(LensError::NotPositive { name, value })
+    Err(LensError::new(format!(
+        "{name} is {value}: it must be greater than 0"
+    )))
 }
 
 /// Checks a parameter whose accepted values `range` states in words.
@@ -31,12 +35,8 @@ pub(super) fn in_range(
     if is_accepted(finite(name, value)?) {
         return Ok(value);
     }
-    Err(LensError::OutOfRange {
-        model,
-        name,
-        value,
-        range,
-    })
+    let problem = format!("{name} is {value}: this {model} parameter must be {range}");
+    Err(LensError::new(problem))
 }
 
 pub(super) fn from_zero_to_one(

@@ -8,7 +8,6 @@ impl Lens {
     /// [`Lens::image_plane`] takes to pixels. Beyond `max_theta` the curve is its own mirror image,
     /// `r(max_theta + t) = 2 r(max_theta) − r(max_theta − t)`: smooth across the rim, but nothing
     /// that the lens sees. `None` exactly behind the camera and where nothing finite comes out.
-    #[must_use]
     pub fn continued_beyond_rim(&self, ray: &Ray) -> Option<Pixel> {
         let off_axis = ray.x.hypot(ray.y);
         if off_axis == 0.0 {

@@ -27,75 +27,79 @@ pub(super) trait Curve {
     }
 }
 
-/// A radius that is a polynomial of the angle.
+/// A radius that is a function of the angle and is fitted by a polynomial, or an angle that is one
+/// of the radius.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct RadiusCurve(Tabulated<Polynomial>);
-
-impl RadiusCurve {
-    pub(super) fn new(polynomial: Polynomial) -> Self {
-        let limit = first_stationary_point(|theta| polynomial.slope(theta), PI);
-        Self(Tabulated::new(polynomial, limit))
-    }
+pub(super) struct FittedCurve<F> {
+    table: Tabulated<F>,
+    gives_angle: bool,
 }
 
-impl Curve for RadiusCurve {
-    fn limit(&self) -> f64 {
-        self.0.end()
-    }
-
-    fn radius(&self, theta: f64) -> f64 {
-        self.0.value(theta)
-    }
-
-    fn angle(&self, radius: f64) -> f64 {
-        self.0.invert(radius)
-    }
-
-    fn is_polynomial(&self) -> bool {
-        true
-    }
-}
-
-/// An angle that is a function of the radius and is fitted by a polynomial.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct AngleCurve<F>(Tabulated<F>);
-
-impl<F: Rising> AngleCurve<F> {
-    /// The curve up to `reach` or the radius at which the angle stops rising, if that is less.
-    pub(super) fn up_to(reach: f64, angle: F) -> Self {
+impl<F: Rising> FittedCurve<F> {
+    /// The angle up to `reach` or the radius at which it stops rising, if that is less.
+    pub(super) fn angle_up_to(reach: f64, angle: F) -> Self {
         let end = first_stationary_point(|radius| angle.slope(radius), reach);
-        Self(Tabulated::new(angle, end))
+        Self {
+            table: Tabulated::new(angle, end),
+            gives_angle: true,
+        }
     }
 }
 
-impl AngleCurve<Polynomial> {
-    pub(super) fn new(polynomial: Polynomial) -> Self {
+impl FittedCurve<Polynomial> {
+    /// The radius at each angle.
+    pub(super) fn radius(polynomial: Polynomial) -> Self {
+        let limit = first_stationary_point(|theta| polynomial.slope(theta), PI);
+        Self {
+            table: Tabulated::new(polynomial, limit),
+            gives_angle: false,
+        }
+    }
+
+    /// The angle at each radius.
+    pub(super) fn angle(polynomial: Polynomial) -> Self {
         // Twice as far as the lens would reach if it continued at its first slope, and then twice.
         let reach = 4.0 * PI / polynomial.slope(0.0);
-        let Self(whole) = Self::up_to(reach, polynomial);
+        let whole = Self::angle_up_to(reach, polynomial).table;
         // Beyond PI there is nothing more to see.
         let end = if whole.value(whole.end()) > PI {
             whole.invert(PI)
         } else {
             whole.end()
         };
-        Self(whole.limited_to(end))
+        Self {
+            table: whole.limited_to(end),
+            gives_angle: true,
+        }
     }
 }
 
-impl<F: Rising> Curve for AngleCurve<F> {
+impl<F: Rising> Curve for FittedCurve<F> {
     fn limit(&self) -> f64 {
-        let end = self.0.value(self.0.end());
-        // Unlike `min`, this keeps NaN.
+        let end = self.table.end();
+        let end = if self.gives_angle {
+            self.table.value(end)
+        } else {
+            end
+        };
+        // Unlike `min`, this keeps NaN. The end of an angle that is given is at most PI.
         if end > PI { PI } else { end }
     }
 
     fn radius(&self, theta: f64) -> f64 {
-        self.0.invert(theta)
+        if self.gives_angle {
+            self.table.invert(theta)
+        } else {
+            self.table.value(theta)
+        }
     }
 
     fn angle(&self, radius: f64) -> f64 {
-        self.0.value(radius)
+        if self.gives_angle {
+            self.table.value(radius)
+        } else {
+            self.table.invert(radius)
+        }
     }
 
     fn is_polynomial(&self) -> bool {

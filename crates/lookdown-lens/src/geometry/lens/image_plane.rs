@@ -31,7 +31,6 @@ pub struct ImagePlane {
 
 impl ImagePlane {
     /// An image plane without skew.
-    #[must_use]
     pub fn new(fx: f64, fy: f64, cx: f64, cy: f64) -> Self {
         Self {
             fx,
@@ -59,12 +58,17 @@ impl ImagePlane {
         }
         let is_orienting = self.determinant() > 0.0;
         if !is_orienting {
-            return Err(LensError::NotOrienting {
-                fx: self.fx,
-                skew: self.skew,
-                row_skew: self.row_skew,
-                fy: self.fy,
-            });
+            let Self {
+                fx,
+                fy,
+                skew,
+                row_skew,
+                ..
+            } = self;
+            return Err(LensError::new(format!(
+                "the affine part [[{fx}, {skew}], [{row_skew}, {fy}]] flattens or mirrors the \
+                 image: its off-diagonal terms must be small against its diagonal"
+            )));
         }
         Ok(())
     }

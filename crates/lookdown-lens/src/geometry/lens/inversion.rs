@@ -139,7 +139,6 @@ pub(super) fn first_stationary_point(slope: impl Fn(f64) -> f64, end: f64) -> f6
     low
 }
 
-#[expect(clippy::cast_precision_loss, reason = "indices far below 2^52")]
 fn fraction(index: usize) -> f64 {
     index as f64
 }

@@ -30,7 +30,13 @@ pub(super) fn one() -> f64 {
 /// * `SkewedPinhole`: `fx`, `fy` and `skew`;
 /// * `Centered`: none but `cx` and `cy`; the model's file has a `plane` function for the rest.
 macro_rules! lens_parameters {
-    ($(#[$doc:meta])* pub struct $Model:ident: Ideal with $Curve:ident;) => {
+    (
+        $(#[$doc:meta])* pub struct $Model:ident: Ideal with $Curve:ident {
+            limit: $limit:expr,
+            radius: |$theta:ident| $radius_at:expr,
+            angle: |$radius:ident| $angle_at:expr,
+        }
+    ) => {
         lens_parameters! {
             @struct $(#[$doc])* $Model {
                 /// Focal length, pixels; stands for equal `fx` and `fy`.
@@ -47,21 +53,18 @@ macro_rules! lens_parameters {
 
         impl $Model {
             /// Creates the lens with these focal lengths and center.
-            #[must_use]
             pub fn new([fx, fy, cx, cy]: $crate::geometry::lens::Pinhole) -> Self {
                 Self { focal: None, fx: Some(fx), fy: Some(fy), cx, cy, max_theta: None }
             }
 
             /// Creates the lens with one focal length (pixels) that sees up to `max_theta` radians
             /// off its axis.
-            #[must_use]
             pub fn with_focal(focal: f64, cx: f64, cy: f64, max_theta: f64) -> Self {
                 let max_theta = Some(max_theta);
                 Self { focal: Some(focal), fx: None, fy: None, cx, cy, max_theta }
             }
 
             /// Returns the focal lengths and the center, unless a focal length is missing.
-            #[must_use]
             pub fn pinhole(&self) -> Option<$crate::geometry::lens::Pinhole> {
                 Some([self.fx.or(self.focal)?, self.fy.or(self.focal)?, self.cx, self.cy])
             }
@@ -83,6 +86,20 @@ macro_rules! lens_parameters {
 
             fn curve(&self) -> Result<$Curve, $crate::geometry::LensError> {
                 Ok($Curve)
+            }
+        }
+
+        impl $crate::geometry::lens::curve::Curve for $Curve {
+            fn limit(&self) -> f64 {
+                $limit
+            }
+
+            fn radius(&self, $theta: f64) -> f64 {
+                $radius_at
+            }
+
+            fn angle(&self, $radius: f64) -> f64 {
+                $angle_at
             }
         }
     };
@@ -119,13 +136,11 @@ macro_rules! lens_parameters {
 
         impl $Model {
             /// Creates the lens with these focal lengths, center and parameters, without skew.
-            #[must_use]
             pub fn new([fx, fy, cx, cy]: $crate::geometry::lens::Pinhole, $($own: $Own),*) -> Self {
                 Self { fx, fy, cx, cy, $($own,)* $($skew: 0.0,)? max_theta: None }
             }
 
             /// Returns the focal lengths and the center.
-            #[must_use]
             pub fn pinhole(&self) -> $crate::geometry::lens::Pinhole {
                 [self.fx, self.fy, self.cx, self.cy]
             }
@@ -174,9 +189,7 @@ pub(super) fn ideal_plane(
         }
         (None, Some(fx), Some(fy)) => (fx, fy),
         _ => {
-            return Err(LensError::EitherOr {
-                choice: "focal, or both fx and fy",
-            });
+            return Err(LensError::new("give either focal, or both fx and fy"));
         }
     };
     Ok(ImagePlane::new(fx, fy, cx, cy))
@@ -219,7 +232,6 @@ macro_rules! lens_models {
             pub const NAMES: &'static [&'static str] = &[$($Model::NAME),+];
 
             /// Returns the model's name in calibration files.
-            #[must_use]
             pub fn name(&self) -> &'static str {
                 match self {
                     $(Self::$Model(_) => $Model::NAME,)+
@@ -227,7 +239,6 @@ macro_rules! lens_models {
             }
 
             /// Returns the end of the lens image that the file states, radians.
-            #[must_use]
             pub fn max_theta(&self) -> Option<f64> {
                 match self {
                     $(Self::$Model(model) => model.max_theta,)+

@@ -25,7 +25,8 @@ impl Polynomial {
         let polynomial = Self::checked(name, coefficients, 2)?;
         let value = coefficients[0];
         if value != 0.0 {
-            return Err(LensError::TornAtAxis { name, value });
+            let problem = format!("{name}[0] is {value}: the radius at the optical axis must be 0");
+            return Err(LensError::new(problem));
         }
         Ok(polynomial)
     }
@@ -37,12 +38,10 @@ impl Polynomial {
         least: usize,
     ) -> Result<Self, LensError> {
         if !(least..=MAX_COEFFICIENTS).contains(&coefficients.len()) {
-            return Err(LensError::CoefficientCount {
-                name,
-                count: coefficients.len(),
-                least,
-                most: MAX_COEFFICIENTS,
-            });
+            return Err(LensError::new(format!(
+                "{name} has {} entries: between {least} and {MAX_COEFFICIENTS} are accepted",
+                coefficients.len()
+            )));
         }
         all_finite(name, coefficients)?;
         Ok(Self(coefficients.to_vec()))
@@ -65,7 +64,6 @@ impl Rising for Polynomial {
     fn slope(&self, x: f64) -> f64 {
         let powers = (1..self.0.len()).rev();
         powers.fold(0.0, |sum, power| {
-            #[expect(clippy::cast_precision_loss, reason = "a power below 64")]
             let factor = power as f64;
             sum * x + factor * self.0[power]
         })

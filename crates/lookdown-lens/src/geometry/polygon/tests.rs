@@ -102,7 +102,6 @@ fn areas_meet_where_they_overlap_contain_each_other_or_touch() {
 /// A star around the origin: always simple, and known by the distance in each direction.
 fn star() -> impl Strategy<Value = Vec<[f64; 2]>> {
     prop::collection::vec(1.0..10.0_f64, 3..40).prop_map(|radii| {
-        #[expect(clippy::cast_precision_loss, reason = "a few corners")]
         let step = std::f64::consts::TAU / radii.len() as f64;
         let corners = (0_u32..).zip(radii).map(|(index, radius)| {
             let angle = step * f64::from(index);

@@ -16,7 +16,6 @@ pub struct Coverage {
 
 impl Coverage {
     /// Measures `views` on a frame of `width` × `height` pixels, at points of a regular grid.
-    #[must_use]
     pub fn new(lens: &Lens, views: &[VirtualView], width: u32, height: u32) -> Self {
         let position = |index: u32, side: u32| {
             (f64::from(index) + 0.5) / f64::from(SAMPLES) * f64::from(side) - 0.5

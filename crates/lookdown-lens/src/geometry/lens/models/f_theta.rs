@@ -3,7 +3,7 @@
 use crate::geometry::lens::{
     ImagePlane, LensError,
     check::{finite, positive},
-    curve::{AngleCurve, Curve, RadiusCurve},
+    curve::FittedCurve,
     model::Model,
     polynomial::Polynomial,
 };
@@ -42,55 +42,21 @@ impl FTheta {
 }
 
 impl Model for FTheta {
-    type Curve = FThetaCurve;
+    type Curve = FittedCurve<Polynomial>;
 
-    fn curve(&self) -> Result<FThetaCurve, LensError> {
+    fn curve(&self) -> Result<Self::Curve, LensError> {
         match (&self.angle_to_pixel, &self.pixel_to_angle) {
             (Some(coefficients), None) => {
                 let polynomial = Polynomial::from_axis("angle_to_pixel", coefficients)?;
-                Ok(FThetaCurve::Radius(RadiusCurve::new(polynomial)))
+                Ok(FittedCurve::radius(polynomial))
             }
             (None, Some(coefficients)) => {
                 let polynomial = Polynomial::from_axis("pixel_to_angle", coefficients)?;
-                Ok(FThetaCurve::Angle(AngleCurve::new(polynomial)))
+                Ok(FittedCurve::angle(polynomial))
             }
-            _ => Err(LensError::EitherOr {
-                choice: "angle_to_pixel or pixel_to_angle, the one that is exact",
-            }),
+            _ => Err(LensError::new(
+                "give either angle_to_pixel or pixel_to_angle, the one that is exact",
+            )),
         }
-    }
-}
-
-/// The curve in the direction that the calibration declares as its reference.
-#[derive(Debug, Clone, PartialEq)]
-pub enum FThetaCurve {
-    Radius(RadiusCurve),
-    Angle(AngleCurve<Polynomial>),
-}
-
-impl Curve for FThetaCurve {
-    fn limit(&self) -> f64 {
-        match self {
-            Self::Radius(curve) => curve.limit(),
-            Self::Angle(curve) => curve.limit(),
-        }
-    }
-
-    fn radius(&self, theta: f64) -> f64 {
-        match self {
-            Self::Radius(curve) => curve.radius(theta),
-            Self::Angle(curve) => curve.radius(theta),
-        }
-    }
-
-    fn angle(&self, radius: f64) -> f64 {
-        match self {
-            Self::Radius(curve) => curve.angle(radius),
-            Self::Angle(curve) => curve.angle(radius),
-        }
-    }
-
-    fn is_polynomial(&self) -> bool {
-        true
     }
 }

@@ -1,7 +1,7 @@
 //! The odd polynomial of Kannala and Brandt, as OpenCV's fisheye module uses it.
 
 use crate::geometry::lens::{
-    LensError, check::all_finite, curve::RadiusCurve, model::Model, polynomial::Polynomial,
+    LensError, check::all_finite, curve::FittedCurve, model::Model, polynomial::Polynomial,
 };
 
 lens_parameters! {
@@ -15,12 +15,12 @@ lens_parameters! {
 }
 
 impl Model for KannalaBrandt {
-    type Curve = RadiusCurve;
+    type Curve = FittedCurve<Polynomial>;
 
-    fn curve(&self) -> Result<RadiusCurve, LensError> {
+    fn curve(&self) -> Result<Self::Curve, LensError> {
         all_finite("k", &self.k)?;
         let odd_powers = self.k.into_iter().flat_map(|k| [0.0, k]);
         let coefficients = [0.0, 1.0].into_iter().chain(odd_powers).collect();
-        Ok(RadiusCurve::new(Polynomial(coefficients)))
+        Ok(FittedCurve::radius(Polynomial(coefficients)))
     }
 }

@@ -3,7 +3,7 @@
 use crate::geometry::lens::{
     ImagePlane, LensError,
     check::{finite, in_range, positive},
-    curve::AngleCurve,
+    curve::FittedCurve,
     model::Model,
     polynomial::{Polynomial, Rising},
 };
@@ -34,7 +34,6 @@ lens_parameters! {
 
 impl Ocam {
     /// Creates the lens with this polynomial and center and with square pixels.
-    #[must_use]
     pub fn new(polynomial: Vec<f64>, [cx, cy]: [f64; 2]) -> Self {
         Self {
             polynomial,
@@ -57,7 +56,7 @@ impl Ocam {
 }
 
 impl Model for Ocam {
-    type Curve = AngleCurve<OcamAngle>;
+    type Curve = FittedCurve<OcamAngle>;
 
     fn curve(&self) -> Result<Self::Curve, LensError> {
         let angle = OcamAngle(Polynomial::checked("polynomial", &self.polynomial, 1)?);
@@ -65,7 +64,7 @@ impl Model for Ocam {
         let first = (Self::NAME, "polynomial[0]");
         let first = in_range(first, self.polynomial[0], |first| first < 0.0, range)?;
         // At the axis there are `-first` pixels per radian.
-        Ok(AngleCurve::up_to(REACH * -first, angle))
+        Ok(FittedCurve::angle_up_to(REACH * -first, angle))
     }
 }
 

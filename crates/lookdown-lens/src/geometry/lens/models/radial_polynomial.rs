@@ -1,7 +1,7 @@
 //! A polynomial of the angle, as `WoodScape` and MOIL use it.
 
 use crate::geometry::lens::{
-    ImagePlane, LensError, check::positive, curve::RadiusCurve, model::Model,
+    ImagePlane, LensError, check::positive, curve::FittedCurve, model::Model,
     polynomial::Polynomial,
 };
 
@@ -19,7 +19,6 @@ lens_parameters! {
 
 impl RadialPolynomial {
     /// Creates the lens with these coefficients and center and with square pixels.
-    #[must_use]
     pub fn new(coefficients: Vec<f64>, [cx, cy]: [f64; 2]) -> Self {
         Self {
             coefficients,
@@ -37,10 +36,10 @@ impl RadialPolynomial {
 }
 
 impl Model for RadialPolynomial {
-    type Curve = RadiusCurve;
+    type Curve = FittedCurve<Polynomial>;
 
-    fn curve(&self) -> Result<RadiusCurve, LensError> {
+    fn curve(&self) -> Result<Self::Curve, LensError> {
         let polynomial = Polynomial::from_axis("coefficients", &self.coefficients)?;
-        Ok(RadiusCurve::new(polynomial))
+        Ok(FittedCurve::radius(polynomial))
     }
 }
