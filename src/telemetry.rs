@@ -9,4 +9,4 @@ mod tracer;
 pub use incoming::IncomingTrace;
 pub use logs::{log_subscriber, start_logs};
 pub use request_trace::RequestTrace;
-pub use tracer::{Tracer, TracerError};
+pub use tracer::Tracer;

@@ -1,38 +1,14 @@
 //! XML documents of annotation files.
 
-use quick_xml::se::Serializer;
-use serde::Serialize;
+use quick_xml::escape::escape;
 
-const DECLARATION: &str = "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n";
+/// The first line of a document.
+pub(super) const DECLARATION: &str = "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n";
 
-/// Returns the document with the root element `root`.
-pub(super) fn document(root: &str, content: &impl Serialize) -> String {
-    let mut text = DECLARATION.to_owned();
-    let written = Serializer::with_root(&mut text, Some(root)).and_then(|mut serializer| {
-        serializer.indent(' ', 2).expand_empty_elements(true);
-        content.serialize(serializer)
-    });
-    debug_assert!(written.is_ok(), "{written:?}");
-    text.push('\n');
-    text
-}
-
-/// Text in which U+FFFD replaces control characters and others that XML cannot contain (XML 1.0,
-/// section 2.2), or that a parser would change.
-#[derive(Serialize)]
-#[serde(transparent)]
-pub(super) struct Text(String);
-
-impl From<&str> for Text {
-    fn from(text: &str) -> Self {
-        let is_kept = |c: char| c >= ' ' && !"\u{fffe}\u{ffff}".contains(c);
-        let kept = |c: char| {
-            if is_kept(c) {
-                c
-            } else {
-                char::REPLACEMENT_CHARACTER
-            }
-        };
-        Self(text.chars().map(kept).collect())
-    }
+/// Returns escaped text in which U+FFFD replaces control characters and others that XML cannot
+/// contain (XML 1.0, section 2.2), or that a parser would change.
+pub(super) fn escaped(text: &str) -> String {
+    let is_refused = |c: char| c < ' ' || "\u{fffe}\u{ffff}".contains(c);
+    let replaced = text.replace(is_refused, "\u{fffd}");
+    escape(replaced).into_owned()
 }

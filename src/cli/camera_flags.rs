@@ -8,7 +8,7 @@ use lookdown_watch::{CameraEntry, Transport};
 use strum::VariantNames;
 
 /// Settings of a single camera, as in a file of cameras.
-#[derive(Debug, Args)]
+#[derive(Debug, Default, PartialEq, Args)]
 #[group(id = "camera_flags", multiple = true)]
 pub(super) struct CameraFlags {
     /// The name under which the server keeps the results [default: the calibration; `run` without
@@ -76,34 +76,6 @@ impl CameraFlags {
 
     /// Returns true if there is a flag that belongs to a single camera.
     pub(super) fn is_given(&self) -> bool {
-        let Self {
-            name,
-            calibration,
-            profile,
-            every,
-            motion,
-            follow,
-            user,
-            password_file,
-            stall_after,
-            hwaccel,
-            udp,
-            keyframes_only,
-        } = self;
-        let texts = [
-            name,
-            calibration,
-            profile,
-            every,
-            user,
-            stall_after,
-            hwaccel,
-        ];
-        texts.iter().any(|text| text.is_some())
-            || password_file.is_some()
-            || motion.is_some()
-            || follow.is_some()
-            || *udp
-            || *keyframes_only
+        *self != Self::default()
     }
 }

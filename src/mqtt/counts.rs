@@ -33,7 +33,6 @@ use super::{
     session::{Session, SessionError},
     topics::{Topics, level},
 };
-use crate::tls::TlsError;
 use event_entities::{announcements, config_topics, event_topic, image_topic};
 use events::{EventImage, events, floor_alert, request_images};
 use number::{AVAILABILITY, Number, Owner};
@@ -76,12 +75,12 @@ impl CountsPublisher {
     /// Creates a publisher that is not connected yet.
     ///
     /// # Errors
-    /// [`TlsError`] when the authorities cannot be used.
+    /// If the authorities cannot be used.
     pub fn new(
         options: CountsOptions,
         snapshots: watch::Receiver<Snapshot>,
         server: ServerClient,
-    ) -> Result<Self, TlsError> {
+    ) -> anyhow::Result<Self> {
         Ok(Self {
             connector: Connector::new(
                 options.broker.clone(),

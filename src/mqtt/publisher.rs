@@ -31,7 +31,6 @@ use crate::{
     metrics::Metrics,
     reference_counts::ReferenceCounts,
     results::{self, FollowedPersons, Headline, ListenError, ResultStore, StoredReport},
-    tls::TlsError,
 };
 
 /// Most reports that wait for the broker. When the queue is full, the oldest report is not sent.
@@ -94,14 +93,14 @@ impl Publisher {
     /// Creates a publisher that is not connected yet.
     ///
     /// # Errors
-    /// [`TlsError`] when the authorities cannot be used.
+    /// If the authorities cannot be used.
     pub fn new(
         options: MqttOptions,
         results: Arc<dyn ResultStore>,
         counted: FollowedPersons,
         references: Arc<ReferenceCounts>,
         metrics: Arc<Metrics>,
-    ) -> Result<Self, TlsError> {
+    ) -> anyhow::Result<Self> {
         let connector = Connector::new(
             options.broker.clone(),
             options.authorities.as_deref(),

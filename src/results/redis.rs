@@ -43,7 +43,7 @@ use super::{
     Cameras, ListenError, Listeners, Listening, NewReport, ReportId, ResultLimits, ResultStore,
     ResultUse, StoreHealth, StoredImage, StoredReport, Unreachable,
 };
-use crate::{annotated_image::StoredFrame, metrics::Metrics, tls::TlsError};
+use crate::{annotated_image::StoredFrame, metrics::Metrics};
 
 /// Longest time that the shutdown waits for reports that Redis has not stored yet.
 const LAST_WAIT: Duration = Duration::from_secs(2);
@@ -59,12 +59,12 @@ impl RedisResults {
     /// Starts a store that connects, and reconnects, in the background. Needs a tokio runtime.
     ///
     /// # Errors
-    /// [`TlsError`] if the address needs TLS and TLS cannot be used.
+    /// If the address needs TLS and TLS cannot be used.
     pub fn start(
         options: RedisOptions,
         limits: ResultLimits,
         metrics: Arc<Metrics>,
-    ) -> Result<Self, TlsError> {
+    ) -> anyhow::Result<Self> {
         let shared = Arc::new(Shared {
             keys: Keys::new(&options.key_prefix, options.address.database()),
             followed: Followed::default(),

@@ -9,7 +9,7 @@ use super::{
     declare::settings,
     form::{Form, Refusal, flag, given_path, list, poll_seconds},
 };
-use crate::access::{KeyError, KeyList};
+use crate::access::KeyList;
 
 settings! {
     /// API keys, and the web pages that may call the server.
@@ -73,7 +73,7 @@ fn keys() -> Form<KeyList> {
         "API keys",
         |entries| {
             let keys = entries.join(",").parse();
-            keys.map_err(|error: KeyError| Refusal::Hidden(error.to_string()))
+            keys.map_err(|error: anyhow::Error| Refusal::Hidden(error.to_string()))
         },
         // No key is a default.
         |_| Vec::new(),

@@ -3,6 +3,7 @@
 
 use std::time::Duration;
 
+use anyhow::Context;
 use opentelemetry::{
     InstrumentationScope, KeyValue,
     trace::{SpanBuilder, SpanKind, TraceContextExt, Tracer as _, TracerProvider},
@@ -20,17 +21,6 @@ use crate::settings::TraceSettings;
 const LAST_DELIVERY: Duration = Duration::from_secs(3);
 const SIGNAL_PATH: &str = "v1/traces";
 
-/// The reason why traces cannot be sent.
-#[derive(Debug, thiserror::Error)]
-pub enum TracerError {
-    /// No HTTP client can be created.
-    #[error("telemetry.otlp_endpoint: no connection can be made: {0}")]
-    Client(#[from] reqwest::Error),
-    /// The exporter refuses its configuration.
-    #[error("telemetry.otlp_endpoint: {0}")]
-    Exporter(#[from] opentelemetry_otlp::ExporterBuildError),
-}
-
 /// Creates the spans of requests. The default one records nothing. Clones share its queue.
 #[derive(Debug, Clone, Default)]
 pub struct Tracer(Option<Exporting>);
@@ -46,18 +36,21 @@ impl Tracer {
     /// the collector answers. Needs a tokio runtime.
     ///
     /// # Errors
-    /// [`TracerError`], which names the setting.
-    pub fn start(settings: &TraceSettings) -> Result<Self, TracerError> {
+    /// If no connection can be made. The error names the setting.
+    pub fn start(settings: &TraceSettings) -> anyhow::Result<Self> {
         let Some(endpoint) = &settings.otlp_endpoint else {
             return Ok(Self::default());
         };
         let endpoint = endpoint.as_str().trim_end_matches('/');
+        let client = Collector::new();
+        let client = client.context("telemetry.otlp_endpoint: no connection can be made")?;
         let exporter = SpanExporter::builder()
             .with_http()
-            .with_http_client(Collector::new()?)
+            .with_http_client(client)
             .with_endpoint(format!("{endpoint}/{SIGNAL_PATH}"))
             .with_protocol(Protocol::HttpBinary)
-            .build()?;
+            .build()
+            .context("telemetry.otlp_endpoint")?;
         let version = KeyValue::new("service.version", env!("CARGO_PKG_VERSION"));
         let resource = Resource::builder()
             .with_service_name(settings.service_name.clone())

@@ -2,6 +2,7 @@
 
 use std::{path::Path, sync::Arc};
 
+use anyhow::{Context, anyhow};
 use jiff::Timestamp;
 use rustls::{
     Error, RootCertStore, ServerConfig,
@@ -13,12 +14,15 @@ use rustls::{
 };
 
 use super::{
-    TlsError, TlsOptions,
-    files::{TlsFiles, invalid, is_readable_by_others},
+    files::{TlsFiles, TlsOptions, invalid, is_readable_by_others},
     validity::Validity,
 };
+
 /// The application protocol over TLS (ALPN, RFC 7301).
 const PROTOCOL: &[u8] = b"http/1.1";
+
+/// Files that passed all checks, and that the TLS library refuses.
+const REFUSED: &str = "server.tls: these files cannot be used together: give others";
 
 /// The certificates and settings that a server uses in handshakes.
 pub(super) struct Identity {
@@ -31,7 +35,7 @@ pub(super) struct Identity {
 
 impl Identity {
     /// Validates the content of the files: the key belongs to the certificate, and all can be used.
-    pub(super) fn new(files: &TlsFiles, options: &TlsOptions) -> Result<Self, TlsError> {
+    pub(super) fn new(files: &TlsFiles, options: &TlsOptions) -> anyhow::Result<Self> {
         let provider = Arc::new(ring::default_provider());
         let certified = certified_key(files, options, &provider)?;
         let validity = certified
@@ -39,7 +43,8 @@ impl Identity {
             .ok()
             .and_then(|certificate| Validity::from_der(certificate));
         let builder = ServerConfig::builder_with_provider(Arc::clone(&provider))
-            .with_protocol_versions(&[&TLS13, &TLS12])?;
+            .with_protocol_versions(&[&TLS13, &TLS12])
+            .context(REFUSED)?;
         let builder = match files.authorities(options)? {
             Some(authorities) => {
                 builder.with_client_cert_verifier(verifier(authorities, options, provider)?)
@@ -93,18 +98,24 @@ fn certified_key(
     files: &TlsFiles,
     options: &TlsOptions,
     provider: &CryptoProvider,
-) -> Result<CertifiedKey, TlsError> {
+) -> anyhow::Result<CertifiedKey> {
     let chain = files.chain(options)?;
     let key = files.key(options)?;
-    CertifiedKey::from_der(chain, key, provider).map_err(|error| match error {
-        Error::InconsistentKeys(_) => TlsError::Mismatch {
-            private_key: options.private_key.clone(),
-            certificate: options.certificate.clone(),
-        },
-        Error::InvalidCertificate(_) => invalid(options, false, 1),
-        _ => TlsError::UnknownKey {
-            path: options.private_key.clone(),
-        },
+    CertifiedKey::from_der(chain, key, provider).map_err(|error| {
+        let file = options.private_key.display();
+        match error {
+            Error::InconsistentKeys(_) => anyhow!(
+                "server.tls.private_key: the private key in {file} is not that of the first \
+                 certificate in {} (server.tls.certificate): give both files of one pair, the \
+                 server's own certificate first",
+                options.certificate.display()
+            ),
+            Error::InvalidCertificate(_) => invalid(options, false, 1),
+            _ => anyhow!(
+                "server.tls.private_key: the private key in {file} cannot be used: give an RSA key \
+                 of 2048 bits or more, an ECDSA key on P-256 or P-384, or an Ed25519 key"
+            ),
+        }
     })
 }
 
@@ -112,12 +123,12 @@ fn verifier(
     authorities: Vec<CertificateDer<'static>>,
     options: &TlsOptions,
     provider: Arc<CryptoProvider>,
-) -> Result<Arc<dyn ClientCertVerifier>, TlsError> {
+) -> anyhow::Result<Arc<dyn ClientCertVerifier>> {
     let mut roots = RootCertStore::empty();
     for (position, certificate) in (1..).zip(authorities) {
         let added = roots.add(certificate);
         added.map_err(|_| invalid(options, true, position))?;
     }
     let verifier = WebPkiClientVerifier::builder_with_provider(Arc::new(roots), provider).build();
-    verifier.map_err(|error| TlsError::Refused(Error::General(error.to_string())))
+    verifier.context(REFUSED)
 }

@@ -1,17 +1,12 @@
 //! The data set and the interpretation of its ground truth.
 
-use std::{
-    path::{Path, PathBuf},
-    sync::Arc,
-};
+use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
-use lookdown_calibration::{Calibration, CalibrationId};
-use lookdown_detect::pipeline::CalibrationLookup;
 use lookdown_eval::{DataSet, Scoring};
 
-use crate::{app::open_calibrations, cli::SettingsFile};
+use crate::{cli::parameters::named_calibration, settings::Settings};
 
 /// The flags that select a data set.
 #[derive(Debug, Args)]
@@ -32,10 +27,10 @@ pub(in crate::cli) struct TruthFlags {
 
 impl TruthFlags {
     /// Opens the data set.
-    pub(in crate::cli) fn open(&self, settings_file: &SettingsFile) -> anyhow::Result<DataSet> {
+    pub(in crate::cli) fn open(&self, settings: &Settings) -> anyhow::Result<DataSet> {
         let mut data_set = DataSet::open(&self.data_set)?;
         if let Some(named) = &self.calibration {
-            data_set = data_set.with_calibration(&calibration(named, settings_file)?);
+            data_set = data_set.with_calibration(&named_calibration(named, settings)?);
         }
         if self.axis_parallel {
             data_set = data_set
@@ -44,15 +39,4 @@ impl TruthFlags {
         }
         Ok(data_set)
     }
-}
-
-fn calibration(named: &str, settings_file: &SettingsFile) -> anyhow::Result<Arc<Calibration>> {
-    let path = Path::new(named);
-    if path.is_file() {
-        return Ok(Arc::new(Calibration::read(path)?));
-    }
-    let strange = || format!("--calibration: {named:?} is neither a file nor a calibration's ID");
-    let id: CalibrationId = named.parse().with_context(strange)?;
-    let calibrations = open_calibrations(&settings_file.load()?)?;
-    calibrations.get(&id)?.with_context(strange)
 }

@@ -12,7 +12,7 @@ use super::{
     RedisAddress,
     pushes::{self, Pushes},
 };
-use crate::tls::{ClientTls, TlsError};
+use crate::tls::ClientTls;
 
 /// Longest time for the login, and for any reply of Redis.
 pub(super) const TIMEOUT: Duration = Duration::from_secs(2);
@@ -30,8 +30,8 @@ impl Connector {
     /// Creates a connector. Sends nothing.
     ///
     /// # Errors
-    /// [`TlsError`] if TLS cannot be used.
-    pub(super) fn new(address: RedisAddress) -> Result<Self, TlsError> {
+    /// If TLS cannot be used.
+    pub(super) fn new(address: RedisAddress) -> anyhow::Result<Self> {
         let tls = match address.client().get_connection_info().addr() {
             ConnectionAddr::TcpTls { .. } => Some(ClientTls::new("results.url", None)?),
             _ => None,
