@@ -9,7 +9,6 @@ mod cvat;
 mod geojson;
 mod label_studio;
 mod voc;
-mod xml;
 mod yolo;
 
 use strum::{Display, EnumString, VariantArray};

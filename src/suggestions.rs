@@ -5,7 +5,6 @@
 //! frame at a time. Neither frames nor images of people are kept.
 
 mod observed;
-mod shared;
 #[cfg(test)]
 mod tests;
 mod worker;
@@ -29,10 +28,10 @@ use parking_lot::Mutex;
 
 use crate::calibration_store::Calibrations;
 use observed::{Observed, Subject};
-use shared::Shared;
+use worker::Shared;
 use worker::{Work, Worker};
 
-pub(crate) use {observed::FRAMES, shared::Suggestion};
+pub(crate) use {observed::FRAMES, worker::Suggestion};
 
 /// Most cameras that are observed, beside those of this process. One that is silent makes room for
 /// a new one.

@@ -5,7 +5,6 @@ mod client;
 mod files;
 mod handshake;
 mod identity;
-mod validity;
 
 use std::{num::NonZeroU64, sync::Arc};
 

@@ -5,9 +5,8 @@ use std::fmt::Write;
 
 use lookdown_lens::geometry::OrientedBox;
 
-use super::{
-    content::{AnnotatedImage, BoxKind, FormatSpec, LABEL, Layout, SupportedBoxes},
-    xml::{DECLARATION, escaped},
+use super::content::{
+    AnnotatedImage, BoxKind, DECLARATION, FormatSpec, LABEL, Layout, SupportedBoxes, escaped,
 };
 use crate::rounding::{pixels, share};
 

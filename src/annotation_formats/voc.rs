@@ -3,9 +3,8 @@
 
 use std::fmt::Write;
 
-use super::{
-    content::{AnnotatedImage, FormatSpec, LABEL, Layout, SupportedBoxes, stem},
-    xml::{DECLARATION, escaped},
+use super::content::{
+    AnnotatedImage, DECLARATION, FormatSpec, LABEL, Layout, SupportedBoxes, escaped, stem,
 };
 
 /// The format.

@@ -16,12 +16,12 @@ impl App {
     /// Returns an error if a model cannot be loaded, or if the calibration store cannot be read.
     pub fn check(&self) -> anyhow::Result<String> {
         for name in &self.to_load {
-            self.models.load(name)?;
+            self.state.models.load(name)?;
         }
-        while !self.calibrations.is_read() {
+        while !self.state.calibrations.is_read() {
             thread::sleep(CALIBRATIONS_CHECK);
         }
-        let health = self.calibrations.health();
+        let health = self.state.calibrations.health();
         if let Some(problem) = health.store_problem {
             bail!("calibrations.path: {problem}");
         }

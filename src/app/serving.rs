@@ -1,4 +1,6 @@
 //! The life of the server, from the sockets to the last answer.
+//!
+//! The sockets that the settings describe.
 
 use std::{
     future::pending,
@@ -7,6 +9,7 @@ use std::{
     time::{Duration, Instant},
 };
 
+use anyhow::Context;
 use lookdown_http::{
     Shutdown,
     server::{self, Plain},
@@ -20,10 +23,10 @@ use tokio::{
     time::{sleep, timeout},
 };
 
-use super::{App, CALIBRATIONS_CHECK, Sockets, systemd};
+use super::{App, CALIBRATIONS_CHECK, systemd};
 use crate::{
     api::{self, Phase},
-    settings::Settings,
+    settings::{ServerSettings, Settings, variable_of},
 };
 
 /// Longest time, 3 seconds, that the shutdown waits for the MQTT broker.
@@ -63,7 +66,7 @@ impl App {
             tls,
             router,
             limits,
-            &self.metrics.connections,
+            &self.state.metrics.connections,
             &shutdown,
         );
         // Waits for both: the process must not exit while a model is being loaded.
@@ -73,13 +76,13 @@ impl App {
                 Ok(())
             };
             tokio::try_join!(self.load_models(scheme, address, &shutdown), connections)?;
-            let workers = Arc::clone(&self.workers);
+            let workers = Arc::clone(&self.state.workers);
             spawn_blocking(move || workers.shut_down()).await?;
             if let Some(publishing) = publishing {
                 // The results have ended. If the broker takes too long, it publishes the will.
                 let _ = timeout(MQTT_SHUTDOWN_TIMEOUT, publishing).await;
             }
-            self.results.flush().await;
+            self.state.results.flush().await;
             tracing::info!("stopped");
             anyhow::Ok(())
         };
@@ -89,10 +92,11 @@ impl App {
             }
         };
         let limit = self.state.stall_limit();
-        let is_stuck = || self.workers.stall(Instant::now(), limit).is_some();
+        let is_stuck = || self.state.workers.stall(Instant::now(), limit).is_some();
         let alongside = async {
             // In memory of its own: the future of the server has a limit.
-            let notifications = Box::pin(systemd::notify(&self.readiness, &shutdown, is_stuck));
+            let notifications =
+                Box::pin(systemd::notify(&self.state.readiness, &shutdown, is_stuck));
             join!(operation, notifications);
             pending::<()>().await;
         };
@@ -117,7 +121,7 @@ impl App {
     /// ends during a load.
     async fn end_of_load(&self) {
         let ended = async {
-            while self.models.is_loading() {
+            while self.state.models.is_loading() {
                 sleep(LOAD_CHECK).await;
             }
         };
@@ -133,7 +137,7 @@ impl App {
             None,
             router,
             limits,
-            &self.metrics.connections,
+            &self.state.metrics.connections,
             &Shutdown::default(),
         )
         .await;
@@ -145,7 +149,7 @@ impl App {
         let grace = self.settings.shutdown.grace;
         let drain_timeout = self.settings.drain_timeout();
         shutdown.requested().await;
-        self.readiness.stopping();
+        self.state.readiness.stopping();
         tracing::info!("stopping");
         tokio::select! {
             () = sleep(grace) => {}
@@ -153,7 +157,7 @@ impl App {
         }
         tracing::info!("draining: requests in flight are finished");
         // Streams of results would never end by themselves.
-        self.results.listeners().end();
+        self.state.results.listeners().end();
         shutdown.drain();
         sleep(drain_timeout).await;
     }
@@ -162,8 +166,8 @@ impl App {
     /// loaded.
     async fn load(&self, name: String, shutdown: &Shutdown) -> anyhow::Result<()> {
         loop {
-            let loaded = if self.models.is_remote_available() {
-                let (models, name) = (Arc::clone(&self.models), name.clone());
+            let loaded = if self.state.models.is_remote_available() {
+                let (models, name) = (Arc::clone(&self.state.models), name.clone());
                 Some(spawn_blocking(move || models.load(&name)).await?)
             } else {
                 None
@@ -195,12 +199,12 @@ impl App {
             }
             self.load(name, shutdown).await?;
         }
-        while !self.calibrations.is_read() && !shutdown.is_requested() {
+        while !self.state.calibrations.is_read() && !shutdown.is_requested() {
             sleep(CALIBRATIONS_CHECK).await;
         }
         // Each profile needs its model: a server with some of them would refuse the others' frames.
-        if self.readiness.phase() == Phase::WarmingUp && !shutdown.is_requested() {
-            self.readiness.warmed_up();
+        if self.state.readiness.phase() == Phase::WarmingUp && !shutdown.is_requested() {
+            self.state.readiness.warmed_up();
             let port = address.port();
             tracing::info!(
                 "ready: the page is {scheme}://localhost:{port}, try curl -F img=@samples/office.jpg \
@@ -250,4 +254,36 @@ fn log_start(settings: &Settings, scheme: &str, address: SocketAddr) {
         calibrations = %settings.calibrations.path.display(),
         "listening on {scheme}://{address}, API page at {scheme}://{address}/docs"
     );
+}
+
+/// The sockets of the service.
+#[derive(Debug)]
+pub struct Sockets {
+    /// All endpoints, or all except metrics.
+    pub main: TcpListener,
+    /// Metrics and probes only, if the settings ask for a separate port.
+    pub metrics: Option<TcpListener>,
+}
+
+impl Sockets {
+    /// Binds the addresses of the settings.
+    ///
+    /// # Errors
+    /// One sentence that names the setting, for an address that is in use or not one of this
+    /// machine.
+    pub async fn bind(settings: &ServerSettings) -> anyhow::Result<Self> {
+        let main = bind("server.listen", settings.listen).await?;
+        let metrics = match settings.metrics_listen {
+            Some(address) => Some(bind("server.metrics_listen", address).await?),
+            None => None,
+        };
+        Ok(Self { main, metrics })
+    }
+}
+
+async fn bind(key: &str, address: SocketAddr) -> anyhow::Result<TcpListener> {
+    TcpListener::bind(address).await.with_context(|| {
+        let variable = variable_of(key);
+        format!("{key}: cannot listen on {address}: set {variable} or --listen to a free address")
+    })
 }

@@ -5,10 +5,8 @@ mod convert;
 mod fit;
 mod frame_file;
 mod height;
-mod native_output;
 mod people;
 mod place;
-mod report_file;
 mod source;
 mod suggest_area;
 

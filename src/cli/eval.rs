@@ -2,7 +2,6 @@
 
 mod arguments;
 mod table;
-mod truth;
 
 use std::{
     io::{self, Write},

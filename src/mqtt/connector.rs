@@ -8,8 +8,7 @@ use uuid::Uuid;
 
 use super::{
     Broker,
-    message::Message,
-    session::{Session, SessionError},
+    session::{Message, Session, SessionError},
 };
 use crate::tls::ClientTls;
 

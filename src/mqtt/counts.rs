@@ -26,11 +26,9 @@ use tokio::{
 use super::{
     Broker,
     connector::Connector,
-    discovery::{OFFLINE, ONLINE},
-    entity,
-    message::Message,
+    discovery::{self, OFFLINE, ONLINE},
     retained::RetainedTopics,
-    session::{Session, SessionError},
+    session::{Message, Session, SessionError},
     topics::{Topics, level},
 };
 use event_entities::{announcements, config_topics, event_topic, image_topic};
@@ -254,8 +252,8 @@ impl CountsPublisher {
         self.topics.counts(&topic)
     }
 
-    fn device<'a>(&self, owner: Owner<'_>, name: &'a str) -> entity::Device<'a> {
-        entity::Device {
+    fn device<'a>(&self, owner: Owner<'_>, name: &'a str) -> discovery::Device<'a> {
+        discovery::Device {
             id: format!("{}_{}", level(&self.options.topic_prefix), owner.device()),
             name,
         }

@@ -3,13 +3,16 @@
 //! With enough reference counts, it is the number that they teach. Else it is the number of persons
 //! that the counts follow, while it is known, and else that of the reports. Numbers of reports are
 //! medians. Without reference counts, all servers with one result store have the same number.
+//!
+//! The numbers of persons that the counts follow.
 
-use std::{num::NonZeroUsize, sync::Arc, time::Duration};
+use std::{fmt, num::NonZeroUsize, sync::Arc, time::Duration};
 
 use lookdown_common::OwnCameras;
 use lookdown_tracking::taught::{NumberWithBar, TaughtNumber};
+use parking_lot::RwLock;
 
-use super::{Cameras, FollowedPersons, ReportId, ResultStore, StoredReport, Unreachable};
+use super::{Cameras, ReportId, ResultStore, StoredReport, Unreachable};
 use crate::reference_counts::ReferenceCounts;
 
 /// The reports of this time before the latest one, inclusively, have a part in the median.
@@ -143,6 +146,34 @@ fn median(numbers: &[NumberWithBar]) -> Option<NumberWithBar> {
         low: of(|number| number.low),
         high: of(|number| number.high),
     })
+}
+
+/// Returns the number of a camera; `None` while it is unknown.
+type Source = Arc<dyn Fn(&str) -> Option<u64> + Send + Sync>;
+
+/// The persons that the counts of this process or of `counts.url` follow, if there are any. Clones
+/// share them.
+#[derive(Clone, Default)]
+pub struct FollowedPersons(Arc<RwLock<Option<Source>>>);
+
+impl FollowedPersons {
+    /// Replaces the source of the numbers.
+    pub fn set(&self, source: impl Fn(&str) -> Option<u64> + Send + Sync + 'static) {
+        *self.0.write() = Some(Arc::new(source));
+    }
+
+    /// Returns the number of a camera; `None` while it is unknown.
+    #[must_use]
+    pub fn at(&self, camera: &str) -> Option<usize> {
+        let source = self.0.read().clone()?;
+        usize::try_from(source(camera)?).ok()
+    }
+}
+
+impl fmt::Debug for FollowedPersons {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("FollowedPersons")
+    }
 }
 
 #[cfg(test)]

@@ -6,10 +6,6 @@
 //! and detection does not wait for them.
 
 mod address;
-mod connect;
-mod followed;
-mod keys;
-mod link;
 mod message;
 mod news;
 mod outbox;
@@ -28,16 +24,15 @@ use lookdown_detect::fairness::Client;
 use redis::RedisResult;
 use tokio::{task::JoinSet, time::timeout};
 
-pub use self::address::{RedisAddress, RedisAddressError};
-pub use self::shared::RedisOptions;
 use self::{
-    connect::{Connector, TIMEOUT},
-    followed::Followed,
-    keys::Keys,
-    link::Link,
+    address::{Connector, TIMEOUT},
     outbox::Outbox,
     reading::Reader,
-    shared::Shared,
+    shared::{Followed, Keys, Link, Shared},
+};
+pub use self::{
+    address::{RedisAddress, RedisAddressError},
+    shared::RedisOptions,
 };
 use super::{
     Cameras, ListenError, Listeners, Listening, NewReport, ReportId, ResultLimits, ResultStore,

@@ -57,14 +57,13 @@ impl AccessSettings {
         if listen.ip().is_loopback() || self.needs_keys() || self.open {
             return Ok(());
         }
-        Err(SettingsError::Value {
-            key: "server.listen",
-            value: listen.to_string(),
-            remedy: "other machines reach this address and no API keys are set: set \
+        Err(SettingsError::value(
+            "server.listen",
+            listen,
+            "other machines reach this address and no API keys are set: set \
                      access.keys_file, or set access.open to true to let every client detect and \
-                     read"
-                .to_owned(),
-        })
+                     read",
+        ))
     }
 }
 

@@ -22,7 +22,7 @@ use lookdown_lens::geometry::{
 };
 
 use super::{
-    native_output::refuse_input,
+    frame_file::refuse_input,
     read_frame,
     source::{NamedCamera, Source},
 };

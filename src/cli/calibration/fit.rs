@@ -10,7 +10,7 @@ use std::process::ExitCode;
 use anyhow::Context;
 
 use super::{
-    native_output::{refuse_input, write_native},
+    frame_file::{refuse_input, write_native},
     people::{PeopleSource, set_height},
     read_frames,
 };

@@ -6,8 +6,7 @@ use anyhow::Context;
 use clap::Args;
 
 use super::{
-    frame_file::read_frames,
-    native_output::write_native,
+    frame_file::{read_frames, write_native},
     people::{PeopleSource, set_height},
     source::Source,
 };

@@ -4,7 +4,7 @@ use serde_json::json;
 
 use super::events::TYPES;
 use crate::mqtt::{
-    entity::{Device, EVENT, IMAGE},
+    discovery::{Device, EVENT, IMAGE},
     topics::{Topics, level},
 };
 
