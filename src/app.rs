@@ -1,11 +1,9 @@
 //! The composition root: settings → engine → workers → service.
 
 mod api_options;
-mod check;
 mod models;
 mod pollers;
 mod serving;
-mod systemd;
 
 use std::{sync::Arc, time::Duration};
 

@@ -44,7 +44,7 @@ use crate::{
 const UNAUTHENTICATED_SHARE: usize = 8;
 
 /// The options of the API: access rules and limits.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 #[expect(clippy::struct_excessive_bools, reason = "independent settings")]
 pub struct ApiOptions {
     /// Largest request body, bytes.

@@ -3,7 +3,6 @@
 mod check;
 mod convert;
 mod fit;
-mod frame_file;
 mod height;
 mod people;
 mod place;
@@ -14,7 +13,7 @@ use std::process::ExitCode;
 
 use clap::Subcommand;
 
-use self::frame_file::{read_frame, read_frames};
+use self::source::{read_frame, read_frames};
 
 /// The subcommands for calibrations.
 #[derive(Debug, Subcommand)]

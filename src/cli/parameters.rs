@@ -89,10 +89,15 @@ impl<const IS_ANNOTATION: bool> Flags<IS_ANNOTATION> {
 
 impl<const IS_ANNOTATION: bool> Args for Flags<IS_ANNOTATION> {
     fn augment_args(command: Command) -> Command {
-        command.args(Self::offered().map(|spec| match IS_ANNOTATION {
-            true => flag(spec).requires(ANNOTATE),
-            false => flag(spec),
-        }))
+        let flag = |spec| {
+            let flag = flag(spec);
+            if IS_ANNOTATION {
+                flag.requires(ANNOTATE)
+            } else {
+                flag
+            }
+        };
+        command.args(Self::offered().map(flag))
     }
 
     fn augment_args_for_update(command: Command) -> Command {

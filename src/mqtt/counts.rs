@@ -1,7 +1,6 @@
 //! Publishes the counts of `lookdown count`: totals, occupancy and dwell times, with their
 //! announcements to Home Assistant.
 
-mod event_entities;
 mod events;
 mod number;
 
@@ -31,8 +30,8 @@ use super::{
     session::{Message, Session, SessionError},
     topics::{Topics, level},
 };
-use event_entities::{announcements, config_topics, event_topic, image_topic};
 use events::{EventImage, events, floor_alert, request_images};
+use events::{announcements, config_topics, event_topic, image_topic};
 use number::{AVAILABILITY, Number, Owner};
 
 /// Most images of events that wait. Further ones are not requested.

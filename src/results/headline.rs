@@ -6,7 +6,7 @@
 //!
 //! The numbers of persons that the counts follow.
 
-use std::{fmt, num::NonZeroUsize, sync::Arc, time::Duration};
+use std::{num::NonZeroUsize, sync::Arc, time::Duration};
 
 use lookdown_common::OwnCameras;
 use lookdown_tracking::taught::{NumberWithBar, TaughtNumber};
@@ -21,7 +21,8 @@ pub const MEDIAN_WINDOW: Duration = Duration::from_secs(5);
 const MOST_REPORTS: usize = 500;
 
 /// The origin of a headline number.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, strum::IntoStaticStr)]
+#[strum(serialize_all = "snake_case")]
 pub enum HeadlineSource {
     /// The median of the last reports, with the threshold of the camera.
     Taught,
@@ -92,19 +93,6 @@ impl Headline {
     }
 }
 
-impl HeadlineSource {
-    /// The name in the API.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Taught => "taught",
-            Self::Tracks => "tracks",
-            Self::Median => "median",
-            Self::Paused => "paused",
-        }
-    }
-}
-
 /// Returns the median of each report and those before it in the window, in the order of the
 /// reports.
 #[must_use]
@@ -167,12 +155,6 @@ impl FollowedPersons {
     pub fn at(&self, camera: &str) -> Option<usize> {
         let source = self.0.read().clone()?;
         usize::try_from(source(camera)?).ok()
-    }
-}
-
-impl fmt::Debug for FollowedPersons {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str("FollowedPersons")
     }
 }
 
@@ -257,7 +239,7 @@ mod tests {
             own.set([("hall".to_owned(), is_paused)].into());
             let headline = headline_of(&store, &latest, &own, Some(5)).await;
             assert_eq!(
-                (persons(headline), headline.source.name()),
+                (persons(headline), <&str>::from(headline.source)),
                 (expected, source)
             );
         }
@@ -286,7 +268,10 @@ mod tests {
                 (4, "tracks")
             };
             assert_eq!(
-                (headline.number.unwrap().persons, headline.source.name()),
+                (
+                    headline.number.unwrap().persons,
+                    <&str>::from(headline.source)
+                ),
                 expected
             );
         }

@@ -7,7 +7,6 @@
 
 mod address;
 mod message;
-mod news;
 mod outbox;
 mod pushes;
 mod reading;

@@ -17,8 +17,7 @@ use tempfile::TempDir;
 
 use super::{
     MAX_CAMERAS, SILENCE, make_room,
-    observed::{FRAMES, Observed, Subject},
-    worker::{Shared, Worker},
+    worker::{FRAMES, Observed, Shared, Subject, Worker},
 };
 use crate::calibration_store::{Calibrations, FolderStore};
 use lookdown_common::OwnCameras;

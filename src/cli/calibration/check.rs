@@ -22,9 +22,8 @@ use lookdown_lens::geometry::{
 };
 
 use super::{
-    frame_file::refuse_input,
     read_frame,
-    source::{NamedCamera, Source},
+    source::{NamedCamera, Source, refuse_input},
 };
 use crate::cli::output::UNWRITABLE;
 

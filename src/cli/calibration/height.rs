@@ -6,9 +6,8 @@ use anyhow::Context;
 use clap::Args;
 
 use super::{
-    frame_file::{read_frames, write_native},
     people::{PeopleSource, set_height},
-    source::Source,
+    source::{Source, read_frames, write_native},
 };
 use crate::cli::settings_file::SettingsFile;
 
