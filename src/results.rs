@@ -8,12 +8,9 @@ mod redis;
 mod report;
 mod store;
 
-pub use headline::FollowedPersons;
-pub use headline::{Headline, HeadlineSource, MEDIAN_WINDOW, medians};
-pub use listeners::{ListenError, Listeners, Listening};
+pub use headline::{FollowedPersons, Headline, HeadlineSource, MEDIAN_WINDOW, medians};
+pub use listeners::{ListenError, Listeners, Listening, Unreachable};
 pub use memory::MemoryResults;
 pub use redis::{RedisAddress, RedisAddressError, RedisOptions, RedisResults};
 pub use report::{Cameras, NewReport, ReportId, StoredReport};
-pub use store::{
-    ImagesOf, ResultLimits, ResultStore, ResultUse, StoreHealth, StoredImage, Unreachable,
-};
+pub use store::{ImagesOf, ResultLimits, ResultStore, ResultUse, StoreHealth, StoredImage};

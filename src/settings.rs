@@ -14,6 +14,7 @@ mod entry;
 mod error;
 mod form;
 mod inference;
+mod lists;
 mod locate;
 mod mqtt;
 mod observability;
@@ -32,10 +33,10 @@ use lookdown_common::ServerEntry;
 pub use access::AccessSettings;
 pub use calibrations::{CalibrationSettings, StateSettings};
 pub use counts::CountSettings;
-pub use counts::ListSettings;
 pub use engine_errors::explain;
 pub use error::SettingsError;
 pub use inference::{InferenceSettings, ModelSettings, RemoteSettings};
+pub use lists::ListSettings;
 pub use locate::{
     PackagedFiles, find_calibrations, find_installed, is_installed, use_packaged_files,
 };

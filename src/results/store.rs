@@ -1,7 +1,5 @@
 //! The interface of a result store.
 //!
-//! The error of a result store that does not answer.
-//!
 //! An image that is kept for a camera, and the set of cameras whose images may be kept.
 
 use std::{collections::BTreeSet, num::NonZeroUsize, sync::Arc, time::Duration};
@@ -9,7 +7,9 @@ use std::{collections::BTreeSet, num::NonZeroUsize, sync::Arc, time::Duration};
 use async_trait::async_trait;
 use lookdown_detect::fairness::Client;
 
-use super::{Cameras, ListenError, Listeners, Listening, NewReport, ReportId, StoredReport};
+use super::{
+    Cameras, ListenError, Listeners, Listening, NewReport, ReportId, StoredReport, Unreachable,
+};
 use crate::annotated_image::StoredFrame;
 
 /// A result store. Its return values are shared, not copied.
@@ -151,11 +151,6 @@ pub struct StoreHealth {
     /// The number of reports that wait to be stored.
     pub waiting: usize,
 }
-
-/// The result store does not answer.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("the result store does not answer: {0}")]
-pub struct Unreachable(pub String);
 
 /// A kept image: that of its camera's latest report.
 #[derive(Debug, Clone, PartialEq, Eq)]

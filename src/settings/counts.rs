@@ -2,19 +2,14 @@
 //! to.
 //!
 //! The server of `lookdown watch` and `lookdown count` on another machine.
-//!
-//! The tables of the settings file that are lists: cameras and webhooks.
 
 use std::{net::SocketAddr, path::PathBuf, time::Duration};
 
-use lookdown_common::{ServerEntry, parse_toml};
-use lookdown_count::{CountEntry, WebhookEntry};
-use lookdown_watch::CameraEntry;
-use serde::Deserialize;
+use lookdown_common::ServerEntry;
+use lookdown_count::CountEntry;
 use url::Url;
 
 use super::{
-    SettingsError,
     declare::settings,
     form::{address, duration, flag, optional, path, text, web_address, whole},
 };
@@ -104,35 +99,5 @@ impl UpstreamKeys {
             api_key_file: self.api_key_file,
             authorities: self.authorities,
         }
-    }
-}
-
-/// The names of these tables.
-pub(super) const NAMES: [&str; 3] = ["cameras", "camera_defaults", "webhooks"];
-/// These tables as they are written.
-pub(super) const TABLES: [&str; 3] = ["[[cameras]]", "[camera_defaults]", "[[webhooks]]"];
-
-/// Cameras and webhooks as they are written.
-#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
-pub struct ListSettings {
-    /// The values of keys that a camera does not have.
-    #[serde(default)]
-    pub camera_defaults: CameraEntry,
-    /// The cameras of `lookdown run` and `lookdown watch`.
-    #[serde(default)]
-    pub cameras: Vec<CameraEntry>,
-    /// The receivers of messages of `lookdown run` and `lookdown count`.
-    #[serde(default)]
-    pub webhooks: Vec<WebhookEntry>,
-}
-
-impl ListSettings {
-    /// The lists in the text of a settings file.
-    pub(super) fn read(text: &str) -> Result<Self, SettingsError> {
-        Ok(parse_toml(
-            text,
-            "the settings file",
-            "docs/configuration.md",
-        )?)
     }
 }

@@ -1,6 +1,6 @@
 //! A setting in the reference, and the error for keys that no setting has.
 
-use super::{SettingsError, counts, form::Form};
+use super::{SettingsError, form::Form, lists};
 
 /// A setting as the reference shows it.
 #[derive(Debug, Clone)]
@@ -63,7 +63,7 @@ pub(super) fn unknown(place: &str, key: &str, entries: &[Entry]) -> SettingsErro
     };
     known.dedup();
     if !is_table {
-        known.extend(counts::TABLES);
+        known.extend(lists::TABLES);
     }
     // Similar names, such as that of the list `cameras` for a table `camera`, come first.
     known.sort_by_key(|known| name.is_empty() || !known.trim_matches('[').starts_with(name));

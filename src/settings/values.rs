@@ -11,9 +11,9 @@ use toml::{Table, Value};
 
 use super::{
     SettingsError,
-    counts::{self, ListSettings},
     entry::{Entry, unknown},
     form::{Form, Written},
+    lists::{self, ListSettings},
     variables,
 };
 
@@ -42,7 +42,7 @@ impl Values {
             if let Some(version) = table.remove(StoredFile::KEY) {
                 check_version(path, &version)?;
             }
-            let lists = counts::NAMES
+            let lists = lists::NAMES
                 .iter()
                 .filter(|name| table.remove(**name).is_some());
             if lists.count() > 0 {
