@@ -1,15 +1,11 @@
 //! Access control: API keys with a name and scopes. Only the digests of keys are stored.
 
 mod digest;
-mod error;
 mod key_list;
-mod key_name;
 mod keys;
 mod scope;
 
 pub use digest::{KeyDigest, new_key};
-pub use error::KeyError;
-pub use key_list::{Holder, KeyList};
-pub use key_name::{InvalidKeyName, KeyName};
+pub use key_list::{Holder, InvalidKeyName, KeyList, KeyName};
 pub use keys::AccessKeys;
 pub use scope::{Scope, Scopes};

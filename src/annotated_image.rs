@@ -2,7 +2,6 @@
 //! file format. Frames can also be kept to be drawn into later.
 
 mod kept;
-mod marks;
 mod options;
 mod sketch;
 

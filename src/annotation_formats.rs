@@ -6,21 +6,15 @@ mod cepdof;
 mod coco;
 mod content;
 mod cvat;
-mod format_spec;
 mod geojson;
 mod label_studio;
-mod report;
 mod voc;
-mod xml;
 mod yolo;
 
 use strum::{Display, EnumString, VariantArray};
 
 pub use self::content::{AnnotatedBox, AnnotatedImage, AnnotationFile, BoxKind};
-use self::{
-    content::{LABEL, file, stem},
-    format_spec::{FormatSpec, Layout, SupportedBoxes},
-};
+use self::content::{FormatSpec, Layout, SupportedBoxes, file};
 
 /// Declares [`AnnotationFormat`]: for each format a description, a variant and its module.
 macro_rules! annotation_formats {

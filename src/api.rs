@@ -30,7 +30,7 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
 use self::{
-    detect::headers::{PERSON_COUNT, SERVER_TIMING},
+    detect::report::{PERSON_COUNT, SERVER_TIMING},
     http::{
         context::ContextSource,
         cors, drain_body,

@@ -1,13 +1,9 @@
 //! The composition root: settings → engine → workers → service.
 
 mod api_options;
-mod check;
 mod models;
 mod pollers;
-mod reload;
 mod serving;
-mod sockets;
-mod systemd;
 
 use std::{sync::Arc, time::Duration};
 
@@ -41,8 +37,8 @@ use crate::{
     views::Views,
 };
 
-pub use reload::Reloader;
-pub use sockets::Sockets;
+pub use pollers::Reloader;
+pub use serving::Sockets;
 
 pub(crate) use models::onnx_options;
 
@@ -142,21 +138,12 @@ pub fn engine_for(settings: &Settings, requests: &[DetectParameters]) -> anyhow:
 pub struct App {
     /// Names of the models to load. Readiness waits for the first.
     to_load: Vec<String>,
-    models: Arc<ModelRepository>,
-    calibrations: Arc<Calibrations>,
-    workers: Arc<WorkerPool>,
-    results: Arc<dyn ResultStore>,
-    readiness: Readiness,
-    metrics: Arc<Metrics>,
     /// The API keys, if there are any.
     keys: Option<Arc<AccessKeys>>,
     /// The certificate, if TLS is configured.
     tls: Option<Arc<Tls>>,
     /// The MQTT publisher, if a broker is configured.
     publisher: Option<Publisher>,
-    tracer: Tracer,
-    companions: Companions,
-    views: Arc<Views>,
     state: ApiState,
     settings: Box<Settings>,
 }
@@ -165,7 +152,7 @@ impl App {
     /// Returns the metrics of the server.
     #[must_use]
     pub fn metrics(&self) -> &Metrics {
-        &self.metrics
+        &self.state.metrics
     }
 
     /// Starts the workers. No model is loaded yet: [`App::serve`] does that. Needs a tokio runtime.
@@ -194,13 +181,11 @@ impl App {
         );
         let workers = WorkerPool::start(&Arc::new(engine), workers, capacity)
             .context("the operating system creates no thread for a worker")?;
-        let workers = Arc::new(workers);
         let companions = companions(&settings.counts)?;
         let own = companions.own_cameras();
         let results = open_results(&settings.results, own, Arc::clone(&metrics))?;
         let references = ReferenceCounts::open(&settings.state.path, Timestamp::now());
         let references = Arc::new(references);
-        let readiness = Readiness::default();
         let tls = match settings.tls.clone() {
             Some(options) => Some(Arc::new(Tls::open(options, Arc::clone(&metrics))?)),
             None => None,
@@ -233,37 +218,21 @@ impl App {
         );
         views.load()?;
         let views = Arc::new(views);
-        let options = api_options(
-            &settings,
-            Arc::clone(&views),
-            access,
-            companions.clone(),
-            references,
-            tracer.clone(),
-        );
+        let options = api_options(&settings, views, access, companions, references, tracer);
         let state = ApiState::new(
-            Arc::clone(&workers),
-            Arc::clone(&models),
-            Arc::clone(&calibrations),
-            Arc::clone(&results),
-            Arc::clone(&metrics),
-            readiness.clone(),
+            Arc::new(workers),
+            models,
+            calibrations,
+            results,
+            metrics,
+            Readiness::default(),
             options,
         );
         Ok(Self {
             to_load,
-            models,
-            calibrations,
-            workers,
-            results,
-            readiness,
-            metrics,
             keys,
             tls,
             publisher: publisher.transpose()?,
-            tracer,
-            companions,
-            views,
             state,
             settings: Box::new(settings),
         })
@@ -272,13 +241,14 @@ impl App {
     /// The cameras and counts of this process.
     #[must_use]
     pub fn companions(&self) -> Companions {
-        self.companions.clone()
+        self.state.options.companions.clone()
     }
 
     /// Answers requests to `/cameras` with these cameras, and publishes a switch for each to MQTT.
     pub fn set_cameras(&mut self, cameras: &Arc<Cameras>) {
-        self.views.show_frames(cameras.viewers());
-        self.companions.set_cameras(Arc::clone(cameras));
+        let options = &self.state.options;
+        options.views.show_frames(cameras.viewers());
+        options.companions.set_cameras(Arc::clone(cameras));
         if let Some(publisher) = &mut self.publisher {
             publisher.add_switches(Arc::clone(cameras));
         }
@@ -288,19 +258,19 @@ impl App {
     #[must_use]
     pub fn in_process(&self) -> InProcess {
         let router = api::in_process_router(self.state.clone());
-        api::in_process(router, self.companions.own_cameras())
+        api::in_process(router, self.companions().own_cameras())
     }
 
     /// The readiness of the app. Clones share its state.
     #[must_use]
     pub fn readiness(&self) -> Readiness {
-        self.readiness.clone()
+        self.state.readiness.clone()
     }
 
     /// The tracer of the requests. The caller shuts it down at the end of the process.
     #[must_use]
     pub fn tracer(&self) -> Tracer {
-        self.tracer.clone()
+        self.state.options.tracer.clone()
     }
 }
 

@@ -1,9 +1,7 @@
 //! The cameras of `lookdown run` that are added over HTTP: a file in the state folder, with each
 //! password in a file of its own, and the states of all cameras.
 
-mod error;
 mod state_folder;
-mod stored;
 mod switches;
 
 use std::{
@@ -19,12 +17,12 @@ use lookdown_watch::{
 };
 use parking_lot::{Mutex, RwLock};
 use secrecy::ExposeSecret;
-use stored::{CameraFile, FILE, TEST, check_name, entry};
+use state_folder::{CameraFile, FILE, TEST, check_name, entry};
 use tokio::sync::Semaphore;
 
-pub use error::CameraError;
+pub use state_folder::CameraError;
 pub(crate) use state_folder::StateFolder;
-pub use stored::{Stored, StoredCamera};
+pub use state_folder::{Stored, StoredCamera};
 
 /// Longest wait for the frame of a test.
 const TEST_TIMEOUT: Duration = Duration::from_secs(15);

@@ -3,7 +3,6 @@
 mod annotate;
 mod async_runtime;
 mod calibration;
-mod camera_flags;
 mod complete;
 mod count;
 mod detect;
@@ -18,7 +17,6 @@ mod run;
 mod serve;
 mod server_flags;
 mod settings_file;
-mod shell;
 mod watch;
 
 use std::{
@@ -77,9 +75,9 @@ enum Command {
         counts: bool,
     },
     /// Print shell completions
-    Completions(shell::CompletionArguments),
+    Completions(complete::CompletionArguments),
     /// Write the manual pages
-    Manual(shell::ManualArguments),
+    Manual(complete::ManualArguments),
 }
 
 /// Runs a command line, whose first argument is the name of the program. `commit` is the commit
@@ -105,8 +103,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, commit: Option<&str>) 
         Command::Model(command) => model::run(&command),
         Command::Key(command) => key::run(&command),
         Command::Openapi { counts } => print_openapi(counts),
-        Command::Completions(arguments) => shell::print_completions(&arguments),
-        Command::Manual(arguments) => shell::write_manual(&arguments, command(commit)),
+        Command::Completions(arguments) => complete::print_completions(&arguments),
+        Command::Manual(arguments) => complete::write_manual(&arguments, command(commit)),
     };
     match outcome {
         Ok(code) => code,

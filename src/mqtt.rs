@@ -7,15 +7,10 @@
 mod broker;
 mod camera;
 mod cameras;
-mod connection;
 mod connector;
 mod counts;
 mod discovery;
-mod entity;
-mod images;
-mod message;
 mod occupancy;
-mod packet_codec;
 mod publisher;
 mod retained;
 mod session;

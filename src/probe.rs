@@ -5,7 +5,8 @@ use std::{
     time::Duration,
 };
 
-use reqwest::{Client, StatusCode, redirect};
+use anyhow::{Context, bail, ensure};
+use reqwest::{Client, redirect};
 
 use crate::settings::Settings;
 
@@ -22,44 +23,12 @@ pub enum Probe {
     Readiness,
 }
 
-/// The reason why a health check failed.
-#[derive(Debug, thiserror::Error)]
-pub enum ProbeError {
-    /// The port is chosen by the system and not known here.
-    #[error(
-        "server.listen: with port 0 the system chooses the port: set a fixed port for health checks"
-    )]
-    PortOfTheSystem,
-    /// The HTTP client cannot be created.
-    #[error("the HTTP client cannot be created")]
-    Client(#[source] reqwest::Error),
-    /// There was no answer.
-    #[error("{url} does not answer: is `lookdown serve` running with these settings?{hint}")]
-    Silent {
-        /// The URL of the request.
-        url: String,
-        /// An additional hint.
-        hint: &'static str,
-        /// The cause.
-        #[source]
-        source: reqwest::Error,
-    },
-    /// The server answered with another status than 200.
-    #[error("{url} answered {status}: see its body and the server's log")]
-    Refused {
-        /// The URL of the request.
-        url: String,
-        /// The status of the answer.
-        status: StatusCode,
-    },
-}
-
 /// Checks the server with these settings. Returns the URL that answered 200. Ends within three
 /// seconds.
 ///
 /// # Errors
-/// [`ProbeError`] when the answer is no, or there is none.
-pub async fn ask(settings: &Settings, probe: Probe) -> Result<String, ProbeError> {
+/// If the answer is no, or there is none.
+pub async fn ask(settings: &Settings, probe: Probe) -> anyhow::Result<String> {
     let url = url(settings, probe)?;
     // Fails when there is one already, which is as good.
     let _ = rustls::crypto::ring::default_provider().install_default();
@@ -71,31 +40,38 @@ pub async fn ask(settings: &Settings, probe: Probe) -> Result<String, ProbeError
         // is sent.
         .tls_danger_accept_invalid_certs(true)
         .build()
-        .map_err(ProbeError::Client)?;
-    match client.get(&url).send().await {
-        Ok(answer) if answer.status().is_success() => Ok(url),
-        Ok(answer) => Err(ProbeError::Refused {
-            url,
-            status: answer.status(),
-        }),
-        Err(error) => Err(ProbeError::Silent {
-            url,
-            hint: hint(settings),
-            source: error.without_url(),
-        }),
-    }
+        .context("the HTTP client cannot be created")?;
+    let answer = client
+        .get(&url)
+        .send()
+        .await
+        .map_err(reqwest::Error::without_url);
+    let hint = hint(settings);
+    let status = answer
+        .with_context(|| {
+            format!("{url} does not answer: is `lookdown serve` running with these settings?{hint}")
+        })?
+        .status();
+    ensure!(
+        status.is_success(),
+        "{url} answered {status}: see its body and the server's log"
+    );
+    Ok(url)
 }
 
 /// Returns the URL of a probe: on the metrics port if there is one, because that port speaks plain
 /// HTTP and requests no client certificate.
-fn url(settings: &Settings, probe: Probe) -> Result<String, ProbeError> {
+fn url(settings: &Settings, probe: Probe) -> anyhow::Result<String> {
     let (scheme, address) = match (settings.server.metrics_listen, &settings.tls) {
         (Some(address), _) => ("http", address),
         (None, Some(_)) => ("https", settings.server.listen),
         (None, None) => ("http", settings.server.listen),
     };
     if address.port() == 0 {
-        return Err(ProbeError::PortOfTheSystem);
+        bail!(
+            "server.listen: with port 0 the system chooses the port: set a fixed port for health \
+             checks"
+        );
     }
     let path = match probe {
         Probe::Liveness => "livez",

@@ -14,21 +14,15 @@ mod entry;
 mod error;
 mod form;
 mod inference;
-mod limits;
 mod lists;
 mod locate;
-mod model;
 mod mqtt;
 mod observability;
 #[cfg(test)]
 mod reference;
-mod remote;
 mod results;
 mod server;
-mod state;
 mod threads;
-mod tls;
-mod upstream;
 mod values;
 mod variables;
 
@@ -37,31 +31,27 @@ use std::{path::Path, time::Duration};
 use lookdown_common::ServerEntry;
 
 pub use access::AccessSettings;
-pub use calibrations::CalibrationSettings;
+pub use calibrations::{CalibrationSettings, StateSettings};
 pub use counts::CountSettings;
 pub use engine_errors::explain;
 pub use error::SettingsError;
-pub use inference::InferenceSettings;
-pub use limits::LimitSettings;
+pub use inference::{InferenceSettings, ModelSettings, RemoteSettings};
 pub use lists::ListSettings;
 pub use locate::{
     PackagedFiles, find_calibrations, find_installed, is_installed, use_packaged_files,
 };
 use lookdown_detect::parameters::DetectDefaults;
-pub use model::ModelSettings;
 pub use observability::{LogFormat, LogSettings, TraceSettings};
-pub use remote::RemoteSettings;
 pub use results::ResultSettings;
-pub use server::{ServerSettings, ShutdownSettings};
-pub use state::StateSettings;
+pub use server::{LimitSettings, ServerSettings, ShutdownSettings};
 pub use threads::ThreadPlan;
 pub use variables::{CAMERA_VARIABLE, environment};
 
 pub(crate) use variables::variable_of;
 
 use self::{
-    declare::Table, entry::Entry, mqtt::MqttKeys, remote::RemoteKeys, results::ResultKeys,
-    threads::ThreadKeys, tls::TlsKeys, upstream::UpstreamKeys, values::Values,
+    counts::UpstreamKeys, declare::Table, entry::Entry, inference::RemoteKeys, mqtt::MqttKeys,
+    results::ResultKeys, server::TlsKeys, threads::ThreadKeys, values::Values,
 };
 use lookdown_http::server::ConnectionLimits;
 

@@ -4,8 +4,6 @@
 //! Frames of different times become edges (`RoomFrame`) on one thread of a low priority, one
 //! frame at a time. Neither frames nor images of people are kept.
 
-mod observed;
-mod shared;
 #[cfg(test)]
 mod tests;
 mod worker;
@@ -28,11 +26,11 @@ use lookdown_lens::self_calibration::{IdealLens, KnownCamera};
 use parking_lot::Mutex;
 
 use crate::calibration_store::Calibrations;
-use observed::{Observed, Subject};
-use shared::Shared;
+use worker::Shared;
+use worker::{Observed, Subject};
 use worker::{Work, Worker};
 
-pub(crate) use {observed::FRAMES, shared::Suggestion};
+pub(crate) use worker::{FRAMES, Suggestion};
 
 /// Most cameras that are observed, beside those of this process. One that is silent makes room for
 /// a new one.

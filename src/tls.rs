@@ -2,12 +2,9 @@
 //! and TLS for outgoing connections.
 
 mod client;
-mod error;
 mod files;
 mod handshake;
 mod identity;
-mod options;
-mod validity;
 
 use std::{num::NonZeroU64, sync::Arc};
 
@@ -18,8 +15,7 @@ use tokio::{net::TcpStream, time::timeout};
 use tokio_rustls::server::TlsStream;
 
 pub use client::ClientTls;
-pub use error::TlsError;
-pub use options::TlsOptions;
+pub use files::TlsOptions;
 
 use self::{files::TlsFiles, handshake::shake_hands, identity::Identity};
 use lookdown_common::LogOnce;
@@ -39,8 +35,8 @@ impl Tls {
     /// Reads the files that `options` names.
     ///
     /// # Errors
-    /// [`TlsError`] if they cannot be used.
-    pub fn open(options: TlsOptions, metrics: Arc<Metrics>) -> Result<Self, TlsError> {
+    /// If they cannot be used.
+    pub fn open(options: TlsOptions, metrics: Arc<Metrics>) -> anyhow::Result<Self> {
         let files = TlsFiles::read(&options)?;
         let identity = Identity::new(&files, &options)?;
         show(&identity, &options, &metrics);
@@ -82,7 +78,7 @@ impl Tls {
     }
 
     /// The identity in the files, if it differs from the current one.
-    fn newer(&self) -> Result<Option<Identity>, TlsError> {
+    fn newer(&self) -> anyhow::Result<Option<Identity>> {
         let files = TlsFiles::read(&self.options)?;
         if files.digest() == self.serving().digest {
             return Ok(None);

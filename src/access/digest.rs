@@ -19,7 +19,7 @@ const BYTES: usize = 32;
 pub fn new_key() -> Result<String, getrandom::Error> {
     let mut bytes = [0; BYTES];
     getrandom::fill(&mut bytes)?;
-    Ok(format!("{PREFIX}{}", hexadecimal(&bytes)))
+    Ok(format!("{PREFIX}{}", hex::encode(bytes)))
 }
 
 /// The SHA-256 of a key. Its `Debug` output shows nothing of it.
@@ -36,20 +36,15 @@ impl KeyDigest {
     /// Parses a digest of 64 hexadecimal digits.
     #[must_use]
     pub fn parse(text: &str) -> Option<Self> {
-        let digits: Option<Vec<_>> = text.chars().map(|digit| digit.to_digit(16)).collect();
-        let bytes = digits?;
-        let bytes = bytes.chunks(2).map(|pair| match pair {
-            [high, low] => u8::try_from(high * 16 + low).ok(),
-            _ => None,
-        });
-        let bytes: Option<Vec<u8>> = bytes.collect();
-        Some(Self(bytes?.try_into().ok()?))
+        let mut bytes = [0; BYTES];
+        hex::decode_to_slice(text, &mut bytes).ok()?;
+        Some(Self(bytes))
     }
 
     /// Returns the digest as 64 hexadecimal digits.
     #[must_use]
     pub fn hexadecimal(&self) -> String {
-        hexadecimal(&self.0)
+        hex::encode(self.0)
     }
 
     /// Compares in constant time.
@@ -68,13 +63,6 @@ impl fmt::Debug for KeyDigest {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.write_str("KeyDigest(…)")
     }
-}
-
-fn hexadecimal(bytes: &[u8]) -> String {
-    let digits = bytes.iter().flat_map(|byte| [byte >> 4, byte & 15]);
-    digits
-        .filter_map(|digit| char::from_digit(u32::from(digit), 16))
-        .collect()
 }
 
 #[cfg(test)]

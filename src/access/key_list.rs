@@ -1,15 +1,54 @@
-//! The keys of a file or of the environment.
+//! The keys of a file or of the environment. No error repeats the input: it may be a key in the
+//! wrong position.
 
-use std::{collections::BTreeMap, str::FromStr};
+use std::{collections::BTreeMap, fmt, str::FromStr};
 
+use anyhow::{Context, anyhow, bail, ensure};
+use lookdown_common::plain_name::is_plain;
 use lookdown_detect::fairness::PriorityLevel;
 use serde::Deserialize;
 use subtle::{Choice, ConditionallySelectable};
 
-use super::{KeyDigest, KeyError, KeyName, Scope, Scopes};
+use super::{
+    digest::KeyDigest,
+    scope::{Scope, Scopes},
+};
 
 /// Most keys: every request is compared with all of them.
 const MAX_KEYS: usize = 1000;
+
+/// The name of a key: 1 to 64 of a-z, 0-9, `_` and `-`, a bare key in TOML.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct KeyName(String);
+
+/// The text is not a valid name of a key.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("a name is 1 to 64 of a-z, 0-9, _ and -, and begins with a-z or 0-9")]
+pub struct InvalidKeyName;
+
+impl FromStr for KeyName {
+    type Err = InvalidKeyName;
+
+    fn from_str(name: &str) -> Result<Self, InvalidKeyName> {
+        is_plain(name)
+            .then(|| Self(name.to_owned()))
+            .ok_or(InvalidKeyName)
+    }
+}
+
+impl KeyName {
+    /// The name as text.
+    #[must_use]
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+impl fmt::Display for KeyName {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(&self.0)
+    }
+}
 
 /// The holder of a key: its name, its scopes and its highest priority.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,21 +79,23 @@ impl KeyList {
     /// each, with `highest_priority = 1` to 9 if that is not 5.
     ///
     /// # Errors
-    /// [`KeyError`] with the line or the key that cannot be used.
-    pub fn from_toml(text: &str) -> Result<Self, KeyError> {
+    /// With the line or the key that cannot be used.
+    pub fn from_toml(text: &str) -> anyhow::Result<Self> {
         let rows: BTreeMap<String, Row> = toml::from_str(text).map_err(|error| {
             // The message of the TOML library would quote the line.
             let before = error.span().and_then(|span| text.get(..span.start));
             let line = 1 + before.map_or(0, |before| before.matches('\n').count());
-            KeyError::Shape { line }
+            anyhow!(
+                "line {line}: a key is a line of the form name = {{ scopes = [\"detect\"], sha256 = \
+                 \"64 hexadecimal digits\" }}, as `lookdown key new` prints it"
+            )
         })?;
         let mut list = Self::default();
         for (name, row) in rows {
             let scopes: Vec<_> = row.scopes.iter().map(String::as_str).collect();
             let position = list.0.len() + 1;
-            let level = row.highest_priority;
-            let level =
-                level.map(|level| PriorityLevel::new(level).ok_or(KeyError::Priority { position }));
+            let level = row.highest_priority.map(PriorityLevel::new);
+            let level = level.map(|level| level.with_context(|| wrong_priority(position)));
             list.add(&name, &scopes, &row.sha256, level.transpose()?)?;
         }
         Ok(list)
@@ -64,7 +105,7 @@ impl KeyList {
     ///
     /// # Errors
     /// If they share a name, or have too many keys together.
-    pub fn with(mut self, other: &Self) -> Result<Self, KeyError> {
+    pub fn with(mut self, other: &Self) -> anyhow::Result<Self> {
         for (digest, holder) in &other.0 {
             self.push(digest.clone(), holder.clone())?;
         }
@@ -108,13 +149,21 @@ impl KeyList {
         scopes: &[&str],
         sha256: &str,
         highest_priority: Option<PriorityLevel>,
-    ) -> Result<(), KeyError> {
+    ) -> anyhow::Result<()> {
         let position = self.0.len() + 1;
-        let name = name.parse().map_err(|_| KeyError::Name { position })?;
+        let name = name.parse::<KeyName>();
+        let name = name.map_err(|error| anyhow!("key {position}: {error}"))?;
         let scopes: Result<Vec<Scope>, _> = scopes.iter().map(|scope| scope.parse()).collect();
         let scopes = scopes.ok().and_then(|scopes| Scopes::new(&scopes));
-        let scopes = scopes.ok_or(KeyError::Scopes { position })?;
-        let digest = KeyDigest::parse(sha256).ok_or(KeyError::Digest { position })?;
+        let scopes = scopes.with_context(|| {
+            format!("key {position}: give one or more of the scopes detect, read, view and admin")
+        })?;
+        let digest = KeyDigest::parse(sha256).with_context(|| {
+            format!(
+                "key {position}: sha256 must be the 64 hexadecimal digits that `lookdown key new` \
+                 prints, never the key itself"
+            )
+        })?;
         let holder = Holder {
             name,
             scopes,
@@ -123,14 +172,15 @@ impl KeyList {
         self.push(digest, holder)
     }
 
-    fn push(&mut self, digest: KeyDigest, holder: Holder) -> Result<(), KeyError> {
+    fn push(&mut self, digest: KeyDigest, holder: Holder) -> anyhow::Result<()> {
         if self.0.iter().any(|(_, known)| known.name == holder.name) {
             let position = self.0.len() + 1;
-            return Err(KeyError::Repeated { position });
+            bail!("key {position}: its name is used twice: give each key its own name");
         }
-        if self.0.len() == MAX_KEYS {
-            return Err(KeyError::TooMany { most: MAX_KEYS });
-        }
+        ensure!(
+            self.0.len() < MAX_KEYS,
+            "there are more than {MAX_KEYS} keys: remove unused ones"
+        );
         self.0.push((digest, holder));
         Ok(())
     }
@@ -139,9 +189,9 @@ impl KeyList {
 /// `name:scope+scope:sha256` or `name:scope+scope:sha256:highest_priority`, separated by commas, as
 /// an environment variable has them.
 impl FromStr for KeyList {
-    type Err = KeyError;
+    type Err = anyhow::Error;
 
-    fn from_str(text: &str) -> Result<Self, KeyError> {
+    fn from_str(text: &str) -> anyhow::Result<Self> {
         let mut list = Self::default();
         let entries = text.split(',').map(str::trim);
         for entry in entries.filter(|entry| !entry.is_empty()) {
@@ -150,14 +200,26 @@ impl FromStr for KeyList {
             let (name, scopes, sha256, level) = match parts[..] {
                 [name, scopes, sha256] => (name, scopes, sha256, None),
                 [name, scopes, sha256, level] => (name, scopes, sha256, Some(level)),
-                _ => return Err(KeyError::Entry { position }),
+                _ => bail!(
+                    "key {position} is not of the form name:scope+scope:sha256, as `lookdown key \
+                     new` prints it"
+                ),
             };
             let level = level.map(str::parse::<PriorityLevel>).transpose();
-            let level = level.map_err(|_| KeyError::Priority { position })?;
+            let level = level.with_context(|| wrong_priority(position))?;
             list.add(name, &scopes.split('+').collect::<Vec<_>>(), sha256, level)?;
         }
         Ok(list)
     }
+}
+
+fn wrong_priority(position: usize) -> String {
+    format!(
+        "key {position}: highest_priority must be {} (highest) to {}; without it, it is {}",
+        PriorityLevel::HIGHEST,
+        PriorityLevel::LOWEST,
+        PriorityLevel::DEFAULT
+    )
 }
 
 #[cfg(test)]

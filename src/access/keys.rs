@@ -1,18 +1,18 @@
 //! The current keys: those of the environment, and those of a file that may change.
 
 use std::{
-    io,
     path::{Path, PathBuf},
     sync::Arc,
 };
 
-use parking_lot::{Mutex, RwLock};
-
-use super::{Holder, KeyError, KeyList};
+use anyhow::anyhow;
 use lookdown_common::{
     LogOnce,
     files::{self, MAX_SETTINGS_BYTES},
 };
+use parking_lot::{Mutex, RwLock};
+
+use super::key_list::{Holder, KeyList};
 
 /// The current keys.
 #[derive(Debug)]
@@ -29,8 +29,8 @@ impl AccessKeys {
     /// Creates the keys of `lasting` and of `file`, if one is given.
     ///
     /// # Errors
-    /// [`KeyError`] if the file cannot be used.
-    pub fn open(lasting: KeyList, file: Option<&Path>) -> Result<Self, KeyError> {
+    /// If the file cannot be used.
+    pub fn open(lasting: KeyList, file: Option<&Path>) -> anyhow::Result<Self> {
         let known = match file {
             Some(file) => read(file, &lasting)?,
             None => lasting.clone(),
@@ -78,18 +78,11 @@ impl AccessKeys {
     }
 }
 
-fn read(path: &Path, lasting: &KeyList) -> Result<KeyList, KeyError> {
-    let text = read_text(path).map_err(|cause| KeyError::Unreadable {
-        path: path.to_owned(),
-        cause,
+fn read(path: &Path, lasting: &KeyList) -> anyhow::Result<KeyList> {
+    let (key, file) = ("access.keys_file", path.display());
+    let text = files::read_text(path, MAX_SETTINGS_BYTES).map_err(|cause| {
+        anyhow!("{key}: {file} cannot be read ({cause}): check its path and its permissions")
     })?;
     let list = KeyList::from_toml(&text).and_then(|list| lasting.clone().with(&list));
-    list.map_err(|problem| KeyError::File {
-        path: path.to_owned(),
-        problem: Box::new(problem),
-    })
-}
-
-fn read_text(path: &Path) -> io::Result<String> {
-    files::read_text(path, MAX_SETTINGS_BYTES)
+    list.map_err(|problem| anyhow!("{key}: {file} cannot be used: {problem}"))
 }

@@ -65,25 +65,22 @@ impl StoredFrame {
         concealment: Option<Concealment>,
     ) -> Result<Self, StoredFrameError> {
         let sketch = Sketch::new(detected, Layer::VARIANTS).rounded();
-        if let Some(concealment) = concealment {
-            let mut frame = Frame::clone(&detected.frame);
-            let marks = sketch.concealed(frame.width());
-            let is_cancelled = || detected.withdrawn.is_cancelled();
-            conceal(&mut frame, &marks, concealment, &is_cancelled)
-                .map_err(AnnotationError::from)?;
-            return Ok(Self {
-                jpeg: jpeg_of(&frame)?,
-                sketch: serde_json::to_vec(&sketch)?.into(),
-            });
-        }
-        let sketch = serde_json::to_vec(&sketch)?.into();
-        let jpeg = match &detected.encoded {
-            Some(encoded) if is_kept_as_it_is(encoded, &detected.frame) => {
+        let jpeg = match (concealment, &detected.encoded) {
+            (Some(concealment), _) => {
+                let mut frame = Frame::clone(&detected.frame);
+                let marks = sketch.concealed(frame.width());
+                let is_cancelled = || detected.withdrawn.is_cancelled();
+                conceal(&mut frame, &marks, concealment, &is_cancelled)
+                    .map_err(AnnotationError::from)?;
+                jpeg_of(&frame)?
+            }
+            (None, Some(encoded)) if is_kept_as_it_is(encoded, &detected.frame) => {
                 // A copy, so that the rest of the request body can be freed.
                 Bytes::copy_from_slice(encoded)
             }
             _ => jpeg_of(&detected.frame)?,
         };
+        let sketch = serde_json::to_vec(&sketch)?.into();
         Ok(Self { jpeg, sketch })
     }
 

@@ -1,10 +1,13 @@
 //! The drawings for a frame, stored separately from the frame.
+//!
+//! The mark of a person in the frame.
 
-use lookdown_detect::pipeline::{DetectedFrame, DetectionReport};
-use lookdown_imaging::annotate::{Drawing, Mark, ZoneOutline};
+use lookdown_detect::pipeline::{DetectedFrame, DetectionReport, Person};
+use lookdown_imaging::annotate::{Drawing, Head, Mark, OrientedMark, ZoneOutline};
+use lookdown_lens::geometry::OrientedBox;
 use serde::{Deserialize, Serialize};
 
-use super::{Layer, marks};
+use super::Layer;
 
 /// The drawings for a frame. All positions are corner-origin pixels of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -31,7 +34,7 @@ impl Sketch {
         let zones = zones.then(|| detected.zone_outlines());
         Self {
             frame_width: detected.frame.width(),
-            marks: report.persons.iter().map(marks::mark).collect(),
+            marks: report.persons.iter().map(mark).collect(),
             others: detected.boxes_of_others(),
             views: views
                 .map(|outline| outline.iter().map(|at| [at.x, at.y]).collect())
@@ -105,4 +108,32 @@ fn wanted<T: Default>(is_wanted: bool, what: T) -> T {
 fn timestamp(report: &DetectionReport) -> String {
     let time = report.captured_at.unwrap_or(report.received_at);
     time.strftime("%Y-%m-%d %H:%M:%S UTC").to_string()
+}
+
+/// The person's mark, with the score on its label.
+pub(super) fn mark(person: &Person) -> Mark {
+    let oriented = &person.oriented_box;
+    Mark {
+        bbox: person.bbox.corners(),
+        oriented: Some(OrientedMark {
+            cx: oriented.center.x,
+            cy: oriented.center.y,
+            width: oriented.width,
+            height: oriented.height,
+            angle_deg: oriented.angle.to_degrees(),
+        }),
+        head: Some(head(oriented)),
+        label: format!("{:.2}", person.score),
+    }
+}
+
+/// The circle that touches the upper short side and both long sides of the box.
+fn head(oriented: &OrientedBox) -> Head {
+    let radius = oriented.width.min(oriented.height) / 2.0;
+    let center = oriented.center + oriented.up * (oriented.height / 2.0 - radius);
+    Head {
+        cx: center.x,
+        cy: center.y,
+        radius,
+    }
 }

@@ -1,12 +1,10 @@
 //! COCO detection: one JSON document. Besides COCO's keys it has `score` and `oriented_box` for
 //! each annotation and `calibration` for each image, which `lookdown eval` reads.
 
-use lookdown_common::report::ReportOrientedBox;
-use serde::Serialize;
+use serde_json::{Value, json};
 
-use super::{
-    AnnotatedBox, AnnotatedImage, BoxKind, FormatSpec, LABEL, Layout, SupportedBoxes,
-    content::ImageMembers,
+use super::content::{
+    AnnotatedBox, AnnotatedImage, FormatSpec, LABEL, Layout, SupportedBoxes, json_text,
 };
 use crate::rounding::{oriented_box, pixels, share};
 
@@ -16,100 +14,47 @@ pub(super) const FORMAT: FormatSpec = FormatSpec {
     boxes: SupportedBoxes::AxisParallel,
     layout: Layout::OneFile {
         path: "annotations.json",
-        document,
+        document: |images, _| document(images, shape),
     },
 };
 
 /// The category ID of `person` in COCO.
 const PERSON: u64 = 1;
 
-#[derive(Serialize)]
-struct Document<'a, Shape> {
-    images: Vec<Image<'a>>,
-    annotations: Vec<Annotation<Shape>>,
-    categories: [Category; 1],
-}
-
-#[derive(Serialize)]
-struct Image<'a> {
-    id: u64,
-    #[serde(flatten)]
-    members: ImageMembers<'a>,
-}
-
-#[derive(Serialize)]
-struct Annotation<Shape> {
-    id: u64,
-    image_id: u64,
-    category_id: u64,
-    #[serde(flatten)]
-    shape: Shape,
-    iscrowd: u8,
-    /// Required by some tools, though there are no masks.
-    segmentation: [f64; 0],
-    score: f64,
-}
-
-/// The box of an annotation.
-#[derive(Serialize)]
-struct Shape {
-    bbox: [f64; 4],
-    area: f64,
-    oriented_box: ReportOrientedBox,
-}
-
-#[derive(Serialize)]
-struct Category {
-    id: u64,
-    name: &'static str,
-    supercategory: &'static str,
-}
-
-fn document(images: &[AnnotatedImage], _boxes: BoxKind) -> String {
-    document_of(images, shape)
-}
-
 /// Returns the document whose annotations have the keys of `shape` for each clipped box and person.
-pub(super) fn document_of<Shape: Serialize>(
+pub(super) fn document(
     images: &[AnnotatedImage],
-    shape: fn([f64; 4], &AnnotatedBox) -> Shape,
+    shape: fn([f64; 4], &AnnotatedBox) -> Value,
 ) -> String {
-    let mut document = Document {
-        images: Vec::with_capacity(images.len()),
-        annotations: Vec::new(),
-        categories: [Category {
-            id: PERSON,
-            name: LABEL,
-            supercategory: LABEL,
-        }],
-    };
+    let (mut rows, mut annotations) = (Vec::with_capacity(images.len()), Vec::new());
     for (image_id, image) in (1..).zip(images) {
-        document.images.push(Image {
-            id: image_id,
-            members: image.members(),
-        });
+        let mut row = image.members();
+        row["id"] = json!(image_id);
+        rows.push(row);
         for (corners, person) in image.boxes() {
-            let id = document.annotations.len() as u64 + 1;
-            document.annotations.push(Annotation {
-                id,
-                image_id,
-                category_id: PERSON,
-                shape: shape(corners, person),
-                iscrowd: 0,
-                segmentation: [],
-                score: share(person.score),
-            });
+            let mut annotation = shape(corners, person);
+            annotation["id"] = json!(annotations.len() + 1);
+            annotation["image_id"] = json!(image_id);
+            annotation["category_id"] = json!(PERSON);
+            annotation["iscrowd"] = json!(0);
+            // Required by some tools, though there are no masks.
+            annotation["segmentation"] = json!([]);
+            annotation["score"] = json!(share(person.score));
+            annotations.push(annotation);
         }
     }
-    // Serializing numbers and strings in a fixed structure cannot fail.
-    serde_json::to_string_pretty(&document).unwrap_or_default()
+    json_text(&json!({
+        "images": rows,
+        "annotations": annotations,
+        "categories": [{"id": PERSON, "name": LABEL, "supercategory": LABEL}],
+    }))
 }
 
-fn shape([left, top, right, bottom]: [f64; 4], person: &AnnotatedBox) -> Shape {
+fn shape([left, top, right, bottom]: [f64; 4], person: &AnnotatedBox) -> Value {
     let (width, height) = (pixels(right - left), pixels(bottom - top));
-    Shape {
-        bbox: [left, top, width, height],
-        area: pixels(width * height),
-        oriented_box: oriented_box(&person.oriented_box),
-    }
+    json!({
+        "bbox": [left, top, width, height],
+        "area": pixels(width * height),
+        "oriented_box": oriented_box(&person.oriented_box),
+    })
 }

@@ -1,8 +1,14 @@
-//! The persons of images, and the files that describe them.
+//! The persons of images, the files that describe them, and the specification of a format.
+//!
+//! XML documents of annotation files.
 
-use lookdown_detect::detection::{BBox, FramePixels};
+use lookdown_detect::{
+    detection::{BBox, FramePixels},
+    pipeline::{DetectionReport, Person},
+};
 use lookdown_lens::geometry::{OrientedBox, floor::FloorPosition};
-use serde::Serialize;
+use quick_xml::escape::escape;
+use serde_json::{Value, json};
 
 use crate::rounding::pixels;
 
@@ -24,25 +30,29 @@ pub struct AnnotatedImage {
     pub persons: Vec<AnnotatedBox>,
 }
 
-/// The members of an image in JSON documents.
-#[derive(Serialize)]
-pub(super) struct ImageMembers<'a> {
-    file_name: &'a str,
-    width: u32,
-    height: u32,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    calibration: Option<&'a str>,
-}
-
 impl AnnotatedImage {
-    /// Returns the members of the image in JSON documents.
-    pub(super) fn members(&self) -> ImageMembers<'_> {
-        ImageMembers {
-            file_name: &self.file_name,
-            width: self.width,
-            height: self.height,
-            calibration: self.calibration.as_deref(),
+    /// Returns the persons of a report as annotations of the image with this file name.
+    #[must_use]
+    pub fn new(report: &DetectionReport, file_name: String) -> Self {
+        let calibration = &report.calibration;
+        let is_assumed = calibration.assumed_circle.is_some();
+        Self {
+            file_name,
+            width: report.image_width,
+            height: report.image_height,
+            calibration: (!is_assumed).then(|| calibration.id.clone()),
+            persons: report.persons.iter().map(AnnotatedBox::from).collect(),
         }
+    }
+
+    /// Returns the members of the image in JSON documents.
+    pub(super) fn members(&self) -> Value {
+        let (width, height) = (self.width, self.height);
+        let mut members = json!({"file_name": self.file_name, "width": width, "height": height});
+        if let Some(calibration) = &self.calibration {
+            members["calibration"] = json!(calibration);
+        }
+        members
     }
 
     /// The axis-parallel boxes, `[left, top, right, bottom]`, clipped to the image. Those outside
@@ -67,6 +77,17 @@ pub struct AnnotatedBox {
     pub score: f64,
     /// The person's position on the floor, if the camera's height is known.
     pub floor: Option<FloorPosition>,
+}
+
+impl From<&Person> for AnnotatedBox {
+    fn from(person: &Person) -> Self {
+        Self {
+            bbox: person.bbox,
+            oriented_box: person.oriented_box,
+            score: person.score,
+            floor: person.floor,
+        }
+    }
 }
 
 /// The box that is written if a format supports both kinds.
@@ -101,4 +122,56 @@ pub(super) fn stem(file_name: &str) -> &str {
         Some((stem, ending)) if !stem.is_empty() && !ending.contains('/') => stem,
         _ => file_name,
     }
+}
+
+/// Returns a JSON document as text. Serializing numbers and strings cannot fail.
+pub(super) fn json_text(document: &Value) -> String {
+    serde_json::to_string_pretty(document).unwrap_or_default()
+}
+
+/// A format of annotations.
+pub(super) struct FormatSpec {
+    /// The media type of a document. One that is not registered begins with `x.`, so that it is not
+    /// taken for a report.
+    pub(super) media_type: &'static str,
+    pub(super) boxes: SupportedBoxes,
+    pub(super) layout: Layout,
+}
+
+/// The kinds of boxes that a format can have as its shapes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum SupportedBoxes {
+    /// Axis-parallel boxes. Oriented boxes may be additional keys.
+    AxisParallel,
+    /// Oriented boxes.
+    Oriented,
+    /// Either kind, as requested.
+    Both,
+}
+
+/// The files of a format.
+pub(super) enum Layout {
+    /// One file that describes all images.
+    OneFile {
+        path: &'static str,
+        document: fn(&[AnnotatedImage], BoxKind) -> String,
+    },
+    /// A file for each image, and files that do not depend on the images.
+    FilePerImage {
+        /// Returns the path of the file of the image with this name.
+        path: fn(&str) -> String,
+        document: fn(&AnnotatedImage, BoxKind) -> String,
+        others: fn() -> Vec<AnnotationFile>,
+    },
+}
+
+/// The first line of a document.
+pub(super) const DECLARATION: &str = "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n";
+
+/// Returns escaped text in which U+FFFD replaces control characters and others that XML cannot
+/// contain (XML 1.0, section 2.2), or that a parser would change.
+pub(super) fn escaped(text: &str) -> String {
+    let is_refused = |c: char| c < ' ' || "\u{fffe}\u{ffff}".contains(c);
+    let replaced = text.replace(is_refused, "\u{fffd}");
+    escape(replaced).into_owned()
 }

@@ -1,21 +1,14 @@
 //! CVAT for images 1.1: one XML document. An oriented box is written unrotated, with its clockwise
 //! `rotation` about its center in degrees, from 0 to below 360.
 
-use lookdown_lens::geometry::OrientedBox;
-use serde::Serialize;
+use std::fmt::Write;
 
-use super::{
-    AnnotatedImage, BoxKind, FormatSpec, LABEL, Layout, SupportedBoxes,
-    xml::{self, Text},
+use lookdown_lens::geometry::OrientedBox;
+
+use super::content::{
+    AnnotatedImage, BoxKind, DECLARATION, FormatSpec, LABEL, Layout, SupportedBoxes, escaped,
 };
 use crate::rounding::{pixels, share};
-
-#[derive(Serialize)]
-struct Annotations {
-    version: &'static str,
-    meta: Meta,
-    image: Vec<Image>,
-}
 
 /// The format.
 pub(super) const FORMAT: FormatSpec = FormatSpec {
@@ -27,158 +20,65 @@ pub(super) const FORMAT: FormatSpec = FormatSpec {
     },
 };
 
-/// The label, which makes the classes of the file explicit.
-#[derive(Serialize)]
-struct Meta {
-    task: Task,
-}
-
-/// Importers expect a task or a project here.
-#[derive(Serialize)]
-struct Task {
-    labels: Labels,
-}
-
-#[derive(Serialize)]
-struct Labels {
-    label: Label,
-}
-
-#[derive(Serialize)]
-struct Label {
-    name: &'static str,
-    attributes: Attributes,
-}
-
-#[derive(Serialize)]
-struct Attributes {
-    attribute: AttributeType,
-}
-
-#[derive(Serialize)]
-struct AttributeType {
-    name: &'static str,
-    mutable: &'static str,
-    input_type: &'static str,
-    default_value: &'static str,
-    values: &'static str,
-}
-
-#[derive(Serialize)]
-struct Image {
-    #[serde(rename = "@id")]
-    id: usize,
-    #[serde(rename = "@name")]
-    name: Text,
-    #[serde(rename = "@width")]
-    width: u32,
-    #[serde(rename = "@height")]
-    height: u32,
-    #[serde(rename = "box")]
-    shapes: Vec<Shape>,
-}
-
-#[derive(Serialize)]
-struct Shape {
-    #[serde(rename = "@label")]
-    label: &'static str,
-    #[serde(rename = "@source")]
-    source: &'static str,
-    #[serde(rename = "@occluded")]
-    occluded: u8,
-    #[serde(rename = "@xtl")]
-    left: String,
-    #[serde(rename = "@ytl")]
-    top: String,
-    #[serde(rename = "@xbr")]
-    right: String,
-    #[serde(rename = "@ybr")]
-    bottom: String,
-    #[serde(rename = "@z_order")]
-    z_order: u8,
-    #[serde(rename = "@rotation", skip_serializing_if = "Option::is_none")]
-    rotation: Option<String>,
-    attribute: Attribute,
-}
-
-#[derive(Serialize)]
-struct Attribute {
-    #[serde(rename = "@name")]
-    name: &'static str,
-    #[serde(rename = "$text")]
-    value: f64,
-}
-
 fn document(images: &[AnnotatedImage], boxes: BoxKind) -> String {
-    let images = images.iter().enumerate().map(|(id, image)| {
-        let shapes = image.boxes().map(|(corners, person)| {
+    // Importers expect a task or a project; the label makes the classes of the file explicit.
+    let mut text = format!(
+        "{DECLARATION}<annotations>
+  <version>1.1</version>
+  <meta>
+    <task>
+      <labels>
+        <label>
+          <name>{LABEL}</name>
+          <attributes>
+            <attribute>
+              <name>score</name>
+              <mutable>False</mutable>
+              <input_type>text</input_type>
+              <default_value></default_value>
+              <values></values>
+            </attribute>
+          </attributes>
+        </label>
+      </labels>
+    </task>
+  </meta>
+"
+    );
+    for (id, image) in images.iter().enumerate() {
+        let (name, width, height) = (escaped(&image.file_name), image.width, image.height);
+        let _ = writeln!(
+            text,
+            r#"  <image id="{id}" name="{name}" width="{width}" height="{height}">"#
+        );
+        for (clipped, person) in image.boxes() {
             let (corners, rotation) = match boxes {
-                BoxKind::AxisParallel => (corners, None),
+                BoxKind::AxisParallel => (clipped, String::new()),
                 BoxKind::Oriented => unturned(&person.oriented_box),
             };
-            shape(corners, rotation, person.score)
-        });
-        Image {
-            id,
-            name: image.file_name.as_str().into(),
-            width: image.width,
-            height: image.height,
-            shapes: shapes.collect(),
+            let [left, top, right, bottom] = corners;
+            let score = share(person.score);
+            let _ = writeln!(
+                text,
+                r#"    <box label="{LABEL}" source="auto" occluded="0" xtl="{left:.2}" ytl="{top:.2}" xbr="{right:.2}" ybr="{bottom:.2}" z_order="0"{rotation}>
+      <attribute name="score">{score}</attribute>
+    </box>"#
+            );
         }
-    });
-    let attribute = AttributeType {
-        name: "score",
-        mutable: "False",
-        input_type: "text",
-        default_value: "",
-        values: "",
-    };
-    let label = Label {
-        name: LABEL,
-        attributes: Attributes { attribute },
-    };
-    let annotations = Annotations {
-        version: "1.1",
-        meta: Meta {
-            task: Task {
-                labels: Labels { label },
-            },
-        },
-        image: images.collect(),
-    };
-    xml::document("annotations", &annotations)
-}
-
-fn shape(corners: [f64; 4], rotation: Option<f64>, score: f64) -> Shape {
-    let [left, top, right, bottom] = corners.map(|side| format!("{side:.2}"));
-    Shape {
-        label: LABEL,
-        source: "auto",
-        occluded: 0,
-        left,
-        top,
-        right,
-        bottom,
-        z_order: 0,
-        rotation: rotation.map(|degrees| format!("{degrees:.2}")),
-        attribute: Attribute {
-            name: "score",
-            value: share(score),
-        },
+        text += "  </image>\n";
     }
+    text + "</annotations>\n"
 }
 
-/// The corners of the unrotated box, and its rotation in degrees.
-fn unturned(oriented: &OrientedBox) -> ([f64; 4], Option<f64>) {
+/// Returns the corners of the unrotated box, and the attribute of its rotation.
+fn unturned(oriented: &OrientedBox) -> ([f64; 4], String) {
     let (x, y) = (oriented.center.x, oriented.center.y);
     let (half_width, half_height) = (oriented.width / 2.0, oriented.height / 2.0);
     let degrees = pixels(oriented.angle.to_degrees().rem_euclid(360.0));
-    let corners = [
-        x - half_width,
-        y - half_height,
-        x + half_width,
-        y + half_height,
-    ];
+    // Rounding can make a full turn of a small negative angle.
     let below_a_turn = if degrees < 360.0 { degrees } else { 0.0 };
-    (corners.map(pixels), Some(below_a_turn))
+    let [left, right] = [x - half_width, x + half_width].map(pixels);
+    let [top, bottom] = [y - half_height, y + half_height].map(pixels);
+    let rotation = format!(r#" rotation="{below_a_turn:.2}""#);
+    ([left, top, right, bottom], rotation)
 }

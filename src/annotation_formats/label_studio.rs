@@ -6,9 +6,11 @@
 //! left corner, about which it is rotated clockwise.
 
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
-use serde::Serialize;
+use serde_json::{Value, json};
 
-use super::{AnnotatedBox, AnnotatedImage, BoxKind, FormatSpec, LABEL, Layout, SupportedBoxes};
+use super::content::{
+    AnnotatedBox, AnnotatedImage, BoxKind, FormatSpec, LABEL, Layout, SupportedBoxes, json_text,
+};
 use crate::rounding::{azimuth_degrees, share};
 
 /// The format.
@@ -31,93 +33,47 @@ const ENCODED: &AsciiSet = &NON_ALPHANUMERIC
     .remove(b'_')
     .remove(b'~');
 
-#[derive(Serialize)]
-struct Task {
-    data: Data,
-    predictions: [Prediction; 1],
-}
-
-#[derive(Serialize)]
-struct Data {
-    image: String,
-}
-
-#[derive(Serialize)]
-struct Prediction {
-    model_version: &'static str,
-    /// The lowest score of the boxes, by which Label Studio can order tasks; 1 without boxes.
-    score: f64,
-    result: Vec<Region>,
-}
-
-#[derive(Serialize)]
-struct Region {
-    id: String,
-    r#type: &'static str,
-    from_name: &'static str,
-    to_name: &'static str,
-    original_width: u32,
-    original_height: u32,
-    image_rotation: u8,
-    value: Rectangle,
-    score: f64,
-}
-
-#[derive(Serialize)]
-struct Rectangle {
-    x: f64,
-    y: f64,
-    width: f64,
-    height: f64,
-    rotation: f64,
-    rectanglelabels: [&'static str; 1],
-}
-
 fn document(images: &[AnnotatedImage], boxes: BoxKind) -> String {
     let tasks: Vec<_> = images.iter().map(|image| task(image, boxes)).collect();
-    // Serializing numbers and strings in a fixed structure cannot fail.
-    serde_json::to_string_pretty(&tasks).unwrap_or_default()
+    json_text(&json!(tasks))
 }
 
-fn task(image: &AnnotatedImage, boxes: BoxKind) -> Task {
+/// Returns the task of an image. The score of its prediction is the lowest one of the boxes, by
+/// which Label Studio can order tasks, and 1 without boxes.
+fn task(image: &AnnotatedImage, boxes: BoxKind) -> Value {
     let path = utf8_percent_encode(&image.file_name, ENCODED);
-    let regions = image.boxes().zip(1..).map(|((corners, person), number)| {
+    let (image_width, image_height) = (image.width.into(), image.height.into());
+    let (mut regions, mut lowest_score) = (Vec::new(), 1.0_f64);
+    for ((corners, person), number) in image.boxes().zip(1..) {
         let ([x, y, width, height], rotation) = match boxes {
             BoxKind::AxisParallel => (axis_parallel(corners), 0.0),
             BoxKind::Oriented => rotated(person),
         };
-        let (image_width, image_height) = (image.width.into(), image.height.into());
-        Region {
-            id: format!("{LABEL}-{number}"),
-            r#type: "rectanglelabels",
-            from_name: "label",
-            to_name: "image",
-            original_width: image.width,
-            original_height: image.height,
-            image_rotation: 0,
-            value: Rectangle {
-                x: percent(x, image_width),
-                y: percent(y, image_height),
-                width: percent(width, image_width),
-                height: percent(height, image_height),
-                rotation,
-                rectanglelabels: [LABEL],
+        let score = share(person.score);
+        lowest_score = lowest_score.min(score);
+        regions.push(json!({
+            "id": format!("{LABEL}-{number}"),
+            "type": "rectanglelabels",
+            "from_name": "label",
+            "to_name": "image",
+            "original_width": image.width,
+            "original_height": image.height,
+            "image_rotation": 0,
+            "value": {
+                "x": percent(x, image_width),
+                "y": percent(y, image_height),
+                "width": percent(width, image_width),
+                "height": percent(height, image_height),
+                "rotation": rotation,
+                "rectanglelabels": [LABEL],
             },
-            score: share(person.score),
-        }
-    });
-    let result: Vec<_> = regions.collect();
-    let scores = result.iter().map(|region| region.score);
-    Task {
-        data: Data {
-            image: format!("{LOCAL_FILE}{path}"),
-        },
-        predictions: [Prediction {
-            model_version: "lookdown",
-            score: scores.fold(1.0, f64::min),
-            result,
-        }],
+            "score": score,
+        }));
     }
+    json!({
+        "data": {"image": format!("{LOCAL_FILE}{path}")},
+        "predictions": [{"model_version": "lookdown", "score": lowest_score, "result": regions}],
+    })
 }
 
 /// Returns left, top, width and height.

@@ -1,11 +1,10 @@
 //! Pascal VOC: an XML file per image, in `Annotations/`. Boxes are corner-origin pixels with two
 //! decimals, as current annotation tools write and read them.
 
-use serde::Serialize;
+use std::fmt::Write;
 
-use super::{
-    AnnotatedImage, BoxKind, FormatSpec, LABEL, Layout, SupportedBoxes, stem,
-    xml::{self, Text},
+use super::content::{
+    AnnotatedImage, DECLARATION, FormatSpec, LABEL, Layout, SupportedBoxes, escaped, stem,
 };
 
 /// The format.
@@ -13,83 +12,46 @@ pub(super) const FORMAT: FormatSpec = FormatSpec {
     media_type: "application/xml",
     boxes: SupportedBoxes::AxisParallel,
     layout: Layout::FilePerImage {
-        path,
-        document,
+        path: |image_file_name| format!("Annotations/{}.xml", stem(image_file_name)),
+        document: |image, _| document(image),
         others: Vec::new,
     },
 };
 
-/// The number of channels of every image.
-const DEPTH: u8 = 3;
-
-#[derive(Serialize)]
-struct Annotation {
-    folder: Text,
-    filename: Text,
-    size: Size,
-    segmented: u8,
-    object: Vec<Object>,
-}
-
-#[derive(Serialize)]
-struct Size {
-    width: u32,
-    height: u32,
-    depth: u8,
-}
-
-#[derive(Serialize)]
-struct Object {
-    name: &'static str,
-    pose: &'static str,
-    truncated: u8,
-    difficult: u8,
-    bndbox: Bndbox,
-}
-
-#[derive(Serialize)]
-struct Bndbox {
-    xmin: String,
-    ymin: String,
-    xmax: String,
-    ymax: String,
-}
-
-/// The path of an image's file.
-fn path(image_file_name: &str) -> String {
-    format!("Annotations/{}.xml", stem(image_file_name))
-}
-
-fn document(image: &AnnotatedImage, _boxes: BoxKind) -> String {
-    let (folder, name) = image
-        .file_name
-        .rsplit_once('/')
-        .unwrap_or(("", &image.file_name));
-    let objects = image.boxes().map(|(corners, _)| {
-        let [xmin, ymin, xmax, ymax] = corners.map(|side| format!("{side:.2}"));
-        Object {
-            name: LABEL,
-            pose: "Unspecified",
-            truncated: 0,
-            difficult: 0,
-            bndbox: Bndbox {
-                xmin,
-                ymin,
-                xmax,
-                ymax,
-            },
-        }
-    });
-    let annotation = Annotation {
-        folder: folder.into(),
-        filename: name.into(),
-        size: Size {
-            width: image.width,
-            height: image.height,
-            depth: DEPTH,
-        },
-        segmented: 0,
-        object: objects.collect(),
-    };
-    xml::document("annotation", &annotation)
+fn document(image: &AnnotatedImage) -> String {
+    let path = image.file_name.rsplit_once('/');
+    let (folder, name) = path.unwrap_or(("", &image.file_name));
+    let (folder, name) = (escaped(folder), escaped(name));
+    let AnnotatedImage { width, height, .. } = image;
+    let mut text = format!(
+        "{DECLARATION}<annotation>
+  <folder>{folder}</folder>
+  <filename>{name}</filename>
+  <size>
+    <width>{width}</width>
+    <height>{height}</height>
+    <depth>3</depth>
+  </size>
+  <segmented>0</segmented>
+"
+    );
+    for ([left, top, right, bottom], _) in image.boxes() {
+        let _ = write!(
+            text,
+            "  <object>
+    <name>{LABEL}</name>
+    <pose>Unspecified</pose>
+    <truncated>0</truncated>
+    <difficult>0</difficult>
+    <bndbox>
+      <xmin>{left:.2}</xmin>
+      <ymin>{top:.2}</ymin>
+      <xmax>{right:.2}</xmax>
+      <ymax>{bottom:.2}</ymax>
+    </bndbox>
+  </object>
+"
+        );
+    }
+    text + "</annotation>\n"
 }

@@ -5,7 +5,7 @@
 
 use std::fmt::Write;
 
-use super::{
+use super::content::{
     AnnotatedImage, AnnotationFile, BoxKind, FormatSpec, LABEL, Layout, SupportedBoxes, file, stem,
 };
 

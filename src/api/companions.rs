@@ -1,6 +1,6 @@
 //! The cameras and counts of this process, and the counts of another host.
 
-use std::{collections::BTreeMap, fmt, sync::Arc};
+use std::{collections::BTreeMap, sync::Arc};
 
 use axum::Router;
 use lookdown_common::{OwnCameras, ServerClient};
@@ -128,11 +128,5 @@ impl Companions {
         for metrics in metrics {
             text.push_str(&String::from_utf8_lossy(&metrics()));
         }
-    }
-}
-
-impl fmt::Debug for Companions {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str("Companions")
     }
 }

@@ -3,7 +3,6 @@
 
 pub(super) mod answer;
 pub(super) mod defaults;
-pub(super) mod headers;
 pub(super) mod report;
 pub(super) mod route;
 pub(super) mod run;

@@ -9,7 +9,6 @@ pub(super) mod cors;
 pub(super) mod deadline;
 pub(super) mod drain_body;
 pub(super) mod envelope;
-pub(super) mod incoming_trace;
 pub(super) mod problem;
 pub(super) mod query;
 pub(super) mod rate_limit;

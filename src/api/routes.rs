@@ -58,7 +58,7 @@ pub(super) fn client_routes() -> OpenApiRouter<ApiState> {
         .routes(routes!(results::list))
         .routes(routes!(results::delete::delete))
         .routes(routes!(results::latest::get_latest))
-        .routes(routes!(results::latest_image::get_latest_image))
+        .routes(routes!(results::latest::get_latest_image))
         .routes(routes!(results::history::get_history))
         .routes(routes!(results::events::camera_events))
         .routes(routes!(results::events::all_events))

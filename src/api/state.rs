@@ -34,7 +34,7 @@ use crate::{
     calibration_store::Calibrations,
     metrics::Metrics,
     reference_counts::ReferenceCounts,
-    results::{ImagesOf, ResultStore},
+    results::{Headline, ImagesOf, ResultStore, StoredReport, Unreachable},
     suggestions::Suggestions,
     telemetry::Tracer,
     views::Views,
@@ -44,7 +44,7 @@ use crate::{
 const UNAUTHENTICATED_SHARE: usize = 8;
 
 /// The options of the API: access rules and limits.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 #[expect(clippy::struct_excessive_bools, reason = "independent settings")]
 pub struct ApiOptions {
     /// Largest request body, bytes.
@@ -164,12 +164,12 @@ pub struct ApiState(Arc<Shared>);
 
 /// The content of [`ApiState`].
 pub struct Shared {
-    pub(super) workers: Arc<WorkerPool>,
-    pub(super) models: Arc<ModelRepository>,
-    pub(super) calibrations: Arc<Calibrations>,
-    pub(super) results: Arc<dyn ResultStore>,
-    pub(super) metrics: Arc<Metrics>,
-    pub(super) readiness: Readiness,
+    pub(crate) workers: Arc<WorkerPool>,
+    pub(crate) models: Arc<ModelRepository>,
+    pub(crate) calibrations: Arc<Calibrations>,
+    pub(crate) results: Arc<dyn ResultStore>,
+    pub(crate) metrics: Arc<Metrics>,
+    pub(crate) readiness: Readiness,
     pub(super) uploads: UploadBudget,
     /// The memory for bodies whose key has not been checked, apart from that of the others.
     pub(super) unauthenticated_uploads: UploadBudget,
@@ -181,7 +181,7 @@ pub struct Shared {
     pub(super) suggestions: Suggestions,
     /// The turns of fits that were asked for.
     pub(super) fits: FitTurns,
-    pub(super) options: ApiOptions,
+    pub(crate) options: ApiOptions,
 }
 
 impl ApiState {
@@ -237,6 +237,13 @@ impl ApiState {
         let of_settings = self.options.images_of.include(camera);
         let cameras = self.options.companions.cameras();
         of_settings || cameras.is_some_and(|cameras| cameras.keeps_image(camera))
+    }
+
+    /// Returns the number of persons of a camera at its latest report.
+    pub(super) async fn headline(&self, latest: &StoredReport) -> Result<Headline, Unreachable> {
+        let companions = &self.options.companions;
+        let (own, followed) = (companions.own_cameras(), companions.followed());
+        Headline::for_latest(&*self.results, latest, &own, &followed, &self.references).await
     }
 
     /// Returns the problem while the server is not ready.

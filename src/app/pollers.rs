@@ -1,11 +1,14 @@
 //! The threads that check something at an interval.
+//!
+//! The reload that SIGHUP requests: the files that the pollers check, at once.
 
 use std::{num::NonZeroU64, sync::Arc, time::Instant};
 
 use anyhow::Context;
+use lookdown_detect::inference::ModelRepository;
 
 use super::App;
-use crate::poller::Poller;
+use crate::{access::AccessKeys, calibration_store::Calibrations, poller::Poller, tls::Tls};
 
 /// Interval of the checks of the inference server, seconds.
 const REMOTE_EVERY: NonZeroU64 = NonZeroU64::MIN;
@@ -17,7 +20,10 @@ const WATCHDOG_EVERY: NonZeroU64 = NonZeroU64::MIN;
 impl App {
     /// The threads that look for changed models, calibrations, keys and certificates.
     pub(super) fn start_pollers(&self) -> anyhow::Result<Vec<Poller>> {
-        let (models, calibrations) = (Arc::clone(&self.models), Arc::clone(&self.calibrations));
+        let (models, calibrations) = (
+            Arc::clone(&self.state.models),
+            Arc::clone(&self.state.calibrations),
+        );
         let model_poller =
             self.settings.model.poll_seconds.map(|every| {
                 Poller::start("model-watcher", every, move || models.reload_changed())
@@ -32,16 +38,16 @@ impl App {
             let every = tls.poll_seconds()?;
             Some(Poller::start("tls-watcher", every, move || tls.refresh()))
         });
-        let (workers, limit) = (Arc::clone(&self.workers), self.state.stall_limit());
+        let (workers, limit) = (Arc::clone(&self.state.workers), self.state.stall_limit());
         let watchdog = Poller::start("worker-watchdog", WATCHDOG_EVERY, move || {
             if let Some(stall) = workers.new_stall(Instant::now(), limit) {
                 let seconds = stall.since.as_secs();
                 tracing::error!(seconds, "no frame makes progress; in flight are {stall}");
             }
         });
-        let results = Arc::clone(&self.results);
+        let results = Arc::clone(&self.state.results);
         let expiry = Poller::start("result-expiry", EXPIRY_EVERY, move || results.expire());
-        let remote = self.models.remote().cloned();
+        let remote = self.state.models.remote().cloned();
         let remote_poller = remote.map(|remote| {
             Poller::start("remote-watcher", REMOTE_EVERY, move || {
                 remote.check_health();
@@ -57,5 +63,48 @@ impl App {
         pollers
             .collect::<Result<_, _>>()
             .context("the operating system creates no thread to watch files")
+    }
+}
+
+/// Reads again what may change while the server runs. Clones share it.
+#[derive(Clone)]
+pub struct Reloader {
+    keys: Option<Arc<AccessKeys>>,
+    tls: Option<Arc<Tls>>,
+    calibrations: Arc<Calibrations>,
+    models: Arc<ModelRepository>,
+}
+
+impl App {
+    /// The reloader of the files that the app uses.
+    #[must_use]
+    pub fn reloader(&self) -> Reloader {
+        Reloader {
+            keys: self.keys.clone(),
+            tls: self.tls.clone(),
+            calibrations: Arc::clone(&self.state.calibrations),
+            models: Arc::clone(&self.state.models),
+        }
+    }
+}
+
+impl Reloader {
+    /// Loads the files that have changed. A file that cannot be used is logged, and the previous
+    /// version stays in use. Blocks.
+    pub fn reload(&self) {
+        if let Some(keys) = &self.keys {
+            keys.refresh();
+        }
+        if let Some(tls) = &self.tls {
+            tls.refresh();
+        }
+        self.calibrations.refresh();
+        // The second check finds the files of models unchanged since the first, and loads them.
+        self.models.reload_changed();
+        self.models.reload_changed();
+        tracing::info!(
+            "SIGHUP: the files of keys, certificates, calibrations and models were checked for \
+             changes"
+        );
     }
 }

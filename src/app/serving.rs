@@ -1,29 +1,44 @@
 //! The life of the server, from the sockets to the last answer.
+//!
+//! The sockets that the settings describe.
+//!
+//! The report of `lookdown serve --check`.
+//!
+//! Notifications to systemd: ready, stopping, and the watchdog of the service.
+//!
+//! systemd names its socket in `NOTIFY_SOCKET`, and the interval of the watchdog in
+//! `WATCHDOG_USEC`. Without these variables nothing is sent.
 
 use std::{
+    fmt::Write as _,
     future::pending,
     net::SocketAddr,
     sync::Arc,
+    thread,
     time::{Duration, Instant},
 };
 
+use anyhow::{Context, bail};
+use lookdown_detect::parameters::Priority;
 use lookdown_http::{
     Shutdown,
     server::{self, Plain},
 };
 use rustix::process::{Resource, getrlimit};
+use sd_notify::NotifyState;
 use tokio::{
     join,
     net::TcpListener,
     spawn,
     task::spawn_blocking,
-    time::{sleep, timeout},
+    time::{MissedTickBehavior, interval, sleep, timeout},
 };
 
-use super::{App, CALIBRATIONS_CHECK, Sockets, systemd};
+use super::{App, CALIBRATIONS_CHECK};
 use crate::{
-    api::{self, Phase},
-    settings::Settings,
+    access::Scope,
+    api::{self, Phase, Readiness},
+    settings::{ServerSettings, Settings, variable_of},
 };
 
 /// Longest time, 3 seconds, that the shutdown waits for the MQTT broker.
@@ -63,7 +78,7 @@ impl App {
             tls,
             router,
             limits,
-            &self.metrics.connections,
+            &self.state.metrics.connections,
             &shutdown,
         );
         // Waits for both: the process must not exit while a model is being loaded.
@@ -73,13 +88,13 @@ impl App {
                 Ok(())
             };
             tokio::try_join!(self.load_models(scheme, address, &shutdown), connections)?;
-            let workers = Arc::clone(&self.workers);
+            let workers = Arc::clone(&self.state.workers);
             spawn_blocking(move || workers.shut_down()).await?;
             if let Some(publishing) = publishing {
                 // The results have ended. If the broker takes too long, it publishes the will.
                 let _ = timeout(MQTT_SHUTDOWN_TIMEOUT, publishing).await;
             }
-            self.results.flush().await;
+            self.state.results.flush().await;
             tracing::info!("stopped");
             anyhow::Ok(())
         };
@@ -89,10 +104,10 @@ impl App {
             }
         };
         let limit = self.state.stall_limit();
-        let is_stuck = || self.workers.stall(Instant::now(), limit).is_some();
+        let is_stuck = || self.state.workers.stall(Instant::now(), limit).is_some();
         let alongside = async {
             // In memory of its own: the future of the server has a limit.
-            let notifications = Box::pin(systemd::notify(&self.readiness, &shutdown, is_stuck));
+            let notifications = Box::pin(notify(&self.state.readiness, &shutdown, is_stuck));
             join!(operation, notifications);
             pending::<()>().await;
         };
@@ -117,7 +132,7 @@ impl App {
     /// ends during a load.
     async fn end_of_load(&self) {
         let ended = async {
-            while self.models.is_loading() {
+            while self.state.models.is_loading() {
                 sleep(LOAD_CHECK).await;
             }
         };
@@ -133,7 +148,7 @@ impl App {
             None,
             router,
             limits,
-            &self.metrics.connections,
+            &self.state.metrics.connections,
             &Shutdown::default(),
         )
         .await;
@@ -145,7 +160,7 @@ impl App {
         let grace = self.settings.shutdown.grace;
         let drain_timeout = self.settings.drain_timeout();
         shutdown.requested().await;
-        self.readiness.stopping();
+        self.state.readiness.stopping();
         tracing::info!("stopping");
         tokio::select! {
             () = sleep(grace) => {}
@@ -153,7 +168,7 @@ impl App {
         }
         tracing::info!("draining: requests in flight are finished");
         // Streams of results would never end by themselves.
-        self.results.listeners().end();
+        self.state.results.listeners().end();
         shutdown.drain();
         sleep(drain_timeout).await;
     }
@@ -162,8 +177,8 @@ impl App {
     /// loaded.
     async fn load(&self, name: String, shutdown: &Shutdown) -> anyhow::Result<()> {
         loop {
-            let loaded = if self.models.is_remote_available() {
-                let (models, name) = (Arc::clone(&self.models), name.clone());
+            let loaded = if self.state.models.is_remote_available() {
+                let (models, name) = (Arc::clone(&self.state.models), name.clone());
                 Some(spawn_blocking(move || models.load(&name)).await?)
             } else {
                 None
@@ -195,12 +210,12 @@ impl App {
             }
             self.load(name, shutdown).await?;
         }
-        while !self.calibrations.is_read() && !shutdown.is_requested() {
+        while !self.state.calibrations.is_read() && !shutdown.is_requested() {
             sleep(CALIBRATIONS_CHECK).await;
         }
         // Each profile needs its model: a server with some of them would refuse the others' frames.
-        if self.readiness.phase() == Phase::WarmingUp && !shutdown.is_requested() {
-            self.readiness.warmed_up();
+        if self.state.readiness.phase() == Phase::WarmingUp && !shutdown.is_requested() {
+            self.state.readiness.warmed_up();
             let port = address.port();
             tracing::info!(
                 "ready: the page is {scheme}://localhost:{port}, try curl -F img=@samples/office.jpg \
@@ -250,4 +265,170 @@ fn log_start(settings: &Settings, scheme: &str, address: SocketAddr) {
         calibrations = %settings.calibrations.path.display(),
         "listening on {scheme}://{address}, API page at {scheme}://{address}/docs"
     );
+}
+
+/// The sockets of the service.
+#[derive(Debug)]
+pub struct Sockets {
+    /// All endpoints, or all except metrics.
+    pub main: TcpListener,
+    /// Metrics and probes only, if the settings ask for a separate port.
+    pub metrics: Option<TcpListener>,
+}
+
+impl Sockets {
+    /// Binds the addresses of the settings.
+    ///
+    /// # Errors
+    /// One sentence that names the setting, for an address that is in use or not one of this
+    /// machine.
+    pub async fn bind(settings: &ServerSettings) -> anyhow::Result<Self> {
+        let main = bind("server.listen", settings.listen).await?;
+        let metrics = match settings.metrics_listen {
+            Some(address) => Some(bind("server.metrics_listen", address).await?),
+            None => None,
+        };
+        Ok(Self { main, metrics })
+    }
+}
+
+async fn bind(key: &str, address: SocketAddr) -> anyhow::Result<TcpListener> {
+    TcpListener::bind(address).await.with_context(|| {
+        let variable = variable_of(key);
+        format!("{key}: cannot listen on {address}: set {variable} or --listen to a free address")
+    })
+}
+
+impl App {
+    /// Loads every model that is served, and describes the server that could start: a line on
+    /// models and calibrations, and lines on the clients that have access. Blocks.
+    ///
+    /// # Errors
+    /// Returns an error if a model cannot be loaded, or if the calibration store cannot be read.
+    pub fn check(&self) -> anyhow::Result<String> {
+        for name in &self.to_load {
+            self.state.models.load(name)?;
+        }
+        while !self.state.calibrations.is_read() {
+            thread::sleep(CALIBRATIONS_CHECK);
+        }
+        let health = self.state.calibrations.health();
+        if let Some(problem) = health.store_problem {
+            bail!("calibrations.path: {problem}");
+        }
+        Ok(format!(
+            "ready to serve on {}: the models {} and {} calibrations can be used\n{}",
+            self.settings.server.listen,
+            self.to_load.join(", "),
+            health.serving,
+            self.access_report(),
+        ))
+    }
+
+    fn access_report(&self) -> String {
+        let address = self.settings.server.listen;
+        let mut report = match &self.keys {
+            None if !self.settings.access.open => format!(
+                "access: open, without API keys: every client on this machine may send frames, read \
+                 and change everything at {address}"
+            ),
+            None => format!(
+                "access: open (access.open), without API keys: every client that reaches {address} \
+                 may send frames and read calibrations and reports; changes are refused; set \
+                 access.keys_file to need keys"
+            ),
+            Some(keys) => {
+                let keys = keys.known();
+                let mut report =
+                    format!("access: {address} needs an API key; {} known", keys.len());
+                for holder in keys.holders() {
+                    let scopes = holder.scopes.joined(", ");
+                    let _ = write!(report, "\n  {}: {scopes}", holder.name);
+                    if holder.scopes.allow(Scope::Detect) {
+                        let highest = Priority::from_level(holder.highest_priority.get());
+                        let _ = write!(report, "; priorities {} to 9", highest.highest_level());
+                    }
+                }
+                report
+            }
+        };
+        let public = match self.settings.server.metrics_listen {
+            Some(address) => {
+                format!("\nwithout a key: health checks and the API page, and metrics at {address}")
+            }
+            None => "\nwithout a key: health checks, metrics and the API page".to_owned(),
+        };
+        report.push_str(&public);
+        report
+    }
+}
+
+/// Notifies systemd when the server is ready and when a stop is requested. Confirms the watchdog at
+/// half of its interval while `is_stuck` returns false. A blocked runtime confirms nothing. In both
+/// cases systemd restarts the server.
+pub(super) async fn notify(
+    readiness: &Readiness,
+    shutdown: &Shutdown,
+    is_stuck: impl Fn() -> bool,
+) {
+    let phases = async {
+        readiness.ready().await;
+        if readiness.phase() == Phase::Ready {
+            send(NotifyState::Ready).await;
+        }
+        shutdown.requested().await;
+        send(NotifyState::Stopping).await;
+    };
+    let watchdog = async {
+        let timeout = sd_notify::watchdog_enabled();
+        if let Some(timeout) = timeout.filter(|timeout| !timeout.is_zero()) {
+            let confirm = async || send(NotifyState::Watchdog).await;
+            confirm_every(timeout / 2, is_stuck, confirm).await;
+        }
+    };
+    join!(phases, watchdog);
+}
+
+/// Confirms at this interval, except while `is_stuck` returns true.
+async fn confirm_every(every: Duration, is_stuck: impl Fn() -> bool, confirm: impl AsyncFn()) -> ! {
+    let mut ticks = interval(every);
+    ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    loop {
+        ticks.tick().await;
+        if !is_stuck() {
+            confirm().await;
+        }
+    }
+}
+
+/// Sends a message. A failure is logged: systemd then acts on the missing message.
+async fn send(state: NotifyState<'static>) {
+    let sent = spawn_blocking(move || sd_notify::notify(&[state])).await;
+    if let Ok(Err(error)) = sent {
+        tracing::warn!(%error, "systemd cannot be notified");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+
+    use tokio::time::timeout;
+
+    use super::*;
+
+    #[tokio::test(start_paused = true)]
+    async fn watchdog_is_confirmed_only_while_work_progresses() {
+        let (stuck, confirmed) = (Cell::new(false), Cell::new(0));
+        let for_three_ticks = async || {
+            let confirm = async || confirmed.set(confirmed.get() + 1);
+            let confirming = confirm_every(Duration::from_secs(5), || stuck.get(), confirm);
+            let _ = timeout(Duration::from_secs(14), confirming).await;
+        };
+        for_three_ticks().await;
+        assert_eq!(confirmed.get(), 3);
+        stuck.set(true);
+        for_three_ticks().await;
+        assert_eq!(confirmed.get(), 3);
+    }
 }

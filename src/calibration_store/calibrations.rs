@@ -3,9 +3,7 @@
 
 mod change;
 mod content;
-mod error;
 mod load;
-mod named_file;
 mod samples;
 mod scan;
 mod snapshot;
@@ -32,8 +30,8 @@ use super::{CalibrationStore, StoreError};
 use crate::metrics::Metrics;
 
 pub use change::{Put, WriteCondition};
+pub use content::ChangeError;
 pub use content::{CalibrationEntry, Reading, defaults};
-pub use error::ChangeError;
 pub use snapshot::{CalibrationRow, CalibrationsHealth};
 
 /// The calibrations of a store. Shared; lookups never wait for the store.

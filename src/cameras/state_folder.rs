@@ -1,16 +1,21 @@
 //! The files of the state folder, which only this user can read.
+//!
+//! The reasons why a camera cannot be stored, removed or read.
+//!
+//! A stored camera, and the file of all.
 
 use std::{
+    collections::BTreeMap,
     fs,
     io::{self, Write},
     os::unix::fs::{DirBuilderExt, OpenOptionsExt},
     path::{Path, PathBuf},
 };
 
-use lookdown_common::{ConfigError, Replacement, Secret, read_file};
-use serde::de::DeserializeOwned;
-
-use super::error::CameraError;
+use lookdown_common::{ConfigError, Replacement, Secret, StoredFile, plain_name, read_file};
+use lookdown_watch::{CameraEntry, Location, SourceError};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use serde_json::{Map, Value};
 
 /// The folder of the passwords in the state folder.
 const PASSWORDS: &str = "passwords";
@@ -116,5 +121,124 @@ fn unless_missing(path: &Path, done: io::Result<()>) -> Result<(), CameraError> 
             Err(CameraError::Folder(path.to_owned(), error))
         }
         _ => Ok(()),
+    }
+}
+
+/// A camera that cannot be stored or removed.
+#[derive(Debug, thiserror::Error)]
+pub enum CameraError {
+    /// A value that cannot be used.
+    #[error(transparent)]
+    Invalid(#[from] ConfigError),
+    /// A camera of the settings file.
+    #[error("{0}: this camera is in the settings file: change it there")]
+    Configured(String),
+    /// The state folder cannot be used.
+    #[error("state.path: {0} cannot be written: {1}")]
+    Folder(PathBuf, #[source] io::Error),
+    /// Other cameras are being tested.
+    #[error("other cameras are being tested: retry")]
+    Busy,
+    /// The camera gives no frame.
+    #[error(transparent)]
+    Source(#[from] SourceError),
+}
+
+/// The name in the path of a test, which no camera has.
+pub(super) const TEST: &str = "test";
+/// The file of the cameras in the state folder.
+pub(super) const FILE: &str = "cameras.json";
+
+/// A camera as it is stored, without its password.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StoredCamera {
+    /// The URL of the source.
+    pub url: String,
+    /// The user name.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub user: Option<String>,
+    /// The interval between two frames.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub every: Option<String>,
+    /// The ID of the calibration.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<String>,
+    /// The profile.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub profile: Option<String>,
+    /// True if no frames are read.
+    #[serde(default)]
+    pub paused: bool,
+    /// True if the latest image is kept.
+    #[serde(default)]
+    pub keep_image: bool,
+}
+
+impl StoredCamera {
+    /// Returns the source without its query, which may hold a token.
+    #[must_use]
+    pub fn shown_source(&self) -> String {
+        let location = Location::parse(&self.url);
+        location.map_or_else(|_| String::new(), |(location, _)| location.to_string())
+    }
+}
+
+/// Stored cameras by name.
+pub type Stored = BTreeMap<String, StoredCamera>;
+
+/// The content of the file of the cameras.
+#[derive(Serialize)]
+pub(super) struct CameraFile {
+    version: u8,
+    #[serde(flatten)]
+    pub(super) cameras: Stored,
+    /// Entries that are not cameras. They stay until they are replaced or deleted.
+    #[serde(flatten)]
+    pub(super) invalid: Map<String, Value>,
+}
+
+impl CameraFile {
+    /// Reads the file in a state folder.
+    pub(super) fn read(folder: &StateFolder) -> Result<Self, ConfigError> {
+        let mut entries: Map<String, Value> = folder.read(FILE)?;
+        if let Some(version) = entries.remove(StoredFile::KEY) {
+            let checked = StoredFile::Cameras.check(&version.to_string());
+            checked.map_err(|problem| folder.refused(FILE, &problem))?;
+        }
+        let (mut cameras, mut invalid) = (Stored::new(), Map::new());
+        for (name, entry) in entries {
+            match StoredCamera::deserialize(&entry) {
+                Ok(camera) => drop(cameras.insert(name, camera)),
+                Err(_) => drop(invalid.insert(name, entry)),
+            }
+        }
+        Ok(Self {
+            version: StoredFile::Cameras.version(),
+            cameras,
+            invalid,
+        })
+    }
+}
+
+/// Checks the name of a camera that is to be stored.
+pub(super) fn check_name(name: &str) -> Result<(), ConfigError> {
+    if plain_name::is_plain(name) && ![TEST, StoredFile::KEY].contains(&name) {
+        return Ok(());
+    }
+    let remedy = "is not a name of 1 to 64 of a-z, 0-9, '_' and '-', and not test or version";
+    Err(ConfigError::value("name", name, remedy))
+}
+
+/// Returns the entry of a stored camera, without its password.
+pub(super) fn entry(name: &str, camera: &StoredCamera) -> CameraEntry {
+    CameraEntry {
+        name: Some(name.to_owned()),
+        url: Some(camera.url.clone()),
+        user: camera.user.clone(),
+        every: camera.every.clone(),
+        calibration: camera.calibration.clone(),
+        profile: camera.profile.clone(),
+        ..CameraEntry::default()
     }
 }

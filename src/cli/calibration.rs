@@ -3,12 +3,9 @@
 mod check;
 mod convert;
 mod fit;
-mod frame_file;
 mod height;
-mod native_output;
 mod people;
 mod place;
-mod report_file;
 mod source;
 mod suggest_area;
 
@@ -16,7 +13,7 @@ use std::process::ExitCode;
 
 use clap::Subcommand;
 
-use self::frame_file::{read_frame, read_frames};
+use self::source::{read_frame, read_frames};
 
 /// The subcommands for calibrations.
 #[derive(Debug, Subcommand)]

@@ -1,12 +1,18 @@
 //! Completion on the command line: the answers to a shell, whose script `lookdown completions`
 //! prints.
+//!
+//! `lookdown completions` and `lookdown manual`: the command line for shells and as manual pages.
 
 use std::{
     ffi::{OsStr, OsString},
-    io,
+    fs,
+    io::{self, Write},
+    path::PathBuf,
+    process::ExitCode,
 };
 
-use clap::Command;
+use anyhow::Context;
+use clap::{Args, Command};
 use clap_complete::{
     CompleteEnv, CompletionCandidate, Shell,
     engine::ArgValueCompleter,
@@ -14,7 +20,7 @@ use clap_complete::{
 };
 use lookdown_detect::inference::model_names;
 
-use crate::settings;
+use crate::{cli::output::UNWRITABLE, settings};
 
 /// The variable that the scripts set: the name of the shell.
 const VARIABLE: &str = "LOOKDOWN_COMPLETE";
@@ -63,4 +69,38 @@ fn models(begun: &OsStr) -> Vec<CompletionCandidate> {
     let begun = begun.to_string_lossy();
     let names = names.into_iter().filter(|name| name.starts_with(&*begun));
     names.map(CompletionCandidate::new).collect()
+}
+
+/// Arguments of `lookdown completions`.
+#[derive(Debug, Args)]
+pub(super) struct CompletionArguments {
+    /// The shell
+    shell: Shell,
+}
+
+/// Arguments of `lookdown manual`.
+#[derive(Debug, Args)]
+pub(super) struct ManualArguments {
+    /// Output folder of the pages; created if it is missing
+    folder: PathBuf,
+}
+
+/// Prints the script that completes the command line in a shell. It calls this program.
+pub(super) fn print_completions(arguments: &CompletionArguments) -> anyhow::Result<ExitCode> {
+    let mut script = Vec::new();
+    write_script(arguments.shell, &mut script).context(UNWRITABLE)?;
+    io::stdout().write_all(&script).context(UNWRITABLE)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Writes a manual page for `command` and one for each command below it.
+pub(super) fn write_manual(
+    arguments: &ManualArguments,
+    command: Command,
+) -> anyhow::Result<ExitCode> {
+    let folder = &arguments.folder;
+    fs::create_dir_all(folder)
+        .and_then(|()| clap_mangen::generate_to(command, folder))
+        .with_context(|| format!("{}: the pages cannot be written", folder.display()))?;
+    Ok(ExitCode::SUCCESS)
 }

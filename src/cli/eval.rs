@@ -2,7 +2,6 @@
 
 mod arguments;
 mod table;
-mod truth;
 
 use std::{
     io::{self, Write},
@@ -43,7 +42,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     if arguments.from_detections.is_empty() {
         detect_groups(arguments, &mut output)?;
     } else {
-        let data_set = arguments.truth.open(&arguments.settings_file)?;
+        let settings = arguments.settings_file.load()?;
+        let data_set = arguments.truth.open(&settings)?;
         for path in saved_rows(&arguments.from_detections)? {
             output.print(&DetectedRow::load(&path, &data_set)?, &data_set)?;
         }
@@ -55,7 +55,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
 fn detect_groups(arguments: &Arguments, output: &mut Output) -> anyhow::Result<()> {
     let groups = parameter_groups(arguments)?;
     let settings = arguments.settings_file.load()?;
-    let data_set = arguments.truth.open(&arguments.settings_file)?;
+    let data_set = arguments.truth.open(&settings)?;
     let engine = engine_for(&settings, &groups.concat())?;
     let engine = engine.with_plan_turn(f64::from(arguments.turn_deg).to_radians());
     for group in groups {
@@ -122,13 +122,18 @@ impl<'a> Output<'a> {
 
     fn print(&mut self, detected: &DetectedRow, data_set: &DataSet) -> anyhow::Result<()> {
         // A data set of empty rooms has counts, but neither precision nor recall.
-        let evaluated = detected.evaluate(data_set).ok();
-        let mut row = Row::new(detected, evaluated.as_ref(), &detected.counts(data_set));
+        let mut strata = Vec::new();
         for by in &self.arguments.by {
-            row.add_strata(*by, &detected.strata(data_set, *by).context("--by")?);
+            strata.push((*by, detected.strata(data_set, *by).context("--by")?));
         }
+        let row = Row {
+            detected,
+            evaluated: detected.evaluate(data_set).ok(),
+            counts: detected.counts(data_set),
+            strata,
+        };
         let line = if self.arguments.json {
-            serde_json::to_string(&row)?
+            row.json().to_string()
         } else {
             row.to_string()
         };

@@ -1,10 +1,8 @@
 //! `lookdown model`
 
 mod check;
-mod description;
 mod list;
 mod manifest;
-mod sample;
 
 use std::process::ExitCode;
 

@@ -1,29 +1,38 @@
 //! Request parameters as flags: the same names in kebab-case and the same checks, from the tables
 //! of their specifications.
 
-use std::str::FromStr;
+use std::{path::Path, str::FromStr, sync::Arc};
 
+use anyhow::Context;
 use clap::{
     Arg, ArgMatches, Args, Command, FromArgMatches,
     builder::{PossibleValuesParser, TypedValueParser},
 };
-use lookdown_detect::parameters::{
-    DetectParameters, Interface, ParameterDefault, ParameterError, ParameterKind, ParameterSpec,
+use lookdown_calibration::{Calibration, CalibrationId};
+use lookdown_detect::{
+    parameters::{
+        DetectParameters, Interface, ParameterDefault, ParameterError, ParameterKind, ParameterSpec,
+    },
+    pipeline::CalibrationLookup,
 };
 use strum::VariantNames;
 
-use crate::{annotated_image::AnnotationOptions, cli::complete};
+use crate::{
+    annotated_image::AnnotationOptions, app::open_calibrations, cli::complete, settings::Settings,
+};
 
 /// The flag that the flags of an annotated image need.
 const ANNOTATE: &str = "annotate";
 
+/// The parameters of a table that are given as flags.
+#[derive(Debug, Default, PartialEq)]
+pub(super) struct Flags<const IS_ANNOTATION: bool>(Given);
+
 /// The parameters that every detection takes, but the calibration.
-#[derive(Debug)]
-pub(super) struct ParameterFlags(Given);
+pub(super) type ParameterFlags = Flags<false>;
 
 /// The parameters of the annotated image that `--annotate` writes.
-#[derive(Debug)]
-pub(super) struct AnnotationFlags(Given);
+pub(super) type AnnotationFlags = Flags<true>;
 
 /// Names and values of parameters.
 type Given = Vec<(&'static str, String)>;
@@ -39,11 +48,6 @@ impl ParameterFlags {
     ) -> Result<DetectParameters, ParameterError> {
         let calibration = calibration.map(|id| ("calibration", id));
         DetectParameters::parse(pairs(&self.0).chain(calibration))
-    }
-
-    /// Returns true if no parameter is given.
-    pub(super) fn is_empty(&self) -> bool {
-        self.0.is_empty()
     }
 
     /// Like [`Self::check`], with another default of a parameter.
@@ -73,9 +77,27 @@ impl AnnotationFlags {
     }
 }
 
-impl Args for ParameterFlags {
+impl<const IS_ANNOTATION: bool> Flags<IS_ANNOTATION> {
+    fn offered() -> impl Iterator<Item = &'static ParameterSpec> {
+        offered(if IS_ANNOTATION {
+            AnnotationOptions::TABLE
+        } else {
+            DetectParameters::TABLE
+        })
+    }
+}
+
+impl<const IS_ANNOTATION: bool> Args for Flags<IS_ANNOTATION> {
     fn augment_args(command: Command) -> Command {
-        command.args(offered(DetectParameters::TABLE).map(flag))
+        let flag = |spec| {
+            let flag = flag(spec);
+            if IS_ANNOTATION {
+                flag.requires(ANNOTATE)
+            } else {
+                flag
+            }
+        };
+        command.args(Self::offered().map(flag))
     }
 
     fn augment_args_for_update(command: Command) -> Command {
@@ -83,9 +105,13 @@ impl Args for ParameterFlags {
     }
 }
 
-impl FromArgMatches for ParameterFlags {
+impl<const IS_ANNOTATION: bool> FromArgMatches for Flags<IS_ANNOTATION> {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
-        Ok(Self(given(DetectParameters::TABLE, matches)))
+        let given = Self::offered().filter_map(|spec| {
+            let values: Vec<_> = matches.get_many::<String>(spec.name)?.cloned().collect();
+            Some((spec.name, values.join(",")))
+        });
+        Ok(Self(given.collect()))
     }
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
@@ -94,26 +120,20 @@ impl FromArgMatches for ParameterFlags {
     }
 }
 
-impl Args for AnnotationFlags {
-    fn augment_args(command: Command) -> Command {
-        let flags = offered(AnnotationOptions::TABLE).map(flag);
-        command.args(flags.map(|flag| flag.requires(ANNOTATE)))
+/// Reads the calibration of `--calibration`: a file, or the ID of one in the calibration folder.
+pub(super) fn named_calibration(
+    named: &str,
+    settings: &Settings,
+) -> anyhow::Result<Arc<Calibration>> {
+    let path = Path::new(named);
+    if path.is_file() {
+        return Ok(Arc::new(Calibration::read(path)?));
     }
-
-    fn augment_args_for_update(command: Command) -> Command {
-        Self::augment_args(command)
-    }
-}
-
-impl FromArgMatches for AnnotationFlags {
-    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
-        Ok(Self(given(AnnotationOptions::TABLE, matches)))
-    }
-
-    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
-        *self = Self::from_arg_matches(matches)?;
-        Ok(())
-    }
+    let strange = || format!("--calibration: {named:?} is neither a file nor a calibration's ID");
+    let id: CalibrationId = named.parse().with_context(strange)?;
+    open_calibrations(settings)?.get(&id)?.with_context(|| {
+        format!("--calibration: there is no calibration {named:?} in calibrations.path")
+    })
 }
 
 /// Parses the names of an enum, and lists them in the help and in completions.
@@ -167,14 +187,6 @@ fn flag(spec: &ParameterSpec) -> Arg {
         }
         ParameterKind::Time => flag.value_name("TIME"),
     }
-}
-
-fn given(table: &'static [ParameterSpec], matches: &ArgMatches) -> Given {
-    let given = offered(table).filter_map(|spec| {
-        let values: Vec<_> = matches.get_many::<String>(spec.name)?.cloned().collect();
-        Some((spec.name, values.join(",")))
-    });
-    given.collect()
 }
 
 fn pairs<'a>(given: &'a [(&'static str, String)]) -> impl Iterator<Item = (&'a str, &'a str)> {

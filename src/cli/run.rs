@@ -18,11 +18,10 @@ use tokio::sync::watch;
 use super::{
     SettingsFile,
     async_runtime::{THREADS, run_async},
-    camera_flags::CameraFlags,
     count::{counting, run_counts},
     output::UNWRITABLE,
     serve,
-    server_flags::given,
+    server_flags::{CameraFlags, given},
     settings_file::SettingsSource,
     watch::{cameras, separate},
 };

@@ -5,7 +5,7 @@ use std::{fmt, path::Path, str::FromStr};
 use percent_encoding::percent_decode_str;
 use url::Url;
 
-use crate::tls::{ClientTls, TlsError};
+use crate::tls::ClientTls;
 
 const PORT: u16 = 1883;
 const TLS_PORT: u16 = 8883;
@@ -40,7 +40,7 @@ impl Broker {
 
     /// Returns the client side of TLS if the connection uses it. `authorities` is a PEM file;
     /// `None` trusts those of the system.
-    pub(super) fn tls(&self, authorities: Option<&Path>) -> Result<Option<ClientTls>, TlsError> {
+    pub(super) fn tls(&self, authorities: Option<&Path>) -> anyhow::Result<Option<ClientTls>> {
         let tls = || ClientTls::new("mqtt.authorities", authorities);
         self.has_tls.then(tls).transpose()
     }

@@ -9,9 +9,9 @@ use tokio::time::Instant;
 
 use super::{
     discovery::{Discovery, OFFLINE, ONLINE},
-    message::Message,
     occupancy::Occupancy,
     retained::withdrawal,
+    session::Message,
     topics::{self, Topics},
 };
 use crate::results::NewReport;

@@ -14,8 +14,8 @@ use tokio::time::Instant;
 use super::{
     camera::{Camera, Delays},
     discovery::{Discovery, OFFLINE},
-    message::Message,
     retained::{RetainedTopics, withdrawal, zone_withdrawal},
+    session::Message,
     topics::{CameraTopic, Topics, level},
 };
 use crate::results::StoredReport;

@@ -8,10 +8,9 @@ use uuid::Uuid;
 
 use super::{
     Broker,
-    message::Message,
-    session::{Session, SessionError},
+    session::{Message, Session, SessionError},
 };
-use crate::tls::{ClientTls, TlsError};
+use crate::tls::ClientTls;
 
 const FIRST_PAUSE: Duration = Duration::from_secs(1);
 const LONGEST_PAUSE: Duration = Duration::from_mins(1);
@@ -33,12 +32,12 @@ impl Connector {
     /// Creates a connector. The ID of the client starts with `client`.
     ///
     /// # Errors
-    /// [`TlsError`] when the authorities cannot be used.
+    /// If the authorities cannot be used.
     pub(super) fn new(
         broker: Broker,
         authorities: Option<&Path>,
         client: &str,
-    ) -> Result<Self, TlsError> {
+    ) -> anyhow::Result<Self> {
         Ok(Self {
             tls: broker.tls(authorities)?,
             broker,

@@ -1,7 +1,6 @@
 //! Publishes the counts of `lookdown count`: totals, occupancy and dwell times, with their
 //! announcements to Home Assistant.
 
-mod event_entities;
 mod events;
 mod number;
 
@@ -26,16 +25,13 @@ use tokio::{
 use super::{
     Broker,
     connector::Connector,
-    discovery::{OFFLINE, ONLINE},
-    entity,
-    message::Message,
+    discovery::{self, OFFLINE, ONLINE},
     retained::RetainedTopics,
-    session::{Session, SessionError},
+    session::{Message, Session, SessionError},
     topics::{Topics, level},
 };
-use crate::tls::TlsError;
-use event_entities::{announcements, config_topics, event_topic, image_topic};
 use events::{EventImage, events, floor_alert, request_images};
+use events::{announcements, config_topics, event_topic, image_topic};
 use number::{AVAILABILITY, Number, Owner};
 
 /// Most images of events that wait. Further ones are not requested.
@@ -76,12 +72,12 @@ impl CountsPublisher {
     /// Creates a publisher that is not connected yet.
     ///
     /// # Errors
-    /// [`TlsError`] when the authorities cannot be used.
+    /// If the authorities cannot be used.
     pub fn new(
         options: CountsOptions,
         snapshots: watch::Receiver<Snapshot>,
         server: ServerClient,
-    ) -> Result<Self, TlsError> {
+    ) -> anyhow::Result<Self> {
         Ok(Self {
             connector: Connector::new(
                 options.broker.clone(),
@@ -255,8 +251,8 @@ impl CountsPublisher {
         self.topics.counts(&topic)
     }
 
-    fn device<'a>(&self, owner: Owner<'_>, name: &'a str) -> entity::Device<'a> {
-        entity::Device {
+    fn device<'a>(&self, owner: Owner<'_>, name: &'a str) -> discovery::Device<'a> {
+        discovery::Device {
             id: format!("{}_{}", level(&self.options.topic_prefix), owner.device()),
             name,
         }

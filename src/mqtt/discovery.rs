@@ -1,5 +1,7 @@
 //! Announces a camera's entities to Home Assistant (its documentation: MQTT, section "MQTT
 //! discovery"): occupancy and the number of persons, of the camera and of each zone.
+//!
+//! The announcement of an entity to Home Assistant: the fields that all entities have in common.
 
 use std::time::Duration;
 
@@ -7,9 +9,8 @@ use serde_json::{Value, json};
 use url::Url;
 
 use super::{
-    entity::{BINARY_SENSOR, Device, IMAGE, SENSOR, SWITCH},
-    message::Message,
     occupancy::{OFF, ON},
+    session::Message,
     topics::{Topics, level},
 };
 use crate::results::ImagesOf;
@@ -193,6 +194,61 @@ fn occupancy_id(zone: Option<&str>) -> (&'static str, String) {
 fn persons_id(zone: Option<&str>) -> (&'static str, String) {
     let id = zone.map_or("persons".to_owned(), |zone| format!("zone_{}", level(zone)));
     (SENSOR, id)
+}
+
+/// The component of numbers.
+pub(super) const SENSOR: &str = "sensor";
+/// The component of states that are on or off.
+pub(super) const BINARY_SENSOR: &str = "binary_sensor";
+
+/// The component of events.
+pub(super) const EVENT: &str = "event";
+/// The component of images.
+pub(super) const IMAGE: &str = "image";
+/// The component of switches.
+pub(super) const SWITCH: &str = "switch";
+
+/// A device of Home Assistant: a camera or a site.
+pub(super) struct Device<'a> {
+    /// The ID, unique in an installation.
+    pub(super) id: String,
+    /// The name that is shown.
+    pub(super) name: &'a str,
+}
+
+impl Device<'_> {
+    /// Returns the ID of an entity of this device.
+    pub(super) fn entity_id(&self, entity: &str) -> String {
+        format!("{}_{entity}", self.id)
+    }
+
+    /// Returns the topic and the payload that announce an entity. `config` has its own fields. The
+    /// entity is available while all topics of `availability` are. `None` without a discovery
+    /// prefix.
+    pub(super) fn announcement(
+        &self,
+        topics: &Topics,
+        component: &str,
+        entity: &str,
+        availability: impl IntoIterator<Item = String>,
+        mut config: Value,
+    ) -> Option<(String, String)> {
+        let id = self.entity_id(entity);
+        let topic = topics.config(component, &id)?;
+        let version = env!("CARGO_PKG_VERSION");
+        let availability = availability.into_iter();
+        let availability: Vec<_> = availability.map(|topic| json!({"topic": topic})).collect();
+        config["unique_id"] = json!(id);
+        config["availability_mode"] = json!("all");
+        config["availability"] = json!(availability);
+        config["device"]["identifiers"] = json!([self.id]);
+        config["device"]["name"] = json!(self.name);
+        config["device"]["manufacturer"] = json!("Lookdown");
+        config["device"]["sw_version"] = json!(version);
+        config["origin"]["name"] = json!("Lookdown");
+        config["origin"]["sw_version"] = json!(version);
+        Some((topic, config.to_string()))
+    }
 }
 
 #[cfg(test)]

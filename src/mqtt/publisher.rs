@@ -1,8 +1,12 @@
 //! Publishes results to the broker: the subscription to the results, the queue, and the time
 //! without a broker.
+//!
+//! The latest images of cameras, with boxes: drawn one after the other, so that neither their
+//! number nor a slow broker takes more than one thread.
 
-use std::{num::NonZeroUsize, path::PathBuf, sync::Arc, time::Duration};
+use std::{collections::HashMap, num::NonZeroUsize, path::PathBuf, sync::Arc, time::Duration};
 
+use bytes::Bytes;
 use jiff::Timestamp;
 use lookdown_common::OwnCameras;
 use lookdown_detect::fairness::Client;
@@ -13,6 +17,7 @@ use tokio::{
         broadcast::{self, error::RecvError},
         mpsc,
     },
+    task::spawn_blocking,
     time::{Instant, MissedTickBehavior, interval, sleep, sleep_until},
 };
 
@@ -21,17 +26,18 @@ use super::{
     cameras::{self, Cameras},
     connector::Connector,
     discovery::{Discovery, OFFLINE, ONLINE},
-    images::{CameraImage, Images},
-    message::Message,
-    session::{Session, SessionError},
+    session::{Message, Session, SessionError},
     switches::Switches,
     topics::Topics,
 };
 use crate::{
+    annotated_image::{AnnotationOptions, Layer},
     metrics::Metrics,
     reference_counts::ReferenceCounts,
-    results::{self, FollowedPersons, Headline, ListenError, ResultStore, StoredReport},
-    tls::TlsError,
+    results::{
+        self, FollowedPersons, Headline, ImagesOf, ListenError, ReportId, ResultStore, StoredImage,
+        StoredReport,
+    },
 };
 
 /// Most reports that wait for the broker. When the queue is full, the oldest report is not sent.
@@ -94,14 +100,14 @@ impl Publisher {
     /// Creates a publisher that is not connected yet.
     ///
     /// # Errors
-    /// [`TlsError`] when the authorities cannot be used.
+    /// If the authorities cannot be used.
     pub fn new(
         options: MqttOptions,
         results: Arc<dyn ResultStore>,
         counted: FollowedPersons,
         references: Arc<ReferenceCounts>,
         metrics: Arc<Metrics>,
-    ) -> Result<Self, TlsError> {
+    ) -> anyhow::Result<Self> {
         let connector = Connector::new(
             options.broker.clone(),
             options.authorities.as_deref(),
@@ -372,6 +378,74 @@ async fn hear(results: &Arc<dyn ResultStore>, queue: broadcast::Sender<Arc<Store
             }
         }
     }
+}
+
+/// The widest image, pixels.
+const WIDTH: u32 = 1280;
+const JPEG_QUALITY: u8 = 80;
+/// Most bytes of an image. Larger ones are not published.
+const MAX_BYTES: usize = 1 << 20;
+
+/// An image of a camera.
+pub(super) struct CameraImage {
+    pub(super) camera: String,
+    pub(super) jpeg: Bytes,
+}
+
+/// The images that are published.
+pub(super) struct Images {
+    pub(super) results: Arc<dyn ResultStore>,
+    pub(super) of: ImagesOf,
+    /// Shortest time between two images of a camera.
+    pub(super) every: Duration,
+}
+
+impl Images {
+    /// Draws images and hands them over until the receiver is dropped. Waits while it is full.
+    pub(super) async fn draw(&self, to: mpsc::Sender<CameraImage>) {
+        let mut drawn = HashMap::<String, ReportId>::new();
+        let mut times = interval(self.every);
+        times.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        loop {
+            tokio::select! {
+                _ = times.tick() => {}
+                () = to.closed() => return,
+            }
+            // Without an answer, the next time decides.
+            let cameras = self.results.cameras().await.unwrap_or_default();
+            drawn.retain(|camera, _| cameras.contains(camera));
+            for camera in cameras {
+                if !self.of.include(&camera) {
+                    continue;
+                }
+                let Ok(Some(stored)) = self.results.image(&camera).await else {
+                    continue;
+                };
+                let before = drawn.insert(camera.clone(), stored.id);
+                if before == Some(stored.id) {
+                    continue;
+                }
+                // A frame that cannot be drawn is logged where it is requested.
+                let Ok(Some(jpeg)) = spawn_blocking(move || image(&stored)).await else {
+                    continue;
+                };
+                if to.send(CameraImage { camera, jpeg }).await.is_err() {
+                    return;
+                }
+            }
+        }
+    }
+}
+
+/// Returns the image that is published, if it is small enough.
+fn image(stored: &StoredImage) -> Option<Bytes> {
+    let options = AnnotationOptions {
+        layers: vec![Layer::Oriented, Layer::Scores],
+        width: WIDTH,
+        quality: JPEG_QUALITY,
+    };
+    let jpeg = stored.frame.annotated(&options, &|| false).ok()?;
+    (jpeg.len() <= MAX_BYTES).then(|| jpeg.into())
 }
 
 #[cfg(test)]

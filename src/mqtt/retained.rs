@@ -4,7 +4,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{discovery::config_withdrawals, message::Message, topics::Topics};
+use super::{discovery::config_withdrawals, session::Message, topics::Topics};
 
 /// Most owners and parts that are noted. Further ones stay with the broker.
 const MAX_NOTED: usize = 10_000;

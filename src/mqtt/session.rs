@@ -1,21 +1,32 @@
 //! One connection to the broker, from CONNECT to its end. Every operation has a timeout that ends
 //! it.
+//!
+//! Messages to publish.
+//!
+//! The connection to the broker: TCP, with TLS if the URL asks for it.
+//!
+//! The packets of a broker, within limits.
+//!
+//! Any client of the broker may retain a large message on a subscribed topic, which the broker
+//! sends after each subscription. Such a message is skipped, without memory for it: ending the
+//! connection would end MQTT for good.
 
 use std::{future::Future, io, time::Duration};
 
+use bytes::{Buf, Bytes, BytesMut};
 use futures_util::{SinkExt, StreamExt};
 use rumqttc::{
-    ConnAck, Connect, ConnectReturnCode, LastWill, Packet, Publish, QoS, Subscribe, SubscribeFilter,
+    Codec, ConnAck, Connect, ConnectReturnCode, LastWill, Packet, Publish, QoS, Subscribe,
+    SubscribeFilter,
 };
-use tokio::time::{Instant, Interval, MissedTickBehavior, interval, timeout};
-use tokio_util::codec::Framed;
+use tokio::{
+    io::{AsyncRead, AsyncWrite},
+    net::TcpStream,
+    time::{Instant, Interval, MissedTickBehavior, interval, timeout},
+};
+use tokio_util::codec::{Decoder, Encoder, Framed};
 
-use super::{
-    Broker,
-    connection::{Stream, connect},
-    message::Message,
-    packet_codec::PacketCodec,
-};
+use super::Broker;
 use crate::tls::ClientTls;
 
 /// The keep-alive interval. After 1.5 times as long without a packet the broker regards the client
@@ -162,6 +173,130 @@ async fn in_time<T>(
     timeout(BROKER_TIMEOUT, work)
         .await
         .map_err(|_| SessionError::Silent)?
+}
+
+/// A message for a topic.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Message {
+    pub(super) topic: String,
+    pub(super) payload: Bytes,
+    /// True if the broker keeps it for later subscribers.
+    pub(super) retained: bool,
+}
+
+impl Message {
+    /// A message that the broker retains.
+    pub(super) fn retained(topic: String, payload: impl Into<Bytes>) -> Self {
+        Self {
+            topic,
+            payload: payload.into(),
+            retained: true,
+        }
+    }
+
+    /// A message for current subscribers only.
+    pub(super) fn passing(topic: String, payload: Bytes) -> Self {
+        Self {
+            topic,
+            payload,
+            retained: false,
+        }
+    }
+
+    /// A message that deletes a retained one (MQTT 3.1.1, section 3.3.1.3).
+    pub(super) fn forget(topic: String) -> Self {
+        Self::retained(topic, Bytes::new())
+    }
+}
+
+/// A byte stream that carries MQTT packets.
+pub(super) trait Stream: AsyncRead + AsyncWrite + Send + Unpin {}
+
+impl<T: AsyncRead + AsyncWrite + Send + Unpin> Stream for T {}
+
+/// Opens a connection. `tls` is given if the broker uses TLS.
+pub(super) async fn connect(
+    broker: &Broker,
+    tls: Option<&ClientTls>,
+) -> io::Result<Box<dyn Stream>> {
+    let stream = TcpStream::connect((broker.host.as_str(), broker.port)).await?;
+    // Counts are small and should arrive without delay.
+    stream.set_nodelay(true)?;
+    Ok(match tls {
+        Some(tls) => Box::new(tls.connect(&broker.host, stream).await?),
+        None => Box::new(stream),
+    })
+}
+
+/// Most bytes of an incoming packet: only statuses are expected.
+const MAX_INCOMING: usize = 64 * 1024;
+/// Most bytes of an outgoing packet: much more than the largest report.
+const MAX_OUTGOING: usize = 16 * 1024 * 1024;
+/// The type of a PUBLISH in the first byte of a packet (MQTT 3.1.1, section 2.2.1).
+const PUBLISH: u8 = 3;
+
+/// Reads and writes packets.
+pub(super) struct PacketCodec {
+    codec: Codec,
+    /// The bytes of a large message that are still to be skipped.
+    to_skip: usize,
+}
+
+impl Default for PacketCodec {
+    fn default() -> Self {
+        Self {
+            codec: Codec {
+                max_incoming_size: MAX_INCOMING,
+                max_outgoing_size: MAX_OUTGOING,
+            },
+            to_skip: 0,
+        }
+    }
+}
+
+impl Decoder for PacketCodec {
+    type Item = Packet;
+    type Error = <Codec as Decoder>::Error;
+
+    fn decode(&mut self, source: &mut BytesMut) -> Result<Option<Packet>, Self::Error> {
+        loop {
+            let skipped = self.to_skip.min(source.len());
+            source.advance(skipped);
+            self.to_skip -= skipped;
+            if self.to_skip > 0 {
+                return Ok(None);
+            }
+            match length_of_large_message(source) {
+                Some(length) => self.to_skip = length,
+                None => return self.codec.decode(source),
+            }
+        }
+    }
+}
+
+impl Encoder<Packet> for PacketCodec {
+    type Error = <Codec as Encoder<Packet>>::Error;
+
+    fn encode(&mut self, packet: Packet, to: &mut BytesMut) -> Result<(), Self::Error> {
+        self.codec.encode(packet, to)
+    }
+}
+
+/// Returns the length of the message with which these bytes begin, if it is too large (section
+/// 2.2.3: seven bits in each of at most four bytes, the lowest first).
+fn length_of_large_message(bytes: &[u8]) -> Option<usize> {
+    let (first, rest) = bytes.split_first()?;
+    if first >> 4 != PUBLISH {
+        return None;
+    }
+    let mut length = 0;
+    for (index, byte) in rest.iter().take(4).enumerate() {
+        length |= usize::from(byte & 0x7F) << (7 * index);
+        if byte & 0x80 == 0 {
+            return (length > MAX_INCOMING).then_some(length + index + 2);
+        }
+    }
+    None
 }
 
 #[cfg(test)]

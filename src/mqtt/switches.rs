@@ -16,9 +16,9 @@ use tokio::{
 
 use super::{
     discovery::Discovery,
-    message::Message,
     occupancy::{OFF, ON},
     retained::RetainedTopics,
+    session::Message,
     topics::{SwitchTopic, Topics, level},
 };
 use crate::cameras::{CameraError, Cameras};

@@ -65,5 +65,5 @@ async fn the_probe_of_a_silent_server_times_out() {
     let address = silent.local_addr().unwrap().to_string();
     let gave_up = ask(&server(&[("LISTEN", &address)]), Probe::Liveness).await;
     let gave_up = gave_up.unwrap_err();
-    assert!(matches!(gave_up, ProbeError::Silent { .. }), "{gave_up}");
+    assert!(gave_up.to_string().contains("does not answer"), "{gave_up}");
 }

@@ -3,13 +3,16 @@
 //! With enough reference counts, it is the number that they teach. Else it is the number of persons
 //! that the counts follow, while it is known, and else that of the reports. Numbers of reports are
 //! medians. Without reference counts, all servers with one result store have the same number.
+//!
+//! The numbers of persons that the counts follow.
 
 use std::{num::NonZeroUsize, sync::Arc, time::Duration};
 
 use lookdown_common::OwnCameras;
 use lookdown_tracking::taught::{NumberWithBar, TaughtNumber};
+use parking_lot::RwLock;
 
-use super::{Cameras, FollowedPersons, ReportId, ResultStore, StoredReport, Unreachable};
+use super::{Cameras, ReportId, ResultStore, StoredReport, Unreachable};
 use crate::reference_counts::ReferenceCounts;
 
 /// The reports of this time before the latest one, inclusively, have a part in the median.
@@ -18,7 +21,8 @@ pub const MEDIAN_WINDOW: Duration = Duration::from_secs(5);
 const MOST_REPORTS: usize = 500;
 
 /// The origin of a headline number.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, strum::IntoStaticStr)]
+#[strum(serialize_all = "snake_case")]
 pub enum HeadlineSource {
     /// The median of the last reports, with the threshold of the camera.
     Taught,
@@ -89,19 +93,6 @@ impl Headline {
     }
 }
 
-impl HeadlineSource {
-    /// The name in the API.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Taught => "taught",
-            Self::Tracks => "tracks",
-            Self::Median => "median",
-            Self::Paused => "paused",
-        }
-    }
-}
-
 /// Returns the median of each report and those before it in the window, in the order of the
 /// reports.
 #[must_use]
@@ -143,6 +134,28 @@ fn median(numbers: &[NumberWithBar]) -> Option<NumberWithBar> {
         low: of(|number| number.low),
         high: of(|number| number.high),
     })
+}
+
+/// Returns the number of a camera; `None` while it is unknown.
+type Source = Arc<dyn Fn(&str) -> Option<u64> + Send + Sync>;
+
+/// The persons that the counts of this process or of `counts.url` follow, if there are any. Clones
+/// share them.
+#[derive(Clone, Default)]
+pub struct FollowedPersons(Arc<RwLock<Option<Source>>>);
+
+impl FollowedPersons {
+    /// Replaces the source of the numbers.
+    pub fn set(&self, source: impl Fn(&str) -> Option<u64> + Send + Sync + 'static) {
+        *self.0.write() = Some(Arc::new(source));
+    }
+
+    /// Returns the number of a camera; `None` while it is unknown.
+    #[must_use]
+    pub fn at(&self, camera: &str) -> Option<usize> {
+        let source = self.0.read().clone()?;
+        usize::try_from(source(camera)?).ok()
+    }
 }
 
 #[cfg(test)]
@@ -226,7 +239,7 @@ mod tests {
             own.set([("hall".to_owned(), is_paused)].into());
             let headline = headline_of(&store, &latest, &own, Some(5)).await;
             assert_eq!(
-                (persons(headline), headline.source.name()),
+                (persons(headline), <&str>::from(headline.source)),
                 (expected, source)
             );
         }
@@ -255,7 +268,10 @@ mod tests {
                 (4, "tracks")
             };
             assert_eq!(
-                (headline.number.unwrap().persons, headline.source.name()),
+                (
+                    headline.number.unwrap().persons,
+                    <&str>::from(headline.source)
+                ),
                 expected
             );
         }

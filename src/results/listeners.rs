@@ -7,7 +7,7 @@ use lookdown_detect::fairness::{BudgetError, BudgetShare, Client, SharedBudget};
 use parking_lot::{Mutex, MutexGuard};
 use tokio::sync::{mpsc, watch};
 
-use super::{Cameras, StoredReport, Unreachable};
+use super::{Cameras, StoredReport};
 use crate::metrics::Metrics;
 
 /// Most reports that wait for a listener.
@@ -42,6 +42,11 @@ pub enum ListenError {
     #[error("no more reports will be published: the server is shutting down")]
     Ended,
 }
+
+/// The result store does not answer.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("the result store does not answer: {0}")]
+pub struct Unreachable(pub String);
 
 /// All listeners.
 #[derive(Debug)]

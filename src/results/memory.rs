@@ -1,6 +1,5 @@
 //! Reports in the memory of this process.
 
-mod images;
 mod kept;
 
 use std::{num::NonZeroUsize, sync::Arc};

@@ -6,12 +6,7 @@
 //! and detection does not wait for them.
 
 mod address;
-mod connect;
-mod followed;
-mod keys;
-mod link;
 mod message;
-mod news;
 mod outbox;
 mod pushes;
 mod reading;
@@ -28,22 +23,21 @@ use lookdown_detect::fairness::Client;
 use redis::RedisResult;
 use tokio::{task::JoinSet, time::timeout};
 
-pub use self::address::{RedisAddress, RedisAddressError};
-pub use self::shared::RedisOptions;
 use self::{
-    connect::{Connector, TIMEOUT},
-    followed::Followed,
-    keys::Keys,
-    link::Link,
+    address::{Connector, TIMEOUT},
     outbox::Outbox,
     reading::Reader,
-    shared::Shared,
+    shared::{Followed, Keys, Link, Shared},
+};
+pub use self::{
+    address::{RedisAddress, RedisAddressError},
+    shared::RedisOptions,
 };
 use super::{
     Cameras, ListenError, Listeners, Listening, NewReport, ReportId, ResultLimits, ResultStore,
     ResultUse, StoreHealth, StoredImage, StoredReport, Unreachable,
 };
-use crate::{annotated_image::StoredFrame, metrics::Metrics, tls::TlsError};
+use crate::{annotated_image::StoredFrame, metrics::Metrics};
 
 /// Longest time that the shutdown waits for reports that Redis has not stored yet.
 const LAST_WAIT: Duration = Duration::from_secs(2);
@@ -59,12 +53,12 @@ impl RedisResults {
     /// Starts a store that connects, and reconnects, in the background. Needs a tokio runtime.
     ///
     /// # Errors
-    /// [`TlsError`] if the address needs TLS and TLS cannot be used.
+    /// If the address needs TLS and TLS cannot be used.
     pub fn start(
         options: RedisOptions,
         limits: ResultLimits,
         metrics: Arc<Metrics>,
-    ) -> Result<Self, TlsError> {
+    ) -> anyhow::Result<Self> {
         let shared = Arc::new(Shared {
             keys: Keys::new(&options.key_prefix, options.address.database()),
             followed: Followed::default(),

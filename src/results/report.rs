@@ -1,4 +1,6 @@
 //! A stored report, and the ID that gives its position in the order of all reports.
+//!
+//! The cameras of a query or a listener.
 
 use std::{fmt, num::ParseIntError, str::FromStr};
 
@@ -87,6 +89,15 @@ pub struct StoredReport {
     pub id: ReportId,
     /// The report.
     pub report: NewReport,
+}
+
+/// The cameras of a query.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub enum Cameras {
+    /// Every camera.
+    All,
+    /// This camera.
+    One(String),
 }
 
 #[cfg(test)]

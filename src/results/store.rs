@@ -1,13 +1,14 @@
 //! The interface of a result store.
+//!
+//! An image that is kept for a camera, and the set of cameras whose images may be kept.
 
-use std::{num::NonZeroUsize, sync::Arc, time::Duration};
+use std::{collections::BTreeSet, num::NonZeroUsize, sync::Arc, time::Duration};
 
 use async_trait::async_trait;
 use lookdown_detect::fairness::Client;
 
 use super::{
-    Cameras, ListenError, Listeners, Listening, NewReport, ReportId, StoredImage, StoredReport,
-    Unreachable,
+    Cameras, ListenError, Listeners, Listening, NewReport, ReportId, StoredReport, Unreachable,
 };
 use crate::annotated_image::StoredFrame;
 
@@ -149,4 +150,40 @@ pub struct StoreHealth {
     pub problem: Option<String>,
     /// The number of reports that wait to be stored.
     pub waiting: usize,
+}
+
+/// A kept image: that of its camera's latest report.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StoredImage {
+    /// The ID of its report.
+    pub id: ReportId,
+    /// The frame of its report.
+    pub frame: StoredFrame,
+}
+
+/// The cameras whose images are kept.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum ImagesOf {
+    /// Every camera.
+    All,
+    /// These cameras, possibly none.
+    Some(BTreeSet<String>),
+}
+
+impl ImagesOf {
+    /// Returns true if the image of this camera may be kept.
+    #[must_use]
+    pub fn include(&self, camera: &str) -> bool {
+        match self {
+            Self::All => true,
+            Self::Some(cameras) => cameras.contains(camera),
+        }
+    }
+}
+
+impl Default for ImagesOf {
+    /// No cameras: images show people.
+    fn default() -> Self {
+        Self::Some(BTreeSet::new())
+    }
 }

@@ -9,7 +9,7 @@ use super::{
     declare::settings,
     form::{Form, Refusal, flag, given_path, list, poll_seconds},
 };
-use crate::access::{KeyError, KeyList};
+use crate::access::KeyList;
 
 settings! {
     /// API keys, and the web pages that may call the server.
@@ -57,14 +57,13 @@ impl AccessSettings {
         if listen.ip().is_loopback() || self.needs_keys() || self.open {
             return Ok(());
         }
-        Err(SettingsError::Value {
-            key: "server.listen",
-            value: listen.to_string(),
-            remedy: "other machines reach this address and no API keys are set: set \
+        Err(SettingsError::value(
+            "server.listen",
+            listen,
+            "other machines reach this address and no API keys are set: set \
                      access.keys_file, or set access.open to true to let every client detect and \
-                     read"
-                .to_owned(),
-        })
+                     read",
+        ))
     }
 }
 
@@ -73,7 +72,7 @@ fn keys() -> Form<KeyList> {
         "API keys",
         |entries| {
             let keys = entries.join(",").parse();
-            keys.map_err(|error: KeyError| Refusal::Hidden(error.to_string()))
+            keys.map_err(|error: anyhow::Error| Refusal::Hidden(error.to_string()))
         },
         // No key is a default.
         |_| Vec::new(),

@@ -1,4 +1,6 @@
 //! The calibration store: a folder, and the memory for what is computed from it.
+//!
+//! The state that is changed over HTTP.
 
 use std::{num::NonZeroU64, path::PathBuf};
 
@@ -39,5 +41,16 @@ settings! {
         /// The most memory for the remap tables of cameras, in bytes. The least recently used go
         /// first.
         cache_bytes: usize = EngineOptions::RIG_CACHE_BYTES => whole(0..=MAX_BYTES);
+    }
+}
+
+settings! {
+    /// The state that is changed over HTTP.
+    #[derive(Debug, Clone, PartialEq)]
+    pub struct StateSettings in "state" {
+        /// The folder of views, of reference counts, and of the cameras that are added to
+        /// `lookdown run` over HTTP, with each password in a file that only its user can read. It
+        /// is created when it is needed.
+        path: PathBuf = "state".into() => path();
     }
 }

@@ -1,14 +1,17 @@
 //! The counts: those of `lookdown run` and `lookdown count`, and the `count` that a server forwards
 //! to.
+//!
+//! The server of `lookdown watch` and `lookdown count` on another machine.
 
 use std::{net::SocketAddr, path::PathBuf, time::Duration};
 
+use lookdown_common::ServerEntry;
 use lookdown_count::CountEntry;
 use url::Url;
 
 use super::{
     declare::settings,
-    form::{address, duration, flag, optional, path, web_address, whole},
+    form::{address, duration, flag, optional, path, text, web_address, whole},
 };
 
 settings! {
@@ -67,6 +70,34 @@ impl CountSettings {
             max_cameras: self.max_cameras,
             floor_alert_after: self.floor_alert.then_some(self.floor_alert_after),
             ..CountEntry::default()
+        }
+    }
+}
+
+settings! {
+    /// The server that `lookdown watch` and `lookdown count` are clients of.
+    #[derive(Debug, Clone)]
+    pub(super) struct UpstreamKeys in "upstream" {
+        /// The URL of the server that `lookdown watch` and `lookdown count` use. `lookdown run`
+        /// uses its own server instead.
+        url: String = "http://127.0.0.1:8080".to_owned()
+            => text("a URL such as http://127.0.0.1:8080", |url| !url.is_empty());
+        /// The file with the API key for that server. The first line is the key. `watch` needs the
+        /// scope `detect`, `count` the scope `read`. Empty: none.
+        api_key_file: Option<PathBuf> = None => optional(path());
+        /// The PEM file of the certificate authorities of that server. Empty: those that the system
+        /// trusts.
+        authorities: Option<PathBuf> = None => optional(path());
+    }
+}
+
+impl UpstreamKeys {
+    /// The server, not checked yet.
+    pub(super) fn entry(self) -> ServerEntry {
+        ServerEntry {
+            url: Some(self.url),
+            api_key_file: self.api_key_file,
+            authorities: self.authorities,
         }
     }
 }

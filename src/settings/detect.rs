@@ -29,10 +29,7 @@ impl Table for DetectDefaults {
             }
         }
         let pairs = given.iter().map(|(name, value)| (*name, value.as_str()));
-        Self::parse(pairs).map_err(|error| SettingsError::Hidden {
-            key: "detect",
-            problem: error.to_string(),
-        })
+        Self::parse(pairs).map_err(|error| SettingsError::hidden("detect", error))
     }
 
     fn entries() -> Vec<Entry> {

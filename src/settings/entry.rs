@@ -67,19 +67,14 @@ pub(super) fn unknown(place: &str, key: &str, entries: &[Entry]) -> SettingsErro
     }
     // Similar names, such as that of the list `cameras` for a table `camera`, come first.
     known.sort_by_key(|known| name.is_empty() || !known.trim_matches('[').starts_with(name));
-    SettingsError::Unknown {
-        place: place.to_owned(),
-        name: if is_table || above.is_empty() {
-            name
-        } else {
-            above
-        }
-        .to_owned(),
-        parent,
-        known: known
-            .iter()
-            .map(|name| format!("`{name}`"))
-            .collect::<Vec<_>>()
-            .join(", "),
-    }
+    let known: Vec<_> = known.iter().map(|name| format!("`{name}`")).collect();
+    let known = known.join(", ");
+    let name = if is_table || above.is_empty() {
+        name
+    } else {
+        above
+    };
+    SettingsError(format!(
+        "{place}: there is no `{name}` {parent}; use one of {known}"
+    ))
 }

@@ -65,7 +65,7 @@ fn repository_of(executable: &Path) -> Option<PathBuf> {
 /// The default folder is searched for in the current folder first, because calibrations are data.
 ///
 /// # Errors
-/// [`SettingsError::Missing`] when the given folder does not exist.
+/// If the given folder does not exist.
 pub fn find_calibrations(folder: &Path) -> Result<Option<PathBuf>, SettingsError> {
     if folder.exists() {
         return Ok(Some(folder.to_owned()));
@@ -73,12 +73,12 @@ pub fn find_calibrations(folder: &Path) -> Result<Option<PathBuf>, SettingsError
     if folder == Path::new(DEFAULT_CALIBRATIONS) {
         return Ok(find_installed(folder));
     }
-    Err(SettingsError::Missing {
-        key: "calibrations.path",
-        what: "folder",
-        path: folder.to_owned(),
-        remedy: "create it, or set LOOKDOWN__CALIBRATIONS__PATH to another".to_owned(),
-    })
+    Err(SettingsError::missing(
+        "calibrations.path",
+        "folder",
+        folder,
+        "create it, or set LOOKDOWN__CALIBRATIONS__PATH to another",
+    ))
 }
 
 /// Returns the existing file or folder of the installation at a relative path.

@@ -70,11 +70,10 @@ settings! {
 impl MqttKeys {
     /// The options of the publisher; `None` where there is no broker.
     pub(super) fn checked(self) -> Result<Option<MqttOptions>, SettingsError> {
-        let refusal = |key, problem| SettingsError::Hidden { key, problem };
         let broker = self.url.map(|url| url.expose_secret().parse::<Broker>());
         let mut broker = broker
             .transpose()
-            .map_err(|error: BrokerError| refusal("mqtt.url", error.to_string()))?;
+            .map_err(|error: BrokerError| SettingsError::hidden("mqtt.url", error))?;
         let in_file = self.password_file.as_deref();
         let in_file = in_file.map(|path| read_secret("mqtt.password_file", path));
         if let Some(password) = self.password.map(Secret::from).or(in_file.transpose()?) {
@@ -82,7 +81,7 @@ impl MqttKeys {
             broker = broker
                 .map(with_password)
                 .transpose()
-                .map_err(|error| refusal("mqtt.password", error.to_string()))?;
+                .map_err(|error| SettingsError::hidden("mqtt.password", error))?;
         }
         Ok(broker.map(|broker| MqttOptions {
             broker,

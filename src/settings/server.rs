@@ -1,13 +1,27 @@
-//! The HTTP server, its connections and its end.
+//! The HTTP server, its TLS, its connections, its limits and its end.
+//!
+//! The cost of one frame, and of all frames together.
+//!
+//! TLS: a certificate and its private key, given together or not at all.
 
-use std::{net::SocketAddr, time::Duration};
+use std::{
+    net::SocketAddr,
+    num::{NonZeroU32, NonZeroU64, NonZeroUsize},
+    path::PathBuf,
+    time::Duration,
+};
 
 use lookdown_http::server::ConnectionLimits;
 
 use super::{
+    SettingsError,
     declare::settings,
-    form::{MAX_TIMEOUT_MILLIS, address, count, millis, optional, whole, zero_is_none},
+    form::{
+        MAX_BYTES, MAX_TIMEOUT_MILLIS, address, count, millis, optional, path, poll_seconds, rate,
+        whole, zero_is_none,
+    },
 };
+use crate::tls::TlsOptions;
 
 settings! {
     /// The HTTP server.
@@ -58,5 +72,112 @@ settings! {
         /// request.
         drain_timeout as "drain_timeout_millis": Option<Duration> = None
             => zero_is_none(millis(0..=MAX_TIMEOUT_MILLIS));
+    }
+}
+
+/// The longest side that the JPEG format can state.
+const MAX_IMAGE_SIDE: u64 = 65_535;
+
+settings! {
+    /// The cost of one frame, and of all frames together.
+    #[derive(Debug, Clone, PartialEq)]
+    pub struct LimitSettings in "limits" {
+        /// The longest side of a frame in pixels, checked before it is decoded.
+        max_image_side: u32 = 8192 => whole(1..=MAX_IMAGE_SIDE);
+        /// The most pixels of a frame, checked before it is decoded.
+        max_image_pixels: u64 = 50_000_000 => whole(1..=MAX_IMAGE_SIDE * MAX_IMAGE_SIDE);
+        /// The most memory for decoding one frame, in bytes.
+        max_decode_bytes: u64 = 512 << 20 => whole(1..=MAX_BYTES);
+        /// The most frames that wait for a worker or are processed. Further ones are answered with
+        /// 429. One of several clients may have half of them. A frame counts 1 more for each 8
+        /// megapixels that are decoded or drawn, and for each 32 inputs of the network, half of
+        /// the limit at most.
+        max_frames_in_flight: NonZeroUsize = NonZeroUsize::new(16).unwrap_or(NonZeroUsize::MIN)
+            => count();
+        /// The most memory for all request bodies together, and for the tensors that are unpacked
+        /// from them (four bytes a number), in bytes. Further ones are answered with 429. Responses
+        /// of more than 64 KiB that clients have not read yet may use as much again. At least
+        /// `server.max_body_bytes`. One of several clients may use half of it.
+        max_upload_bytes: usize = 256 << 20 => whole(1024..=MAX_BYTES);
+        /// The least bytes a second of a request body, over five seconds. A slower one is answered
+        /// with 408. 0: no limit.
+        min_upload_bytes_per_second: Option<NonZeroU64> = NonZeroU64::new(1024) => whole(0..=2 << 30);
+        /// The requests a second that a client may send in the long run. Further ones are answered
+        /// with 429. 0: no limit. A client is an API key, and without one an address. Health
+        /// checks, metrics and pages are not counted.
+        requests_per_second: Option<f64> = None => rate(0.02..=100_000.0);
+        /// The requests that a client may send at once after a pause.
+        request_burst: NonZeroU32 = NonZeroU32::new(20).unwrap_or(NonZeroU32::MIN) => count();
+    }
+}
+
+impl LimitSettings {
+    /// The limits, if they leave room for the largest body.
+    pub(super) fn checked(self, server: &ServerSettings) -> Result<Self, SettingsError> {
+        if self.max_upload_bytes < server.max_body_bytes {
+            return Err(SettingsError::value(
+                "limits.max_upload_bytes",
+                self.max_upload_bytes.to_string(),
+                format!(
+                    "give at least server.max_body_bytes, {}",
+                    server.max_body_bytes
+                ),
+            ));
+        }
+        Ok(self)
+    }
+}
+
+/// A minute: no client needs longer for a handshake.
+const MAX_HANDSHAKE_MILLIS: u64 = 60_000;
+
+settings! {
+    /// TLS as it is written.
+    #[derive(Debug, Clone)]
+    pub(super) struct TlsKeys in "server.tls" {
+        /// The PEM file of the server's certificate, followed by the intermediate certificates.
+        /// With a certificate and a private key the server speaks HTTPS, without them plain HTTP.
+        certificate: Option<PathBuf> = None => optional(path());
+        /// The PEM file of the certificate's private key.
+        private_key: Option<PathBuf> = None => optional(path());
+        /// The PEM file of certificate authorities. Each client must then show a certificate of one
+        /// of them.
+        client_certificates: Option<PathBuf> = None => optional(path());
+        /// The interval in seconds at which these files are checked for changes. 0: never. An
+        /// invalid new version leaves the old one in use and shows in the metrics and in the log.
+        poll_seconds: Option<NonZeroU64> = NonZeroU64::new(2) => poll_seconds();
+        /// The longest time for a TLS handshake.
+        handshake_timeout as "handshake_timeout_millis": Duration = Duration::from_secs(10)
+            => millis(1..=MAX_HANDSHAKE_MILLIS);
+    }
+}
+
+impl TlsKeys {
+    /// The options of TLS; `None` for plain HTTP.
+    pub(super) fn checked(self) -> Result<Option<TlsOptions>, SettingsError> {
+        let missing = |key, remedy| Err(SettingsError::value(key, "empty", remedy));
+        match (self.certificate, self.private_key) {
+            (Some(certificate), Some(private_key)) => Ok(Some(TlsOptions {
+                certificate,
+                private_key,
+                client_certificates: self.client_certificates,
+                poll_seconds: self.poll_seconds,
+                handshake_timeout: self.handshake_timeout,
+            })),
+            (Some(_), None) => missing(
+                "server.tls.private_key",
+                "give the file of the certificate's private key, or leave the certificate out",
+            ),
+            (None, Some(_)) => missing(
+                "server.tls.certificate",
+                "give the file of the private key's certificate, or leave the private key out",
+            ),
+            (None, None) if self.client_certificates.is_some() => missing(
+                "server.tls.certificate",
+                "clients show certificates over TLS only: give the server's certificate and private \
+                 key, or leave client_certificates out",
+            ),
+            (None, None) => Ok(None),
+        }
     }
 }

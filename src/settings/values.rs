@@ -120,26 +120,27 @@ impl Values {
 }
 
 fn read(path: &Path) -> Result<String, SettingsError> {
-    files::read_text(path, MAX_SETTINGS_BYTES).map_err(|source| SettingsError::Unreadable {
-        path: path.to_owned(),
-        source,
+    files::read_text(path, MAX_SETTINGS_BYTES).map_err(|source| {
+        let path = path.display();
+        SettingsError(format!(
+            "the settings file {path} cannot be read ({source}): check the path given to --config"
+        ))
     })
 }
 
 fn parse(path: &Path, text: &str) -> Result<Table, SettingsError> {
-    text.parse()
-        .map_err(|error: toml::de::Error| SettingsError::NotToml {
-            path: path.to_owned(),
-            problem: on_one_line(&error.to_string()),
-        })
+    text.parse().map_err(|error: toml::de::Error| {
+        let (path, problem) = (path.display(), on_one_line(&error.to_string()));
+        SettingsError(format!(
+            "the settings file {path} is not valid TOML: {problem}"
+        ))
+    })
 }
 
 fn check_version(path: &Path, version: &Value) -> Result<(), SettingsError> {
     let checked = StoredFile::Settings.check(&version.to_string());
-    checked.map_err(|problem| SettingsError::Version {
-        path: path.to_owned(),
-        problem,
-    })
+    let path = path.display();
+    checked.map_err(|problem| SettingsError(format!("the settings file {path} {problem}")))
 }
 
 /// Drops the quoted source lines of a TOML error, which may hold a secret.

@@ -47,8 +47,10 @@ pub(super) fn key_of(name: &str, entries: &[Entry]) -> Result<Option<String>, Se
         Some(rest) if rest.contains(SEPARATOR) => {
             let key = key(rest);
             Err(if is_known(&key) {
-                let (name, right) = (name.to_owned(), variable_of(&key));
-                SettingsError::MisnamedVariable { name, right }
+                let right = variable_of(&key);
+                SettingsError(format!(
+                    "the variable {name} is not read: rename it to {right}"
+                ))
             } else {
                 unknown(name, &key, entries)
             })

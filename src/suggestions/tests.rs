@@ -17,9 +17,7 @@ use tempfile::TempDir;
 
 use super::{
     MAX_CAMERAS, SILENCE, make_room,
-    observed::{FRAMES, Observed, Subject},
-    shared::Shared,
-    worker::Worker,
+    worker::{FRAMES, Observed, Shared, Subject, Worker},
 };
 use crate::calibration_store::{Calibrations, FolderStore};
 use lookdown_common::OwnCameras;

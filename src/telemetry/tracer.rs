@@ -1,35 +1,30 @@
 //! OpenTelemetry spans, sent with OTLP over HTTP. Requests never wait for the export: spans wait in
 //! a bounded queue, a separate thread sends them, and spans that find the queue full are lost.
+//!
+//! The incoming trace of a request, according to W3C Trace Context.
+//! Source: W3C Recommendation "Trace Context", section 3, "Trace Context HTTP Headers Format".
 
 use std::time::Duration;
 
+use anyhow::Context as _;
 use opentelemetry::{
-    InstrumentationScope, KeyValue,
+    Context, InstrumentationScope, KeyValue,
+    propagation::{Extractor, TextMapPropagator},
     trace::{SpanBuilder, SpanKind, TraceContextExt, Tracer as _, TracerProvider},
 };
 use opentelemetry_otlp::{Protocol, SpanExporter, WithExportConfig, WithHttpConfig};
 use opentelemetry_sdk::{
     Resource,
+    propagation::TraceContextPropagator,
     trace::{Sampler, SdkTracer, SdkTracerProvider},
 };
 
-use super::{IncomingTrace, RequestTrace, collector::Collector};
+use super::{RequestTrace, collector::Collector};
 use crate::settings::TraceSettings;
 
 /// Longest time that the shutdown waits for the last spans.
 const LAST_DELIVERY: Duration = Duration::from_secs(3);
 const SIGNAL_PATH: &str = "v1/traces";
-
-/// The reason why traces cannot be sent.
-#[derive(Debug, thiserror::Error)]
-pub enum TracerError {
-    /// No HTTP client can be created.
-    #[error("telemetry.otlp_endpoint: no connection can be made: {0}")]
-    Client(#[from] reqwest::Error),
-    /// The exporter refuses its configuration.
-    #[error("telemetry.otlp_endpoint: {0}")]
-    Exporter(#[from] opentelemetry_otlp::ExporterBuildError),
-}
 
 /// Creates the spans of requests. The default one records nothing. Clones share its queue.
 #[derive(Debug, Clone, Default)]
@@ -46,18 +41,21 @@ impl Tracer {
     /// the collector answers. Needs a tokio runtime.
     ///
     /// # Errors
-    /// [`TracerError`], which names the setting.
-    pub fn start(settings: &TraceSettings) -> Result<Self, TracerError> {
+    /// If no connection can be made. The error names the setting.
+    pub fn start(settings: &TraceSettings) -> anyhow::Result<Self> {
         let Some(endpoint) = &settings.otlp_endpoint else {
             return Ok(Self::default());
         };
         let endpoint = endpoint.as_str().trim_end_matches('/');
+        let client = Collector::new();
+        let client = client.context("telemetry.otlp_endpoint: no connection can be made")?;
         let exporter = SpanExporter::builder()
             .with_http()
-            .with_http_client(Collector::new()?)
+            .with_http_client(client)
             .with_endpoint(format!("{endpoint}/{SIGNAL_PATH}"))
             .with_protocol(Protocol::HttpBinary)
-            .build()?;
+            .build()
+            .context("telemetry.otlp_endpoint")?;
         let version = KeyValue::new("service.version", env!("CARGO_PKG_VERSION"));
         let resource = Resource::builder()
             .with_service_name(settings.service_name.clone())
@@ -94,6 +92,103 @@ impl Tracer {
         if let Some(Exporting { provider, .. }) = &self.0 {
             // The collector has already logged a failure.
             let _ = provider.shutdown_with_timeout(LAST_DELIVERY);
+        }
+    }
+}
+
+/// Lengths of version, trace ID, parent ID and flags.
+const PART_LENGTHS: [usize; 4] = [2, 32, 16, 2];
+
+/// The trace headers of a request.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct IncomingTrace<'a> {
+    /// `traceparent`. `None` also if there are several.
+    pub parent: Option<&'a str>,
+    /// `tracestate`. Several are joined with commas.
+    pub state: Option<&'a str>,
+}
+
+impl IncomingTrace<'_> {
+    /// Returns a context with the caller's span as parent, or without a span if the headers name
+    /// none.
+    pub(super) fn context(&self) -> Context {
+        if self.parent.is_none() {
+            return Context::new();
+        }
+        TraceContextPropagator::new().extract_with_context(&Context::new(), self)
+    }
+}
+
+impl Extractor for IncomingTrace<'_> {
+    fn get(&self, key: &str) -> Option<&str> {
+        match key {
+            "traceparent" => self.parent.filter(|parent| is_well_formed(parent)),
+            "tracestate" => self.state,
+            _ => None,
+        }
+    }
+
+    fn keys(&self) -> Vec<&str> {
+        vec!["traceparent", "tracestate"]
+    }
+}
+
+/// Returns true if all parts are present. The propagator validates their values.
+fn is_well_formed(parent: &str) -> bool {
+    let mut parts = parent.split('-');
+    PART_LENGTHS.into_iter().all(|length| {
+        parts.next().is_some_and(|part| {
+            part.len() == length && part.bytes().all(|byte| byte.is_ascii_hexdigit())
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use opentelemetry::trace::TraceContextExt;
+
+    use super::*;
+
+    fn trace_of(parent: &str, state: Option<&str>) -> Option<(String, String)> {
+        let parent = Some(parent);
+        let context = IncomingTrace { parent, state }.context();
+        let span = context.span();
+        let span = span.span_context();
+        span.is_valid()
+            .then(|| (span.trace_id().to_string(), span.trace_state().header()))
+    }
+
+    #[test]
+    fn a_parent_is_known_and_so_is_one_of_a_later_version() {
+        let trace = "4bf92f3577b34da6a3ce929d0e0e4736";
+        for parent in [
+            format!("00-{trace}-00f067aa0ba902b7-01"),
+            format!("cc-{trace}-00f067aa0ba902b7-00-more"),
+        ] {
+            let known = trace_of(&parent, Some("a=1,b=2")).unwrap();
+            assert_eq!(known, (trace.to_owned(), "a=1,b=2".to_owned()));
+            // An invalid state is ignored without affecting the parent.
+            let known = trace_of(&parent, Some("nonsense")).unwrap();
+            assert_eq!(known, (trace.to_owned(), String::new()));
+        }
+    }
+
+    #[test]
+    fn an_invalid_parent_is_ignored() {
+        for parent in [
+            "",
+            "00",
+            "00-1-1-01",
+            "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7",
+            "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01-more",
+            "ff-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01",
+            "00-4BF92F3577B34DA6A3CE929D0E0E4736-00f067aa0ba902b7-01",
+            "00-+bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01",
+            "00-00000000000000000000000000000000-00f067aa0ba902b7-01",
+            "00-4bf92f3577b34da6a3ce929d0e0e4736-0000000000000000-01",
+            "00-4bf92f3577b34da6a3ce929d0e0e473\u{e9}-00f067aa0ba902b7-01",
+        ] {
+            assert_eq!(trace_of(parent, None), None, "{parent}");
         }
     }
 }

@@ -6,7 +6,7 @@ use rustls::{ClientConfig, RootCertStore, pki_types::ServerName};
 use tokio::net::TcpStream;
 use tokio_rustls::{TlsConnector, client::TlsStream};
 
-use super::{TlsError, files};
+use super::files;
 
 /// The authorities that outgoing connections trust.
 #[derive(Clone)]
@@ -17,8 +17,8 @@ impl ClientTls {
     /// system.
     ///
     /// # Errors
-    /// [`TlsError`] if the file cannot be used.
-    pub fn new(setting: &'static str, authorities: Option<&Path>) -> Result<Self, TlsError> {
+    /// If the file cannot be used.
+    pub fn new(setting: &'static str, authorities: Option<&Path>) -> anyhow::Result<Self> {
         let mut roots = RootCertStore::empty();
         let trusted = match authorities {
             Some(path) => files::authorities(setting, path)?,
@@ -27,10 +27,7 @@ impl ClientTls {
         // A certificate that cannot be parsed is not trusted.
         let (_, refused) = roots.add_parsable_certificates(trusted);
         if let Some(path) = authorities.filter(|_| refused > 0) {
-            return Err(TlsError::Damaged {
-                setting,
-                path: path.to_owned(),
-            });
+            return Err(files::damaged(setting, path));
         }
         let provider = Arc::new(rustls::crypto::ring::default_provider());
         let config = ClientConfig::builder_with_provider(provider)

@@ -18,24 +18,15 @@ const ANSWER_TO_PLAIN_HTTP: &[u8] = b"HTTP/1.1 400 Bad Request\r\n\
 /// Most bytes of a plain request that are discarded after the response.
 const MAX_IGNORED_BYTES: u64 = 1 << 20;
 
-/// The reason why a connection was not encrypted.
-#[derive(Debug, thiserror::Error)]
-pub(super) enum HandshakeError {
-    #[error("its first byte is not TLS")]
-    NotTls,
-    #[error("{0}")]
-    Failed(#[from] io::Error),
-}
-
 /// Performs the handshake. A client that sends no TLS gets an HTTP response that says so.
 pub(super) async fn shake_hands(
     mut connection: TcpStream,
     config: Arc<ServerConfig>,
-) -> Result<TlsStream<TcpStream>, HandshakeError> {
+) -> io::Result<TlsStream<TcpStream>> {
     let mut first = [0];
     let read = connection.peek(&mut first).await?;
     if read == 0 {
-        return Err(io::Error::from(io::ErrorKind::UnexpectedEof).into());
+        return Err(io::ErrorKind::UnexpectedEof.into());
     }
     if first != [HANDSHAKE_RECORD] {
         connection.write_all(ANSWER_TO_PLAIN_HTTP).await?;
@@ -43,9 +34,9 @@ pub(super) async fn shake_hands(
         // A close with unread bytes would reset the connection and lose the response.
         let mut rest = connection.take(MAX_IGNORED_BYTES);
         tokio::io::copy(&mut rest, &mut tokio::io::sink()).await?;
-        return Err(HandshakeError::NotTls);
+        return Err(io::Error::other("its first byte is not TLS"));
     }
-    Ok(TlsAcceptor::from(config).accept(connection).await?)
+    TlsAcceptor::from(config).accept(connection).await
 }
 
 #[cfg(test)]

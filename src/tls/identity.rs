@@ -1,8 +1,11 @@
 //! The certificates and settings that a server uses in handshakes, made of validated files.
+//!
+//! The validity period of a certificate.
 
 use std::{path::Path, sync::Arc};
 
-use jiff::Timestamp;
+use anyhow::{Context, anyhow};
+use jiff::{Timestamp, civil::DateTime, tz::TimeZone};
 use rustls::{
     Error, RootCertStore, ServerConfig,
     crypto::{CryptoProvider, ring},
@@ -12,13 +15,13 @@ use rustls::{
     version::{TLS12, TLS13},
 };
 
-use super::{
-    TlsError, TlsOptions,
-    files::{TlsFiles, invalid, is_readable_by_others},
-    validity::Validity,
-};
+use super::files::{TlsFiles, TlsOptions, invalid, is_readable_by_others};
+
 /// The application protocol over TLS (ALPN, RFC 7301).
 const PROTOCOL: &[u8] = b"http/1.1";
+
+/// Files that passed all checks, and that the TLS library refuses.
+const REFUSED: &str = "server.tls: these files cannot be used together: give others";
 
 /// The certificates and settings that a server uses in handshakes.
 pub(super) struct Identity {
@@ -31,7 +34,7 @@ pub(super) struct Identity {
 
 impl Identity {
     /// Validates the content of the files: the key belongs to the certificate, and all can be used.
-    pub(super) fn new(files: &TlsFiles, options: &TlsOptions) -> Result<Self, TlsError> {
+    pub(super) fn new(files: &TlsFiles, options: &TlsOptions) -> anyhow::Result<Self> {
         let provider = Arc::new(ring::default_provider());
         let certified = certified_key(files, options, &provider)?;
         let validity = certified
@@ -39,7 +42,8 @@ impl Identity {
             .ok()
             .and_then(|certificate| Validity::from_der(certificate));
         let builder = ServerConfig::builder_with_provider(Arc::clone(&provider))
-            .with_protocol_versions(&[&TLS13, &TLS12])?;
+            .with_protocol_versions(&[&TLS13, &TLS12])
+            .context(REFUSED)?;
         let builder = match files.authorities(options)? {
             Some(authorities) => {
                 builder.with_client_cert_verifier(verifier(authorities, options, provider)?)
@@ -93,18 +97,24 @@ fn certified_key(
     files: &TlsFiles,
     options: &TlsOptions,
     provider: &CryptoProvider,
-) -> Result<CertifiedKey, TlsError> {
+) -> anyhow::Result<CertifiedKey> {
     let chain = files.chain(options)?;
     let key = files.key(options)?;
-    CertifiedKey::from_der(chain, key, provider).map_err(|error| match error {
-        Error::InconsistentKeys(_) => TlsError::Mismatch {
-            private_key: options.private_key.clone(),
-            certificate: options.certificate.clone(),
-        },
-        Error::InvalidCertificate(_) => invalid(options, false, 1),
-        _ => TlsError::UnknownKey {
-            path: options.private_key.clone(),
-        },
+    CertifiedKey::from_der(chain, key, provider).map_err(|error| {
+        let file = options.private_key.display();
+        match error {
+            Error::InconsistentKeys(_) => anyhow!(
+                "server.tls.private_key: the private key in {file} is not that of the first \
+                 certificate in {} (server.tls.certificate): give both files of one pair, the \
+                 server's own certificate first",
+                options.certificate.display()
+            ),
+            Error::InvalidCertificate(_) => invalid(options, false, 1),
+            _ => anyhow!(
+                "server.tls.private_key: the private key in {file} cannot be used: give an RSA key \
+                 of 2048 bits or more, an ECDSA key on P-256 or P-384, or an Ed25519 key"
+            ),
+        }
     })
 }
 
@@ -112,12 +122,81 @@ fn verifier(
     authorities: Vec<CertificateDer<'static>>,
     options: &TlsOptions,
     provider: Arc<CryptoProvider>,
-) -> Result<Arc<dyn ClientCertVerifier>, TlsError> {
+) -> anyhow::Result<Arc<dyn ClientCertVerifier>> {
     let mut roots = RootCertStore::empty();
     for (position, certificate) in (1..).zip(authorities) {
         let added = roots.add(certificate);
         added.map_err(|_| invalid(options, true, position))?;
     }
     let verifier = WebPkiClientVerifier::builder_with_provider(Arc::new(roots), provider).build();
-    verifier.map_err(|error| TlsError::Refused(Error::General(error.to_string())))
+    verifier.context(REFUSED)
+}
+
+/// The tag of the optional version, the first field of a certificate.
+const VERSION: u8 = 0xa0;
+/// The tag of a time with a year of two digits.
+const UTC_TIME: u8 = 0x17;
+
+/// The validity period of a certificate (RFC 5280, section 4.1.2.5).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Validity {
+    pub(super) not_before: Timestamp,
+    pub(super) not_after: Timestamp,
+}
+
+/// An element of DER.
+struct Element<'a> {
+    tag: u8,
+    content: &'a [u8],
+}
+
+impl Validity {
+    /// Reads the validity of a DER certificate. Returns `None` if it cannot be parsed.
+    pub(super) fn from_der(mut certificate: &[u8]) -> Option<Self> {
+        let mut fields = next(&mut next(&mut certificate)?.content)?.content;
+        if fields.first() == Some(&VERSION) {
+            next(&mut fields)?;
+        }
+        // The serial number, the algorithm and the issuer.
+        for _ in 0..3 {
+            next(&mut fields)?;
+        }
+        let mut validity = next(&mut fields)?.content;
+        Some(Self {
+            not_before: timestamp(&next(&mut validity)?)?,
+            not_after: timestamp(&next(&mut validity)?)?,
+        })
+    }
+}
+
+/// Takes the next element off the front of DER.
+fn next<'a>(der: &mut &'a [u8]) -> Option<Element<'a>> {
+    let [tag, first, rest @ ..] = *der else {
+        return None;
+    };
+    let (length, rest) = match usize::from(*first) {
+        short @ ..0x80 => (short, rest),
+        long => {
+            // The bytes of a length of at most 4 GiB.
+            let (bytes, rest) = rest.split_at_checked(long - 0x80)?;
+            let bytes = bytes.iter().map(|byte| usize::from(*byte));
+            let length = bytes.fold(0_usize, |length, byte| length.saturating_mul(256) | byte);
+            (length, rest)
+        }
+    };
+    let (content, rest) = rest.split_at_checked(length)?;
+    *der = rest;
+    Some(Element { tag: *tag, content })
+}
+
+fn timestamp(time: &Element<'_>) -> Option<Timestamp> {
+    let text = str::from_utf8(time.content).ok()?;
+    let century = match time.tag {
+        UTC_TIME if text >= "50" => "19",
+        UTC_TIME => "20",
+        _ => "",
+    };
+    let text = format!("{century}{text}");
+    let time = DateTime::strptime("%Y%m%d%H%M%SZ", text).ok()?;
+    Some(time.to_zoned(TimeZone::UTC).ok()?.timestamp())
 }

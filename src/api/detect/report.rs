@@ -1,5 +1,8 @@
 //! Converts the report of the pipeline to the units and decimals of the API.
+//!
+//! The headers of a response about its report: the number of persons and the times of the stages.
 
+use axum::http::{HeaderName, HeaderValue};
 use lookdown_calibration::warning::Warning;
 use lookdown_common::report::{
     Report, ReportBearing, ReportBox, ReportCalibration, ReportCircle, ReportDefault, ReportImage,
@@ -148,4 +151,21 @@ pub(in crate::api) fn to_timings(timings: &pipeline::StageTimings) -> ReportTimi
         refine: milliseconds(timings.refine),
         total: milliseconds(timings.total),
     }
+}
+
+pub(in crate::api) const SERVER_TIMING: HeaderName = HeaderName::from_static("server-timing");
+pub(in crate::api) const PERSON_COUNT: HeaderName = HeaderName::from_static("x-person-count");
+
+/// Returns the headers about a report: the number of persons, and the stages as
+/// `Server-Timing: decode;dur=3.1, …, total;dur=412.0` (W3C), milliseconds.
+pub(in crate::api) fn report_headers(report: &DetectionReport) -> [(HeaderName, HeaderValue); 2] {
+    let timings = to_timings(&report.timings);
+    let stages = timings
+        .stages()
+        .map(|(stage, millis)| format!("{stage};dur={millis}"));
+    // Names and numbers are visible ASCII.
+    let stages = stages.join(", ").parse();
+    let stages = stages.unwrap_or(HeaderValue::from_static(""));
+    let count = HeaderValue::from(report.persons.len());
+    [(SERVER_TIMING, stages), (PERSON_COUNT, count)]
 }

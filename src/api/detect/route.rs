@@ -12,11 +12,13 @@ use lookdown_detect::pipeline::DetectJob;
 
 use crate::api::{
     ApiState,
-    detect::answer::{AnswerOptions, Content},
-    detect::defaults::detect_parameters,
-    detect::headers::report_headers,
-    detect::run::{AnswerInput, run_detection},
-    detect::upload::Upload,
+    detect::{
+        answer::{AnswerOptions, Content},
+        defaults::detect_parameters,
+        report::report_headers,
+        run::{AnswerInput, run_detection},
+        upload::Upload,
+    },
     http::{problem::Problem, query::pairs},
     openapi::{DetectForm, DetectQuery, RawBytes},
 };
@@ -62,7 +64,7 @@ pub(in crate::api) async fn detect_persons(
     mut upload: Upload,
 ) -> Result<impl IntoResponse, Problem> {
     let context = Arc::clone(&upload.context);
-    let field = upload.field.take();
+    let field = upload.form.field.take();
     context.note_upload(upload.arrived);
     let (job, answer) = job(&state, upload)?;
     let write = move |input: AnswerInput<'_>| answer.content(input.frame, input.json);
@@ -75,8 +77,9 @@ pub(in crate::api) async fn detect_persons(
 }
 
 fn job(state: &ApiState, mut upload: Upload) -> Result<(DetectJob, AnswerOptions), Problem> {
-    let parameters = &mut upload.parameters;
-    let answer = AnswerOptions::take_from(parameters, &upload.headers, upload.file_name.take())?;
+    let parameters = &mut upload.form.parameters;
+    let answer =
+        AnswerOptions::take_from(parameters, &upload.headers, upload.form.file_name.take())?;
     let parameters = detect_parameters(state, pairs(parameters).collect(), &[])?;
     let mut job = upload.job(parameters)?;
     job.ticket.drawn_width = answer.drawn_width();

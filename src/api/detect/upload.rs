@@ -4,7 +4,6 @@
 //! The whole body is read first, within limits.
 
 mod form;
-mod names;
 mod received_request;
 
 use std::{sync::Arc, time::Instant};
@@ -16,16 +15,15 @@ use axum::{
         header::{CONTENT_ENCODING, CONTENT_TYPE},
     },
 };
-use bytes::Bytes;
 use jiff::Timestamp;
 use lookdown_common::text::Quoted;
 use lookdown_detect::{parameters::DetectParameters, pipeline::DetectJob};
 
 pub(in crate::api) use received_request::ReceivedRequest;
 
-use names::{frame_in_query, use_in_detection};
+use form::{Form, frame_in_query, use_in_detection};
 
-pub(in crate::api) use {form::FieldUse, names::frames_among};
+pub(in crate::api) use form::{FieldUse, frames_among};
 
 use crate::{
     access::Scope,
@@ -43,22 +41,14 @@ use crate::{
 
 /// A frame in memory with the parameters of its request.
 pub(in crate::api) struct Upload {
-    /// The encoded frame.
-    pub(in crate::api) image: Bytes,
-    /// Further frames of a form, where `use_of` permits them.
-    pub(in crate::api) further_images: Vec<Bytes>,
-    /// The form field of the frame; `None` if the frame is the body.
-    pub(in crate::api) field: Option<String>,
-    /// The name of its file, if it was sent.
-    pub(in crate::api) file_name: Option<String>,
+    /// The form; one with nothing but the frame if the frame is the body.
+    pub(in crate::api) form: Form,
     /// The headers of the request, such as `Accept`.
     pub(in crate::api) headers: HeaderMap,
     /// The context of the request.
     pub(in crate::api) context: Arc<RequestContext>,
     /// The caller, by a key in the headers or in the form.
     pub(in crate::api) caller: Caller,
-    /// Parameters by name. The names are checked, the values are not.
-    pub(in crate::api) parameters: Vec<(String, String)>,
     /// Time at which the request arrived.
     pub(in crate::api) received_at: Timestamp,
     /// Time at which the whole body was in memory.
@@ -92,8 +82,8 @@ impl Upload {
                 return Err(frame_in_query(name));
             }
         }
-        parameters.append(&mut upload.parameters);
-        upload.parameters = parameters;
+        parameters.append(&mut upload.form.parameters);
+        upload.form.parameters = parameters;
         Ok(upload)
     }
 
@@ -105,7 +95,7 @@ impl Upload {
         let ticket = self.caller.ticket_at(parameters.priority)?;
         let (received_at, arrived) = (self.received_at, self.arrived);
         Ok(DetectJob::sent(
-            self.image,
+            self.form.image,
             parameters,
             ticket,
             received_at,
@@ -131,29 +121,22 @@ impl Upload {
         let headers = parts.headers.clone();
         check_encoding(&headers)?;
         let form = if is_multipart(&headers) {
-            Some(form::parse(parts, held.bytes(), use_of).await?)
+            let form = form::parse(parts, held.bytes(), use_of).await?;
+            Form {
+                image: held.with_bytes(form.image).into_bytes(),
+                ..form
+            }
         } else {
-            None
-        };
-        let (image, field, file_name, further_images, parameters) = match form {
-            Some(form) => (
-                held.with_bytes(form.image),
-                Some(form.field),
-                form.file_name,
-                form.further_images,
-                form.parameters,
-            ),
-            None => (held, None, None, Vec::new(), Vec::new()),
+            Form {
+                image: held.into_bytes(),
+                ..Form::default()
+            }
         };
         Ok(Self {
-            image: image.into_bytes(),
-            further_images,
-            field,
-            file_name,
+            form,
             headers,
             caller: context.caller.clone(),
             context,
-            parameters,
             received_at,
             arrived,
         })

@@ -1,5 +1,7 @@
 //! The context of a request: its ID, trace, deadline and caller. The outermost layer determines it
 //! once from the head of the request, and everything else reads it.
+//!
+//! The trace context of an incoming request.
 
 use std::{
     sync::Arc,
@@ -8,7 +10,7 @@ use std::{
 
 use axum::{
     extract::FromRequestParts,
-    http::{Extensions, request::Parts},
+    http::{Extensions, HeaderMap, request::Parts},
 };
 use lookdown_http::request_id::RequestId;
 
@@ -16,7 +18,6 @@ use super::{
     access::{Access, Identity},
     caller::Caller,
     deadline::Deadline,
-    incoming_trace,
     problem::Problem,
 };
 use crate::telemetry::{RequestTrace, Tracer};
@@ -57,7 +58,7 @@ impl ContextSource {
         let id = RequestId::from_headers(&parts.headers);
         let identity = self.access.identify(&parts.headers);
         let context = Arc::new(RequestContext {
-            trace: incoming_trace::begin(&self.tracer, name, &parts.headers),
+            trace: begin_trace(&self.tracer, name, &parts.headers),
             deadline: Deadline::begin(self.request_timeout),
             caller: Caller::new(&self.access, &identity, &id, parts),
             is_own: parts.extensions.get::<OwnRequest>().is_some(),
@@ -101,4 +102,22 @@ impl<S: Sync> FromRequestParts<S> for Caller {
             .caller
             .clone())
     }
+}
+
+/// Begins the span of a request in the trace of its `traceparent` header, if there is one.
+fn begin_trace(
+    tracer: &Tracer,
+    name: impl FnOnce() -> String,
+    headers: &HeaderMap,
+) -> RequestTrace {
+    let mut parents = headers.get_all("traceparent").iter();
+    let parent = parents.next().filter(|_| parents.next().is_none());
+    let states = headers.get_all("tracestate").iter();
+    let states: Vec<_> = states.filter_map(|state| state.to_str().ok()).collect();
+    let states = states.join(",");
+    let incoming = crate::telemetry::IncomingTrace {
+        parent: parent.and_then(|parent| parent.to_str().ok()),
+        state: Some(states.as_str()).filter(|states| !states.is_empty()),
+    };
+    tracer.request(name, &incoming)
 }

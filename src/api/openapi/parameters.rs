@@ -17,42 +17,31 @@ use utoipa::{
 
 use crate::{annotated_image::AnnotationOptions, api::parameters};
 
-/// The parameters of `POST /detect` in the query.
-pub(in crate::api) struct DetectQuery;
+/// Declares the parameters of a query by their specifications.
+macro_rules! queries {
+    ($($(#[doc = $description:literal])+ $name:ident = $specs:expr;)+) => {$(
+        $(#[doc = $description])+
+        pub(in crate::api) struct $name;
 
-impl IntoParams for DetectQuery {
-    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
-        parameters::all().map(in_query).collect()
-    }
+        impl IntoParams for $name {
+            fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
+                $specs.map(in_query).collect()
+            }
+        }
+    )+};
 }
 
-/// The parameters of a detection without those of the response, in the query.
-pub(in crate::api) struct DetectionQuery;
-
-impl IntoParams for DetectionQuery {
-    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
-        DetectParameters::TABLE.iter().map(in_query).collect()
-    }
-}
-
-/// [`DetectionQuery`] without the calibration, which the path names.
-pub(in crate::api) struct CalibratedDetectionQuery;
-
-impl IntoParams for CalibratedDetectionQuery {
-    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
-        let table = DetectParameters::TABLE.iter();
-        let table = table.filter(|spec| spec.name != DetectParameters::CALIBRATION);
-        table.map(in_query).collect()
-    }
-}
-
-/// The parameters of an annotated image in the query.
-pub(in crate::api) struct AnnotationQuery;
-
-impl IntoParams for AnnotationQuery {
-    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
-        AnnotationOptions::TABLE.iter().map(in_query).collect()
-    }
+queries! {
+    /// The parameters of `POST /detect` in the query.
+    DetectQuery = parameters::all();
+    /// The parameters of a detection without those of the response, in the query.
+    DetectionQuery = DetectParameters::TABLE.iter();
+    /// [`DetectionQuery`] without the calibration, which the path names.
+    CalibratedDetectionQuery = DetectParameters::TABLE
+        .iter()
+        .filter(|spec| spec.name != DetectParameters::CALIBRATION);
+    /// The parameters of an annotated image in the query.
+    AnnotationQuery = AnnotationOptions::TABLE.iter();
 }
 
 /// The frame and parameters in a form: what `detect::upload::form` reads.

@@ -5,7 +5,6 @@
 //! The only model, `lookdown`, accepts frames and returns their persons.
 
 mod answer;
-mod content_encoding;
 pub(in crate::api) mod describe;
 mod document;
 pub(in crate::api) mod infer;
@@ -14,4 +13,3 @@ mod own_metadata;
 mod persons;
 mod request;
 mod tensor;
-mod wanted;

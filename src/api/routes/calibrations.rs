@@ -1,9 +1,6 @@
 //! The calibration resources: the scope `read` reads them, the scope `admin` changes them.
 
-mod address;
-mod conditions;
 pub(in crate::api) mod fit;
-mod fit_form;
 mod row;
 mod upload;
 pub(in crate::api) mod views;
@@ -20,10 +17,10 @@ use axum::{
 use lookdown_http::entity_tags::{entity_tag, is_unmodified};
 
 use self::{
-    address::{CalibrationAddress, NewCalibrationAddress},
-    conditions::write_condition,
     row::CalibrationInfo,
     upload::CalibrationUpload,
+    upload::write_condition,
+    upload::{CalibrationAddress, NewCalibrationAddress},
 };
 use crate::{
     api::{

@@ -4,10 +4,8 @@
 mod address;
 pub(in crate::api) mod delete;
 pub(in crate::api) mod events;
-mod feed;
 pub(in crate::api) mod history;
 pub(in crate::api) mod latest;
-pub(in crate::api) mod latest_image;
 mod row;
 
 use axum::{
@@ -31,7 +29,7 @@ use crate::{
         http::problem::{Problem, ProblemKind},
         require_scope::RequireRead,
     },
-    results::{Headline, ListenError, Unreachable},
+    results::{ListenError, Unreachable},
 };
 
 /// Clients may cache the response, but must revalidate it before use.
@@ -58,15 +56,10 @@ pub(in crate::api) async fn list(
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
     let now = Timestamp::now();
-    let companions = &state.options.companions;
-    let (own, followed) = (companions.own_cameras(), companions.followed());
     let latest = state.results.latest_of_all().await?;
     let mut rows = Vec::with_capacity(latest.len());
     for report in &latest {
-        let headline =
-            Headline::for_latest(&*state.results, report, &own, &followed, &state.references)
-                .await?;
-        rows.push(CameraRow::at(report, headline, now));
+        rows.push(CameraRow::at(report, state.headline(report).await?, now));
     }
     rows.sort_unstable_by(|one, other| one.camera.cmp(&other.camera));
     let tag = revision_of(

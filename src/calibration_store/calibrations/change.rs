@@ -5,8 +5,10 @@ use std::sync::Arc;
 use lookdown_calibration::CalibrationId;
 
 use super::{
-    CalibrationEntry, Calibrations, ChangeError, Reading, content::import, load::LoadedFile,
-    named_file::written_name, samples::sample,
+    CalibrationEntry, Calibrations, ChangeError, Reading,
+    content::import,
+    load::{LoadedFile, written_name},
+    samples::sample,
 };
 use crate::calibration_store::{ListedFile, Replaces};
 

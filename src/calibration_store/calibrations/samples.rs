@@ -9,7 +9,7 @@ use std::{
 
 use lookdown_calibration::{CalibrationId, native::NativeCalibration};
 
-use super::{CalibrationEntry, Reading, content::import, named_file::written_name};
+use super::{CalibrationEntry, Reading, content::import, load::written_name};
 use crate::samples::SAMPLES;
 
 static ENTRIES: LazyLock<HashMap<CalibrationId, Arc<CalibrationEntry>>> = LazyLock::new(|| {

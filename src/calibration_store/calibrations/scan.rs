@@ -5,7 +5,11 @@ use std::{collections::BTreeMap, sync::Arc};
 use lookdown_calibration::CalibrationFile;
 use parking_lot::MutexGuard;
 
-use super::{Calibrations, load::LoadedFile, named_file::by_id, snapshot::Snapshot};
+use super::{
+    Calibrations,
+    load::{LoadedFile, by_id},
+    snapshot::Snapshot,
+};
 use crate::calibration_store::StoreError;
 
 impl Calibrations {

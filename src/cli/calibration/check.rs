@@ -22,9 +22,8 @@ use lookdown_lens::geometry::{
 };
 
 use super::{
-    native_output::refuse_input,
     read_frame,
-    source::{NamedCamera, Source},
+    source::{NamedCamera, Source, refuse_input},
 };
 use crate::cli::output::UNWRITABLE;
 
@@ -197,52 +196,48 @@ fn mount(calibration: &Calibration) -> String {
 }
 
 /// Describes the zones, lines and masks, if there are any.
-fn areas(calibration: &Calibration) -> impl Iterator<Item = (&'static str, String)> {
+fn areas(calibration: &Calibration) -> Vec<(&'static str, String)> {
     let Areas {
         zones,
         lines,
         masks,
         foot_filter,
     } = calibration.areas();
-    let names = zones.iter().map(|zone| match zone.area {
+    let (width, height) = calibration.image_size();
+    let zones = zones.iter().map(|zone| match zone.area {
         ZoneArea::Frame(_) => format!("{} (in the frame)", zone.name),
         ZoneArea::Floor(_) => format!("{} (on the floor)", zone.name),
     });
-    let names: Vec<_> = names.collect();
-    let zones = (!names.is_empty()).then(|| ("  zones", names.join(", ")));
-    let crossings = lines.iter().map(|line| {
+    let lines = lines.iter().map(|line| {
         let [left_to_right, right_to_left] = &line.directions;
         format!("{} ({left_to_right}, {right_to_left})", line.name)
     });
-    let crossings: Vec<_> = crossings.collect();
-    let lines = (!crossings.is_empty()).then(|| ("  lines", crossings.join(", ")));
-    let masks = (!masks.is_empty()).then(|| {
-        let (width, height) = calibration.image_size();
+    let masked = (!masks.is_empty()).then(|| {
         let hidden = MaskedPixels::new(masks, width, height).count();
         let percent = 100.0 * hidden as f64 / (f64::from(width) * f64::from(height));
-        let text = format!("{}, which hide {percent:.1} % of the frame", masks.len());
-        ("  masks", text)
+        format!("{}, which hide {percent:.1} % of the frame", masks.len())
     });
-    let counted = |title, areas: &[ZoneArea]| {
-        let on_floor = areas
-            .iter()
-            .filter(|area| matches!(area, ZoneArea::Floor(_)));
-        let on_floor = on_floor.count();
-        let text = format!(
-            "{on_floor} on the floor, {} in the frame",
-            areas.len() - on_floor
-        );
-        (!areas.is_empty()).then_some((title, text))
+    let counted = |areas: &[ZoneArea]| {
+        let is_on_floor = |area: &&ZoneArea| matches!(area, ZoneArea::Floor(_));
+        let on_floor = areas.iter().filter(is_on_floor).count();
+        let in_frame = areas.len() - on_floor;
+        (!areas.is_empty()).then(|| format!("{on_floor} on the floor, {in_frame} in the frame"))
     };
-    let areas = counted("  areas", &foot_filter.areas);
-    let ignore = counted("  ignore", &foot_filter.ignore);
-    let (width, height) = calibration.image_size();
     let shares = calibration.areas().shares(width, height).into_iter();
     let shares = shares.map(|AreaShare { field, percent }| format!("{field} {percent:.1} %"));
-    let shares: Vec<_> = shares.collect();
-    let shares = (!shares.is_empty()).then(|| ("  of the frame", shares.join(", ")));
-    let places = areas.into_iter().chain(ignore).chain(shares);
-    zones.into_iter().chain(lines).chain(masks).chain(places)
+    let joined = |texts: Vec<String>| (!texts.is_empty()).then(|| texts.join(", "));
+    let lines = [
+        ("  zones", joined(zones.collect())),
+        ("  lines", joined(lines.collect())),
+        ("  masks", masked),
+        ("  areas", counted(&foot_filter.areas)),
+        ("  ignore", counted(&foot_filter.ignore)),
+        ("  of the frame", joined(shares.collect())),
+    ];
+    let lines = lines.into_iter();
+    lines
+        .filter_map(|(title, text)| Some((title, text?)))
+        .collect()
 }
 
 fn draw(calibration: &Calibration, frame: &Path, out: &Path) -> anyhow::Result<()> {

@@ -6,7 +6,7 @@ use anyhow::Context;
 use clap::Args;
 use lookdown_calibration::export::Target;
 
-use super::{native_output::write_content, source::Source};
+use super::source::{Source, write_content};
 use crate::cli::parameters::one_of;
 
 /// Arguments of `lookdown calibration convert`.

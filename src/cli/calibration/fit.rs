@@ -10,9 +10,9 @@ use std::process::ExitCode;
 use anyhow::Context;
 
 use super::{
-    native_output::{refuse_input, write_native},
     people::{PeopleSource, set_height},
     read_frames,
+    source::{refuse_input, write_native},
 };
 use crate::room_calibration::give_height;
 

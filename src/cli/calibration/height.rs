@@ -6,10 +6,8 @@ use anyhow::Context;
 use clap::Args;
 
 use super::{
-    frame_file::read_frames,
-    native_output::write_native,
     people::{PeopleSource, set_height},
-    source::Source,
+    source::{Source, read_frames, write_native},
 };
 use crate::cli::settings_file::SettingsFile;
 

@@ -11,24 +11,24 @@ use anyhow::{Context, bail};
 use clap::Args;
 use jiff::Timestamp;
 use lookdown_calibration::native::{NativeSource, SourcedValue};
-use lookdown_common::{ServerClient, read_body};
+use lookdown_common::ServerClient;
 use lookdown_tracking::{RelativePose, Walk, relative_pose};
 use serde::Deserialize;
 use serde_json::json;
 use tokio::time;
 
-use crate::cli::{async_runtime::for_this_thread, output::UNWRITABLE, server_flags::ServerFlags};
+use crate::cli::{
+    async_runtime::for_this_thread,
+    output::UNWRITABLE,
+    server_flags::{ServerFlags, read_json},
+};
 
-/// Longest time for the tracks of a camera.
-const TIMEOUT: Duration = Duration::from_secs(10);
 /// Interval of the questions for tracks.
 const INTERVAL: Duration = Duration::from_millis(500);
 /// Interval of the lines that report the progress.
 const PROGRESS: Duration = Duration::from_secs(30);
 /// Most people of a camera. Those of four hours in a busy hall are fewer.
 const MAX_WALKS: usize = 10_000;
-/// Largest answer that is read, bytes.
-const MAX_BYTES: usize = 16 << 20;
 
 /// Arguments of `lookdown calibration place`.
 #[derive(Debug, Args)]
@@ -103,7 +103,7 @@ fn rounded(value: f64, steps: f64) -> f64 {
 
 /// Follows the people of both cameras.
 async fn follow(arguments: &Arguments) -> anyhow::Result<(Walks, Walks)> {
-    let client = ServerClient::new(&arguments.server.entry().check()?)?;
+    let client = arguments.server.client()?;
     let (mut first, mut second) = (Walks::default(), Walks::default());
     let end = time::Instant::now() + Duration::from_secs(60 * arguments.minutes);
     let mut last_reported = time::Instant::now();
@@ -125,18 +125,9 @@ async fn follow(arguments: &Arguments) -> anyhow::Result<(Walks, Walks)> {
 
 async fn tracks(client: &ServerClient, camera: &str) -> anyhow::Result<Answer> {
     let url = client.route(["counts", camera, "tracks"]);
-    let sent = client.send(client.get(url).timeout(TIMEOUT)).await;
-    let response = sent.map_err(|error| anyhow::anyhow!(client.failure(&error)))?;
-    if !response.status().is_success() {
-        bail!(
-            "{}: give the address of `lookdown run` or `count` with --server, such as \
-             http://127.0.0.1:8090",
-            client.refusal(response).await
-        );
-    }
-    let body = read_body(response, MAX_BYTES).await?;
-    serde_json::from_slice(&body)
-        .with_context(|| format!("{} has sent no tracks", client.address()))
+    read_json(client, url, "tracks").await.context(
+        "give the address of `lookdown run` or `count` with --server, such as http://127.0.0.1:8090",
+    )
 }
 
 impl Walks {

@@ -3,21 +3,18 @@
 use std::{
     io::{self, Write},
     process::ExitCode,
-    time::Duration,
 };
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 use clap::Args;
-use lookdown_common::{ServerClient, read_body};
 use serde::Deserialize;
 use serde_json::json;
 
-use crate::cli::{async_runtime::for_this_thread, output::UNWRITABLE, server_flags::ServerFlags};
-
-/// Longest time for the answer.
-const TIMEOUT: Duration = Duration::from_secs(30);
-/// Largest answer that is read, bytes.
-const MAX_BYTES: usize = 64 << 10;
+use crate::cli::{
+    async_runtime::for_this_thread,
+    output::UNWRITABLE,
+    server_flags::{ServerFlags, read_json},
+};
 
 /// Arguments of `lookdown calibration suggest-area`.
 #[derive(Debug, Args)]
@@ -51,18 +48,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
 }
 
 async fn suggested_area(arguments: &Arguments) -> anyhow::Result<SuggestedArea> {
-    let client = ServerClient::new(&arguments.server.entry().check()?)?;
-    let camera = arguments.camera.as_str();
-    let mut url = client.route(["counts", camera, "suggested-area"]);
+    let client = arguments.server.client()?;
+    let mut url = client.route(["counts", &arguments.camera, "suggested-area"]);
     if let Some(from) = &arguments.from {
         url.query_pairs_mut().append_pair("from", from);
     }
-    let sent = client.send(client.get(url).timeout(TIMEOUT)).await;
-    let response = sent.map_err(|error| anyhow::anyhow!(client.failure(&error)))?;
-    if !response.status().is_success() {
-        bail!(client.refusal(response).await);
-    }
-    let body = read_body(response, MAX_BYTES).await?;
-    serde_json::from_slice(&body)
-        .with_context(|| format!("{} has sent no suggested area", client.address()))
+    read_json(&client, url, "suggested area").await
 }

@@ -15,11 +15,11 @@ use anyhow::{Context, bail};
 use bytes::Bytes;
 use clap::Args;
 use jiff::Timestamp;
-use lookdown_calibration::{Calibration, CalibrationId};
+use lookdown_calibration::Calibration;
 use lookdown_count::Recording;
 use lookdown_detect::{
     parameters::DetectParameters,
-    pipeline::{CalibrationLookup, DetectJob, DetectedFrame, Engine, JobImage},
+    pipeline::{DetectJob, DetectedFrame, Engine, JobImage},
 };
 use lookdown_watch::{VideoFrames, VideoOptions, VideoWriter, video_created_at, video_duration};
 use tokio::runtime::Runtime;
@@ -27,17 +27,16 @@ use tokio::runtime::Runtime;
 use crate::{
     annotated_image::AnnotationOptions,
     api::to_report,
-    app::{engine_for, open_calibrations},
+    app::engine_for,
     cli::{
         SettingsFile, annotate,
         async_runtime::for_this_thread,
         detect::stream::{interval, is_video},
         output::UNWRITABLE,
-        parameters::ParameterFlags,
+        parameters::{ParameterFlags, named_calibration},
         progress::Progress,
         server_flags::given,
     },
-    settings::Settings,
 };
 
 /// The interval between two frames if none is given: the figures of docs/lab/count-accuracy.md are
@@ -50,7 +49,7 @@ const THRESHOLD_HELP: &str = "Minimum score of a person in a recording: counts w
                               themselves [default: 0.06]";
 
 /// Flags of recordings.
-#[derive(Debug, Args)]
+#[derive(Debug, Default, PartialEq, Args)]
 #[group(id = "recording_flags", multiple = true)]
 #[command(mut_arg(SCORE_THRESHOLD.0, |flag| flag.help(THRESHOLD_HELP).long_help(THRESHOLD_HELP)))]
 pub(super) struct RecordingFlags {
@@ -79,13 +78,7 @@ pub(super) struct RecordingFlags {
 impl RecordingFlags {
     /// Returns true if a flag is given that has no meaning without a recording.
     pub(super) fn is_given(&self) -> bool {
-        self.calibration.is_some()
-            || self.start.is_some()
-            || self.every.is_some()
-            || self.csv.is_some()
-            || self.step_minutes.is_some()
-            || self.annotate.is_some()
-            || !self.parameters.is_empty()
+        *self != Self::default()
     }
 }
 
@@ -126,7 +119,9 @@ pub(super) fn run(
     }
     let own = given(&[("counts.path", store)]);
     let settings = settings_file.load_with(&own)?;
-    let calibration = calibration(flags.calibration.as_deref(), &settings)?;
+    let named = flags.calibration.as_deref();
+    let calibration = named.map(|named| named_calibration(named, &settings));
+    let calibration = calibration.transpose()?;
     let id = calibration.as_ref().map(|found| found.id().as_str());
     let parameters = flags.parameters.check_or(id, SCORE_THRESHOLD)?;
     let camera = match (&parameters.camera, id, files) {
@@ -298,26 +293,6 @@ impl Counting<'_> {
         }
         Ok(self.recording)
     }
-}
-
-/// Returns the calibration of `--calibration`.
-fn calibration(
-    named: Option<&str>,
-    settings: &Settings,
-) -> anyhow::Result<Option<Arc<Calibration>>> {
-    let Some(named) = named else { return Ok(None) };
-    let path = Path::new(named);
-    if path.is_file() {
-        return Ok(Some(Arc::new(Calibration::read(path)?)));
-    }
-    let Ok(id) = named.parse::<CalibrationId>() else {
-        bail!("--calibration: {named:?} is neither a file nor a calibration's ID");
-    };
-    let found = open_calibrations(settings)?.get(&id)?;
-    if found.is_none() {
-        bail!("--calibration: there is no calibration {named:?} in calibrations.path");
-    }
-    Ok(found)
 }
 
 /// Returns the recordings with their times. Each begins at the end of the one before, or later if

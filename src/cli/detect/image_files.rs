@@ -1,9 +1,11 @@
 //! The images to detect people in: files as they are named, folders with all that is in them.
 
 use std::{
-    fs, io,
+    fs,
     path::{Path, PathBuf},
 };
+
+use anyhow::{Context, bail};
 
 /// Endings of images that can be read, in lower case.
 const ENDINGS: [&str; 4] = ["jpg", "jpeg", "png", "webp"];
@@ -21,29 +23,17 @@ pub(super) struct ImageFile {
     pub name: String,
 }
 
-/// Images that cannot be listed.
-#[derive(Debug, thiserror::Error)]
-pub(super) enum ImageFilesError {
-    #[error("{path}: the folder cannot be read: {source}")]
-    Unreadable { path: PathBuf, source: io::Error },
-    #[error("{0}: there is no .jpg, .jpeg, .png or .webp file in this folder")]
-    NoImages(PathBuf),
-    #[error("{0}: more than {MAX_IMAGES} images at once; name fewer")]
-    TooMany(PathBuf),
-    #[error("{0}: folders lie more than {MAX_DEPTH} deep; name one further down")]
-    TooDeep(PathBuf),
-}
-
 /// The files among `paths`, and the images below the folders among them in the order of their
 /// names. Hidden files and folders are left out, and links to folders are not followed.
-pub(super) fn image_files(paths: &[PathBuf]) -> Result<Vec<ImageFile>, ImageFilesError> {
+pub(super) fn image_files(paths: &[PathBuf]) -> anyhow::Result<Vec<ImageFile>> {
     let mut image_files = Vec::new();
     for path in paths {
         if path.is_dir() {
             let before = image_files.len();
             walk(path, "", MAX_DEPTH, &mut image_files)?;
             if image_files.len() == before {
-                return Err(ImageFilesError::NoImages(path.clone()));
+                let path = path.display();
+                bail!("{path}: there is no .jpg, .jpeg, .png or .webp file in this folder");
             }
         } else {
             let name = path.file_name().unwrap_or(path.as_os_str());
@@ -61,16 +51,14 @@ fn walk(
     prefix: &str,
     depth: usize,
     image_files: &mut Vec<ImageFile>,
-) -> Result<(), ImageFilesError> {
+) -> anyhow::Result<()> {
+    let shown = folder.display();
     if depth == 0 {
-        return Err(ImageFilesError::TooDeep(folder.to_owned()));
+        bail!("{shown}: folders lie more than {MAX_DEPTH} deep; name one further down");
     }
-    let unreadable = |source| ImageFilesError::Unreadable {
-        path: folder.to_owned(),
-        source,
-    };
-    let entries = fs::read_dir(folder).map_err(unreadable)?;
-    let mut entries: Vec<_> = entries.collect::<Result<_, _>>().map_err(unreadable)?;
+    let unreadable = || format!("{shown}: the folder cannot be read");
+    let entries = fs::read_dir(folder).with_context(unreadable)?;
+    let mut entries: Vec<_> = entries.collect::<Result<_, _>>().with_context(unreadable)?;
     entries.sort_by_key(fs::DirEntry::file_name);
     for entry in entries {
         let name = entry.file_name().to_string_lossy().into_owned();
@@ -78,11 +66,11 @@ fn walk(
         if name.starts_with('.') {
             continue;
         }
-        if entry.file_type().map_err(unreadable)?.is_dir() {
+        if entry.file_type().with_context(unreadable)?.is_dir() {
             walk(&path, &format!("{prefix}{name}/"), depth - 1, image_files)?;
         } else if is_image_file(&path) {
             if image_files.len() >= MAX_IMAGES {
-                return Err(ImageFilesError::TooMany(folder.to_owned()));
+                bail!("{shown}: more than {MAX_IMAGES} images at once; name fewer");
             }
             image_files.push(ImageFile {
                 path,

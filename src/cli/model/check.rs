@@ -1,6 +1,11 @@
 //! `lookdown model check`
+//!
+//! Detection on a sample image with the model that is checked.
+//!
+//! The description of a model as text.
 
 use std::{
+    fmt,
     io::{self, Write},
     path::{Path, PathBuf},
     process::ExitCode,
@@ -9,13 +14,18 @@ use std::{
 
 use anyhow::{Context, anyhow};
 use clap::Args;
-use lookdown_detect::inference::{Detector, InferenceError, OnnxDetector};
-use lookdown_imaging::ViewBatch;
+use lookdown_common::files::{self, MAX_IMAGE_BYTES};
+use lookdown_detect::{
+    inference::{Detector, InferenceError, ModelDescription, OnnxDetector, OnnxTensor},
+    parameters::DetectParameters,
+    pipeline::{DetectJob, DetectedFrame, JobImage},
+};
+use lookdown_imaging::{ChannelOrder, ViewBatch};
 
-use super::{description, manifest, sample::detect};
+use super::manifest;
 use crate::{
     annotated_image::AnnotationOptions,
-    app::onnx_options,
+    app::{engine_for, onnx_options},
     cli::{annotate, output::UNWRITABLE, settings_file::SettingsFile},
     settings::{Settings, explain, find_installed},
 };
@@ -71,7 +81,7 @@ pub(super) fn check_model(
         .map_err(|error| anyhow!(explain(&error)))?;
     let loaded = loading.elapsed();
     let mut out = io::stdout().lock();
-    write!(out, "{}", description::Lines(detector.description())).context(UNWRITABLE)?;
+    write!(out, "{}", Lines(detector.description())).context(UNWRITABLE)?;
     writeln!(out, "loaded in    {}", millis(loaded)).context(UNWRITABLE)?;
     let most = settings.threads.batch_views.get().max(BATCH_VIEWS);
     let one_view = millis(time(&mut detector, 1)?);
@@ -145,4 +155,85 @@ fn time(detector: &mut OnnxDetector, views: usize) -> Result<Duration, Inference
     }
     times.sort_unstable();
     Ok(times[RUNS / 2])
+}
+
+/// Detects persons in the sample with the model of the settings.
+pub(super) fn detect(
+    settings: &Settings,
+    sample: &Path,
+    profile: &str,
+) -> anyhow::Result<DetectedFrame> {
+    let parameters = DetectParameters::parse([("profile", profile)])?;
+    let engine = engine_for(settings, std::slice::from_ref(&parameters))?;
+    let image = files::read(sample, MAX_IMAGE_BYTES)
+        .with_context(|| format!("--sample: {} cannot be read", sample.display()))?;
+    Ok(engine.detect(&DetectJob::local(
+        sample.display().to_string(),
+        JobImage::Encoded(image.into()),
+        parameters,
+        None,
+    ))?)
+}
+
+/// One property per line.
+pub(super) struct Lines<'a>(pub(super) &'a ModelDescription);
+
+impl fmt::Display for Lines<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let model = self.0;
+        let manifest = &model.manifest;
+        let unknown = || "not stated".to_owned();
+        let checked = match &manifest.sha256 {
+            Some(_) => "as in the manifest",
+            None => "not in the manifest",
+        };
+        let license = model.license.clone().unwrap_or_else(unknown);
+        let source = manifest.source.clone().unwrap_or_else(unknown);
+        writeln!(f, "name         {}", manifest.name)?;
+        writeln!(
+            f,
+            "file         {}, {} bytes",
+            manifest.onnx.display(),
+            model.bytes
+        )?;
+        writeln!(f, "sha256       {} ({checked})", model.sha256)?;
+        writeln!(f, "revision     {}", model.revision)?;
+        writeln!(f, "license      {license}")?;
+        writeln!(f, "source       {source}")?;
+        for (what, tensors) in [("input", &model.inputs), ("output", &model.outputs)] {
+            for OnnxTensor {
+                name,
+                element,
+                shape,
+            } in tensors
+            {
+                let shape: Vec<_> = shape.iter().copied().map(dimension).collect();
+                writeln!(f, "{what:<12} {name}: {element} [{}]", shape.join(", "))?;
+            }
+        }
+        let input = &model.input;
+        let order = match input.channel_order {
+            ChannelOrder::Rgb => "rgb",
+            ChannelOrder::Bgr => "bgr",
+        };
+        let views = match model.views_per_run {
+            Some(views) => format!("{views} at once"),
+            None => "any number at once".to_owned(),
+        };
+        writeln!(
+            f,
+            "pixels       {}×{}, {}, {order}, 0..255 × {:?} + {:?}",
+            input.width, input.height, model.layout, input.scale, input.offset
+        )?;
+        writeln!(f, "views        {views}")?;
+        let head = &manifest.output;
+        writeln!(f, "head         {}: {}", head.name(), head.description())
+    }
+}
+
+fn dimension(side: i64) -> String {
+    match side {
+        ..0 => "any".to_owned(),
+        side => side.to_string(),
+    }
 }

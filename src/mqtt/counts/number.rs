@@ -1,6 +1,6 @@
 //! The numbers of a camera or a site: their topics, and the IDs of their entities.
 
-use crate::mqtt::entity::{BINARY_SENSOR, SENSOR};
+use crate::mqtt::discovery::{BINARY_SENSOR, SENSOR};
 
 /// The topic below that of an owner with its availability.
 pub(super) const AVAILABILITY: &str = "availability";

@@ -12,7 +12,7 @@ use redis::{
     streams::{StreamId, StreamRangeReply},
 };
 
-use super::{keys::Keys, message::is_one_line};
+use super::{message::is_one_line, shared::Keys};
 use crate::{
     annotated_image::StoredFrame,
     results::{Cameras, NewReport, ReportId, ResultUse, StoredImage, StoredReport},

@@ -8,7 +8,7 @@ use lookdown_common::text::one_line;
 use lookdown_http::request_id::new_id;
 use redis::{RedisResult, Script, aio::MultiplexedConnection};
 
-use super::{Shared, link::is_refusal, outbox::PendingReport};
+use super::{Shared, outbox::PendingReport, shared::is_refusal};
 use crate::results::Cameras;
 
 /// The script that stores a report in Redis.

@@ -1,4 +1,6 @@
 //! Parses `multipart/form-data`: the frame, and parameters as text fields.
+//!
+//! The parameters that may accompany a frame.
 
 use axum::{
     body::Body,
@@ -7,8 +9,12 @@ use axum::{
 };
 use bytes::Bytes;
 use lookdown_common::text::is_invisible;
+use lookdown_detect::parameters::ParameterError;
 
-use crate::api::http::problem::{Problem, ProblemKind};
+use crate::api::{
+    http::problem::{Problem, ProblemKind},
+    parameters,
+};
 
 /// Largest number of fields of a form: every parameter and the frame, with room for repeated
 /// fields, which have a better error message.
@@ -33,15 +39,16 @@ pub(in crate::api) enum FieldUse {
 }
 
 /// The content of a form.
-pub(super) struct Form {
-    pub(super) image: Bytes,
+#[derive(Default)]
+pub(in crate::api) struct Form {
+    pub(in crate::api) image: Bytes,
     /// Further frames, where the request may have some.
-    pub(super) further_images: Vec<Bytes>,
+    pub(in crate::api) further_images: Vec<Bytes>,
     /// The field of the frame.
-    pub(super) field: String,
+    pub(in crate::api) field: Option<String>,
     /// The name of the frame's file, without its folders.
-    pub(super) file_name: Option<String>,
-    pub(super) parameters: Vec<(String, String)>,
+    pub(in crate::api) file_name: Option<String>,
+    pub(in crate::api) parameters: Vec<(String, String)>,
 }
 
 /// Parses a form. `body` is complete, so this never waits for the client.
@@ -96,7 +103,7 @@ pub(super) async fn parse(
     Ok(Form {
         image,
         further_images,
-        field,
+        field: Some(field),
         file_name,
         parameters,
     })
@@ -164,4 +171,44 @@ fn broken(error: MultipartError) -> Problem {
     malformed(&format!(
         "the multipart form is malformed or cut off: {reason}"
     ))
+}
+
+/// The names of the frame's field.
+const FRAME_NAMES: [&str; 2] = ["img", "image"];
+
+/// Returns the use of a field of `POST /detect`; other fields are refused.
+pub(super) fn use_in_detection(name: &str) -> Result<FieldUse, Problem> {
+    let known: Vec<_> = parameters::all().map(|spec| spec.name).collect();
+    use_among(&known, name)
+}
+
+/// Returns the use of a field of a form with a frame and these parameters; others are refused.
+fn use_among(parameters: &[&str], name: &str) -> Result<FieldUse, Problem> {
+    if FRAME_NAMES.contains(&name) {
+        Ok(FieldUse::Frame)
+    } else if parameters.contains(&name) {
+        Ok(FieldUse::Parameter)
+    } else {
+        let problem = format!(
+            "there is no such field or parameter: send the frame as `img` or `image`; the parameters are {}",
+            parameters.join(", ")
+        );
+        Err(ParameterError::unknown(name, problem).into())
+    }
+}
+
+/// Returns the use of a field of a form with one or more frames and these parameters; others are
+/// refused.
+pub(in crate::api) fn frames_among(parameters: &[&str], name: &str) -> Result<FieldUse, Problem> {
+    let field_use = use_among(parameters, name)?;
+    Ok(match field_use {
+        FieldUse::Frame => FieldUse::Frames,
+        other => other,
+    })
+}
+
+/// Returns the problem of a frame in the query.
+pub(super) fn frame_in_query(name: &str) -> Problem {
+    let problem = "it is in the query: send the frame as the body or in a form".to_owned();
+    ParameterError::unknown(name, problem).into()
 }

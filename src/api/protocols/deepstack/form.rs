@@ -76,6 +76,7 @@ impl FromRequest<ApiState> for DeepStackUpload {
         let query = query_parameters(request.uri())?;
         let mut upload = Upload::receive(request, state, budget, use_of).await?;
         let mut keys = upload
+            .form
             .parameters
             .extract_if(.., |(name, _)| name == API_KEY);
         // Clients without a key send an empty field.
@@ -128,7 +129,7 @@ impl DeepStackUpload {
         given.extend(calibration.map(|id| (DetectParameters::CALIBRATION, id)));
         let is_in_query = given.iter().any(|(name, _)| *name == SCORE_THRESHOLD);
         // All remaining fields have this name. Clients without a threshold send an empty field.
-        let confidences = upload.parameters.iter().map(|(_, value)| &**value);
+        let confidences = upload.form.parameters.iter().map(|(_, value)| &**value);
         let confidences = confidences.filter(|value| !value.is_empty());
         given.extend(confidences.map(|value| (SCORE_THRESHOLD, value)));
         let protocol = [(SCORE_THRESHOLD, DEFAULT_MIN_CONFIDENCE)];

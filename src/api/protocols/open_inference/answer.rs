@@ -13,7 +13,7 @@ use lookdown_detect::open_inference::{
 
 use super::{
     own_metadata::{FRAME_MODEL, FRAME_MODEL_VERSION},
-    wanted::Wanted,
+    tensor::Wanted,
 };
 use crate::api::http::problem::Problem;
 

@@ -6,11 +6,10 @@ use axum::{
 };
 
 use super::{
-    content_encoding::decompressed,
     document::{InferRequestBody, InferResponseBody},
     own_metadata::require_frame_model,
     persons::{self, ArrivalTimes},
-    request::InferRequest,
+    request::{InferRequest, decompressed},
 };
 use crate::api::{
     ApiState,

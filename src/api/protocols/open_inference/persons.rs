@@ -20,9 +20,11 @@ use super::{
 };
 use crate::api::{
     ApiState,
-    detect::defaults::detect_parameters,
-    detect::headers::{PERSON_COUNT, report_headers},
-    detect::run::{AnswerInput, Answered, run_detection},
+    detect::{
+        defaults::detect_parameters,
+        report::{PERSON_COUNT, report_headers},
+        run::{AnswerInput, Answered, run_detection},
+    },
     http::{context::RequestContext, problem::Problem, query::pairs, rate_limit::RequestTokens},
 };
 

@@ -1,4 +1,6 @@
 //! The fit of a camera to the straight edges of its frame.
+//!
+//! The OpenAPI description of what `POST /calibrations/{id}/fit` takes.
 
 use axum::{
     Json,
@@ -14,15 +16,20 @@ use lookdown_imaging::{
     decode::{DecodeLimits, decode},
     room_fit::{RoomFrame, fit_room},
 };
-use lookdown_lens::self_calibration::KnownCamera;
+use lookdown_lens::self_calibration::{FieldOfView, IdealLens, KnownCamera};
 use serde::Serialize;
+use strum::VariantNames;
 use tokio_util::sync::CancellationToken;
-use utoipa::ToSchema;
-
-use super::{
-    address::NewCalibrationAddress,
-    fit_form::{CEILING, FitForm, KnownCameraQuery},
+use utoipa::{
+    IntoParams, PartialSchema, ToSchema,
+    openapi::{
+        KnownFormat, Object, ObjectBuilder, RefOr, Required, Schema, SchemaFormat,
+        path::{Parameter, ParameterBuilder, ParameterIn},
+        schema::{AdditionalProperties, ArrayBuilder, Type},
+    },
 };
+
+use super::upload::NewCalibrationAddress;
 use crate::{
     api::{
         ApiState,
@@ -55,7 +62,7 @@ impl FromRequest<ApiState> for FitRequest {
     async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
         let mut upload = Upload::accept(request, state, |name| frames_among(&NAMES, name)).await?;
         let [lens, field_of_view, ceiling] =
-            values_named(std::mem::take(&mut upload.parameters), NAMES)?;
+            values_named(std::mem::take(&mut upload.form.parameters), NAMES)?;
         let is_on_ceiling = parsed(CEILING, ceiling.as_deref(), "true or false")?;
         let known = known_camera(
             lens.as_deref(),
@@ -105,8 +112,9 @@ pub(in crate::api) async fn fit(
     NewCalibrationAddress(id): NewCalibrationAddress,
     FitRequest { upload, known }: FitRequest,
 ) -> Result<impl IntoResponse, Problem> {
-    let (image, deadline) = (upload.image, upload.context.deadline);
-    let images: Vec<_> = [image].into_iter().chain(upload.further_images).collect();
+    let (form, deadline) = (upload.form, upload.context.deadline);
+    let images = [form.image].into_iter().chain(form.further_images);
+    let images: Vec<_> = images.collect();
     if images.len() > FRAMES {
         let fault = format!("the form has more than {FRAMES} frames: send fewer");
         return Err(refused(&fault));
@@ -161,4 +169,80 @@ fn fitted(
 
 fn refused(fault: &str) -> Problem {
     Problem::for_parameter(ProblemKind::InvalidParameter, "image", fault)
+}
+
+/// The parameter of cameras on a ceiling.
+pub(super) const CEILING: &str = "ceiling";
+
+/// Returns the known values of a camera, from its data sheet, by the name of their parameter.
+fn known_values() -> [(&'static str, Object); 3] {
+    let lenses = ObjectBuilder::new()
+        .schema_type(Type::String)
+        .pattern(Some(format!("^({})$", IdealLens::VARIANTS.join("|"))))
+        .description(Some(
+            "The projection of the lens, from its data sheet. Cameras that look straight down \
+             need it.",
+        ));
+    let field_of_view = ObjectBuilder::new()
+        .schema_type(Type::Number)
+        .format(Some(SchemaFormat::KnownFormat(KnownFormat::Double)))
+        .minimum(Some(FieldOfView::MIN_DEGREES))
+        .maximum(Some(FieldOfView::MAX_DEGREES))
+        .description(Some("The field of view of the lens circle, degrees."));
+    let ceiling = ObjectBuilder::new()
+        .schema_type(Type::Boolean)
+        .description(Some(
+            "`true`: the camera is on a ceiling, even if one wall fills the image. Otherwise, a \
+             camera that may be on a wall is refused.",
+        ));
+    [
+        (LENS, lenses.build()),
+        (FIELD_OF_VIEW_DEG, field_of_view.build()),
+        (CEILING, ceiling.build()),
+    ]
+}
+
+/// The known values in the query.
+pub(super) struct KnownCameraQuery;
+
+impl IntoParams for KnownCameraQuery {
+    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
+        let in_query = |(name, mut value): (&str, Object)| {
+            ParameterBuilder::new()
+                .name(name)
+                .parameter_in(ParameterIn::Query)
+                .required(Required::False)
+                .description(value.description.take())
+                .schema(Some(value))
+                .build()
+        };
+        known_values().map(in_query).into()
+    }
+}
+
+/// Frames in a form, with the known values as further fields.
+pub(super) struct FitForm;
+
+impl ToSchema for FitForm {
+    fn schemas(_: &mut Vec<(String, RefOr<Schema>)>) {}
+}
+
+impl PartialSchema for FitForm {
+    fn schema() -> RefOr<Schema> {
+        // Clients in Go of openapi-generator do not compile with limits on the number of files.
+        let frames = ArrayBuilder::new()
+            .description(Some(format!(
+                "1 to {FRAMES} frames of one camera at different times: JPEG, PNG or WebP files."
+            )))
+            .items(RawBytes::schema());
+        let form = ObjectBuilder::new()
+            .description(Some("Frames, and the known values of the query."))
+            .property("img", frames)
+            .required("img")
+            .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)));
+        let values = known_values().into_iter();
+        values
+            .fold(form, |form, (name, value)| form.property(name, value))
+            .into()
+    }
 }

@@ -1,11 +1,20 @@
 //! An uploaded calibration file.
+//!
+//! Conditional changes of calibrations (RFC 9110, section 13.1). The entity tag is the revision.
+//!
+//! The calibration ID in the path.
 
 use axum::{
-    extract::{FromRequest, Request},
-    http::Uri,
+    extract::{FromRequest, FromRequestParts, Path, Request},
+    http::{
+        HeaderMap, Uri,
+        header::{IF_MATCH, IF_NONE_MATCH},
+        request::Parts,
+    },
 };
 use bytes::Bytes;
-use lookdown_calibration::{CalibrationFile, native::NotAFrameSize};
+use lookdown_calibration::{CalibrationFile, CalibrationId, native::NotAFrameSize};
+use lookdown_http::entity_tags::{Named, named};
 
 use crate::{
     api::{
@@ -16,7 +25,7 @@ use crate::{
             query::parameters_named,
         },
     },
-    calibration_store::Reading,
+    calibration_store::{Reading, WriteCondition},
 };
 
 /// An uploaded calibration file with the options to read it.
@@ -83,4 +92,58 @@ async fn content(request: Request, state: &ApiState) -> Result<(Bytes, Uri), Pro
     let reader = state.body_reader(&context, max_bytes, remedy);
     let bytes = reader.read(&parts.headers, body).await?;
     Ok((bytes.into_bytes(), parts.uri))
+}
+
+/// Returns the condition of a change.
+pub(super) fn write_condition(headers: &HeaderMap) -> Result<WriteCondition, Problem> {
+    let if_match = named(headers, &IF_MATCH, false)?;
+    let if_none_match = named(headers, &IF_NONE_MATCH, true)?;
+    match (if_match, if_none_match) {
+        (None, None) => Ok(WriteCondition::Always),
+        (None, Some(Named::Any)) => Ok(WriteCondition::IfAbsent),
+        (Some(Named::Any), None) => Ok(WriteCondition::IfPresent),
+        (Some(Named::Tags(tags)), None) => Ok(WriteCondition::IfRevision(tags)),
+        _ => {
+            let detail = "send If-Match with the known ETag, or If-None-Match: *, or neither";
+            Err(Problem::new(ProblemKind::MalformedRequest, detail))
+        }
+    }
+}
+
+/// The ID of an existing calibration; it need not exist.
+pub(in crate::api) struct CalibrationAddress(pub(super) CalibrationId);
+
+/// The ID of a calibration to create or replace.
+pub(in crate::api) struct NewCalibrationAddress(pub(super) CalibrationId);
+
+impl FromRequestParts<ApiState> for CalibrationAddress {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &ApiState) -> Result<Self, Problem> {
+        id(parts, state, ProblemKind::UnknownCalibration)
+            .await
+            .map(Self)
+    }
+}
+
+impl FromRequestParts<ApiState> for NewCalibrationAddress {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &ApiState) -> Result<Self, Problem> {
+        id(parts, state, ProblemKind::InvalidCalibration)
+            .await
+            .map(Self)
+    }
+}
+
+async fn id(
+    parts: &mut Parts,
+    state: &ApiState,
+    kind: ProblemKind,
+) -> Result<CalibrationId, Problem> {
+    // A path segment that is not UTF-8 is not an ID.
+    let id = Path::<String>::from_request_parts(parts, state).await;
+    let id = id.map(|Path(id)| id).unwrap_or_default();
+    id.parse()
+        .map_err(|error| Problem::new(kind, format!("{error}")))
 }

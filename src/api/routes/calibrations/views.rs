@@ -10,15 +10,15 @@ use axum::{
 use lookdown_calibration::Calibration;
 use lookdown_detect::{
     parameters::{Profile, parse_profile, whole_number},
-    pipeline::{Engine, PlannedView, PlannedViews},
+    pipeline::{Engine, PlannedView},
 };
+use lookdown_lens::geometry::{Lens, Pixel};
 use serde::Serialize;
 use utoipa::{IntoParams, ToSchema};
 
 use super::{
-    address::{CalibrationAddress, NewCalibrationAddress},
     unknown,
-    upload::{CalibrationTrial, CalibrationUpload},
+    upload::{CalibrationAddress, CalibrationTrial, CalibrationUpload, NewCalibrationAddress},
 };
 use crate::{
     api::{
@@ -226,63 +226,43 @@ impl ViewPlanRequest {
 
     fn plan(self, engine: &Engine, calibration: &Calibration) -> Result<ViewPlanInfo, Problem> {
         let planned = engine.planned_views(calibration, self.profile)?;
-        let lens = calibration.lens();
-        let views = planned.views.iter().map(|view| ViewInfo {
-            grid: self.grid_cells.map(|cells| {
-                let nodes = view.grid(lens, cells).into_iter();
-                nodes
-                    .map(|node| node.map(|at| [pixels(at.x), pixels(at.y)]))
-                    .collect()
-            }),
-            ..ViewInfo::from(view)
-        });
+        let views = planned.views.iter();
+        let views = views.map(|view| self.view(view, calibration.lens()));
         Ok(ViewPlanInfo {
             calibration: calibration.id().to_string(),
             revision: calibration.revision().to_owned(),
+            profile: planned.profile.name(),
+            image: [planned.image_width, planned.image_height],
+            coverage: planned.seen_share,
+            overlap: planned.mean_views,
+            cost: PlanCost {
+                images: planned.images,
+                crops_at_most: planned.crops_at_most,
+                batches: planned.batches,
+                pixels: planned.pixels,
+            },
             views: views.collect(),
-            ..ViewPlanInfo::from(&planned)
+            model: planned.model,
         })
     }
-}
 
-impl From<&PlannedViews> for ViewPlanInfo {
-    fn from(plan: &PlannedViews) -> Self {
-        Self {
-            calibration: String::new(),
-            revision: String::new(),
-            profile: plan.profile.name(),
-            model: plan.model.clone(),
-            image: [plan.image_width, plan.image_height],
-            coverage: plan.seen_share,
-            overlap: plan.mean_views,
-            cost: PlanCost {
-                images: plan.images,
-                crops_at_most: plan.crops_at_most,
-                batches: plan.batches,
-                pixels: plan.pixels,
-            },
-            views: Vec::new(),
-        }
-    }
-}
-
-impl From<&PlannedView> for ViewInfo {
-    fn from(planned: &PlannedView) -> Self {
+    fn view(self, planned: &PlannedView, lens: &Lens) -> ViewInfo {
         let view = &planned.view;
         let rotation = view.camera_from_view().matrix();
         let axis = rotation.column(2);
         let principal = view.principal_point();
-        let azimuth = axis.y.atan2(axis.x).to_degrees().rem_euclid(360.0);
-        Self {
+        let node = |node: Option<Pixel>| node.map(|at| [pixels(at.x), pixels(at.y)]);
+        let grid = self.grid_cells.map(|cells| planned.grid(lens, cells));
+        ViewInfo {
             camera_from_view: [0, 1, 2].map(|row| [0, 1, 2].map(|column| rotation[(row, column)])),
-            azimuth_deg: azimuth,
+            azimuth_deg: axis.y.atan2(axis.x).to_degrees().rem_euclid(360.0),
             off_axis_deg: axis.x.hypot(axis.y).atan2(axis.z).to_degrees(),
             field_of_view_deg: view.field_of_view().to_degrees(),
             size: [view.width(), view.height()],
             focal: view.focal(),
             principal_point: [principal.x, principal.y],
             outline: planned.outline.iter().map(|at| [at.x, at.y]).collect(),
-            grid: None,
+            grid: grid.map(|nodes| nodes.into_iter().map(node).collect()),
         }
     }
 }

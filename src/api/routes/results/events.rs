@@ -1,29 +1,36 @@
 //! Streams of reports: server-sent events (HTML Living Standard, section 9.2).
+//!
+//! The event source of a subscriber: missed reports, then new ones.
 
-use std::{convert::Infallible, future::pending, sync::Arc, time::Duration};
+use std::{
+    collections::VecDeque, convert::Infallible, future::pending, num::NonZeroUsize, sync::Arc,
+    time::Duration,
+};
 
 use axum::{
     extract::State,
     http::{HeaderMap, HeaderName, Uri},
     response::{
         IntoResponse, Response,
-        sse::{KeepAlive, Sse},
+        sse::{Event, KeepAlive, Sse},
     },
 };
 use futures_util::stream::unfold;
+use lookdown_detect::fairness::Client;
+use lookdown_lens::geometry::{OrientedBox, Pixel};
+use serde_json::{Value, json};
 use tokio::time::sleep;
 
-use super::{
-    address::CameraAddress,
-    feed::{Feed, ViewBoxes},
-};
+use super::address::CameraAddress;
 use crate::{
     api::{
         ApiState,
         http::{caller::Caller, problem::Problem, query::parameters_named},
         require_scope::RequireRead,
     },
-    results::Cameras,
+    results::{Cameras, Listening, ReportId, ResultStore, StoredReport},
+    rounding::pixels,
+    views::Views,
 };
 
 pub(in crate::api) const LAST_EVENT_ID: HeaderName = HeaderName::from_static("last-event-id");
@@ -136,5 +143,132 @@ async fn key_removed(state: &ApiState, headers: &HeaderMap) {
     }
     while RequireRead::check_again(state, headers).is_ok() {
         sleep(KEY_CHECK).await;
+    }
+}
+
+/// Pause before a retry when the result store does not respond.
+const PAUSE: Duration = Duration::from_secs(1);
+/// Largest number of missed reports per read.
+const PAGE: usize = 32;
+
+/// The position of a subscriber in the reports.
+pub(super) struct Feed {
+    results: Arc<dyn ResultStore>,
+    cameras: Cameras,
+    listening: Listening,
+    /// The last report that was sent.
+    last: ReportId,
+    /// Reports from before the subscription, to be sent first.
+    missed: VecDeque<Arc<StoredReport>>,
+    /// `true` if the store may have more missed reports.
+    behind: bool,
+    /// The view whose boxes are added.
+    boxes: Option<ViewBoxes>,
+}
+
+/// The boxes of the persons in a view of their camera.
+pub(super) struct ViewBoxes {
+    pub(super) views: Arc<Views>,
+    pub(super) camera: String,
+    pub(super) name: String,
+}
+
+impl ViewBoxes {
+    /// Returns a report with the boxes of the view, if there is such a view now.
+    fn added_to(&self, report: &[u8]) -> Option<String> {
+        let view = self.views.list(&self.camera).remove(&self.name)?;
+        let live = self.views.live(&self.camera)?;
+        let mut report: Value = serde_json::from_slice(report).ok()?;
+        for person in report["persons"].as_array_mut()? {
+            let of = |key: &str| person["oriented_box"][key].as_f64();
+            let center = Pixel::new(of("cx")?, of("cy")?);
+            let angle = of("angle_deg")?.to_radians();
+            let oriented = OrientedBox::turned(center, of("width")?, of("height")?, angle);
+            let boxes = live.boxes(&view, &[oriented]).ok()?;
+            let sides = boxes
+                .first()
+                .copied()
+                .flatten()
+                .map(|sides| sides.map(pixels));
+            person["view_boxes"] = json!({
+                &self.name: sides.map(|[x_min, y_min, x_max, y_max]| {
+                    json!({ "x_min": x_min, "y_min": y_min, "x_max": x_max, "y_max": y_max })
+                })
+            });
+        }
+        serde_json::to_string(&report).ok()
+    }
+}
+
+impl Feed {
+    /// Continues after the last received report, or begins with the latest one of each camera.
+    ///
+    /// # Errors
+    /// [`Problem`] when there are too many subscribers, or the result store does not respond.
+    pub(super) async fn begin(
+        results: Arc<dyn ResultStore>,
+        client: &Client,
+        cameras: Cameras,
+        last_heard: Option<ReportId>,
+        boxes: Option<ViewBoxes>,
+    ) -> Result<Self, Problem> {
+        // Subscribes before the first read, so no report is missed in between.
+        let listening = results.listen(client, cameras.clone()).await?;
+        let latest = match &cameras {
+            Cameras::All => results.latest_of_all().await?,
+            Cameras::One(camera) => results.latest(camera).await?.into_iter().collect(),
+        };
+        let newest = latest.last().map(|report| report.id).unwrap_or_default();
+        // An ID later than all reports is from another server: no report here follows it.
+        let last_heard = last_heard.filter(|id| *id <= newest);
+        Ok(Self {
+            results,
+            cameras,
+            listening,
+            last: last_heard.unwrap_or(newest),
+            behind: last_heard.is_some(),
+            boxes,
+            missed: match last_heard {
+                None => latest.into(),
+                Some(_) => VecDeque::new(),
+            },
+        })
+    }
+
+    /// Returns the next event; `None` at the end of the stream.
+    pub(super) async fn next(&mut self) -> Option<Event> {
+        loop {
+            if let Some(missed) = self.missed.pop_front() {
+                return Some(self.event(&missed));
+            }
+            if self.behind {
+                let page = NonZeroUsize::new(PAGE).unwrap_or(NonZeroUsize::MIN);
+                let missed = self.results.since(&self.cameras, self.last, page).await;
+                let Ok(missed) = missed else {
+                    sleep(PAUSE).await;
+                    continue;
+                };
+                self.behind = !missed.is_empty();
+                self.missed = missed.into();
+                continue;
+            }
+            let report = self.listening.next().await?;
+            // Another one was already sent with the missed ones.
+            if report.id > self.last {
+                return Some(self.event(&report));
+            }
+        }
+    }
+
+    fn event(&mut self, stored: &StoredReport) -> Event {
+        self.last = stored.id;
+        let json = &stored.report.json;
+        let boxes = self.boxes.as_ref();
+        let with_boxes = boxes.and_then(|boxes| boxes.added_to(json));
+        let event = Event::default().id(stored.id.to_string());
+        match with_boxes {
+            Some(json) => event.data(json),
+            None => event.data(String::from_utf8_lossy(json)),
+        }
     }
 }

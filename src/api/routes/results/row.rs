@@ -58,7 +58,7 @@ impl CameraRow {
             persons: headline.number.map(|number| number.persons),
             persons_low: headline.number.map(|number| number.low),
             persons_high: headline.number.map(|number| number.high),
-            persons_source: headline.source.name(),
+            persons_source: headline.source.into(),
             frame_persons: latest.report.persons,
         }
     }
