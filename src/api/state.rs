@@ -34,7 +34,7 @@ use crate::{
     calibration_store::Calibrations,
     metrics::Metrics,
     reference_counts::ReferenceCounts,
-    results::{ImagesOf, ResultStore},
+    results::{Headline, ImagesOf, ResultStore, StoredReport, Unreachable},
     suggestions::Suggestions,
     telemetry::Tracer,
     views::Views,
@@ -237,6 +237,13 @@ impl ApiState {
         let of_settings = self.options.images_of.include(camera);
         let cameras = self.options.companions.cameras();
         of_settings || cameras.is_some_and(|cameras| cameras.keeps_image(camera))
+    }
+
+    /// Returns the headline number of the camera with this latest report.
+    pub(super) async fn headline(&self, latest: &StoredReport) -> Result<Headline, Unreachable> {
+        let companions = &self.options.companions;
+        let (own, followed) = (companions.own_cameras(), companions.followed());
+        Headline::for_latest(&*self.results, latest, &own, &followed, &self.references).await
     }
 
     /// Returns the problem while the server is not ready.

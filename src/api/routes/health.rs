@@ -14,7 +14,6 @@ use utoipa::ToSchema;
 use crate::{
     api::{ApiState, http::problem::Problem, require_scope::RequireRead},
     calibration_store::CalibrationsHealth,
-    results::Headline,
 };
 
 /// Largest number of invalid files in a response.
@@ -203,15 +202,12 @@ async fn read_cameras(state: &ApiState) {
     let Ok(mut latest) = state.results.latest_of_all().await else {
         return;
     };
-    let companions = &state.options.companions;
-    let (own, followed) = (companions.own_cameras(), companions.followed());
+    let own = state.options.companions.own_cameras();
     latest.retain(|report| !own.is_paused(&report.report.camera));
     let cameras = latest.iter().map(|report| report.report.camera.clone());
     state.metrics.retain_cameras(&cameras.collect::<Vec<_>>());
     for report in latest.iter().filter(|_| state.options.camera_metrics) {
-        let Ok(headline) =
-            Headline::for_latest(&*state.results, report, &own, &followed, &state.references).await
-        else {
+        let Ok(headline) = state.headline(report).await else {
             return;
         };
         let Some(number) = headline.number else {

@@ -31,7 +31,7 @@ use crate::{
         http::problem::{Problem, ProblemKind},
         require_scope::RequireRead,
     },
-    results::{Headline, ListenError, Unreachable},
+    results::{ListenError, Unreachable},
 };
 
 /// Clients may cache the response, but must revalidate it before use.
@@ -58,14 +58,10 @@ pub(in crate::api) async fn list(
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
     let now = Timestamp::now();
-    let companions = &state.options.companions;
-    let (own, followed) = (companions.own_cameras(), companions.followed());
     let latest = state.results.latest_of_all().await?;
     let mut rows = Vec::with_capacity(latest.len());
     for report in &latest {
-        let headline =
-            Headline::for_latest(&*state.results, report, &own, &followed, &state.references)
-                .await?;
+        let headline = state.headline(report).await?;
         rows.push(CameraRow::at(report, headline, now));
     }
     rows.sort_unstable_by(|one, other| one.camera.cmp(&other.camera));

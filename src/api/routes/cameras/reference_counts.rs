@@ -25,7 +25,7 @@ use crate::{
         require_scope::{RequireAdmin, RequireRead},
     },
     reference_counts::{MAX_PERSONS, ReferenceCount, ReferenceError, good_moment},
-    results::{Cameras, Headline, ReportId},
+    results::{Cameras, ReportId},
 };
 
 /// The number of persons in a frame.
@@ -95,11 +95,7 @@ pub(in crate::api) async fn list(
     }
     let mut moment = None;
     if let Some(latest) = latest.filter(|latest| latest.report.scores.is_some()) {
-        let companions = &state.options.companions;
-        let (own, followed) = (companions.own_cameras(), companions.followed());
-        let headline =
-            Headline::for_latest(&*state.results, &latest, &own, &followed, &state.references);
-        let number = headline.await?.number;
+        let number = state.headline(&latest).await?.number;
         moment = number.and_then(|number| good_moment(&counts, latest.id.time(), number));
     }
     let taught = state.references.number(&camera);
