@@ -11,6 +11,8 @@ pub(super) const BINARY_SENSOR: &str = "binary_sensor";
 
 /// The component of events.
 pub(super) const EVENT: &str = "event";
+/// The component of cameras: images that change.
+pub(super) const CAMERA: &str = "camera";
 /// The component of images.
 pub(super) const IMAGE: &str = "image";
 /// The component of switches.

@@ -32,6 +32,7 @@ use crate::{
     reference_counts::ReferenceCounts,
     results::{self, FollowedPersons, Headline, ListenError, ResultStore, StoredReport},
     tls::TlsError,
+    views::Views,
 };
 
 /// Most reports that wait for the broker. When the queue is full, the oldest report is not sent.
@@ -42,7 +43,7 @@ const LISTEN_PAUSE: Duration = Duration::from_secs(1);
 /// Shortest time between two messages of the whole state. Any client of the broker can ask for it.
 const BIRTH_PAUSE: Duration = Duration::from_secs(10);
 
-/// Interval of the checks for followed numbers and for switches.
+/// Interval of the checks for followed numbers, for views and for switches.
 const NUMBER_CHECK: Duration = Duration::from_secs(1);
 
 /// Interval of the checks for cameras that another server with the same result store has removed.
@@ -83,6 +84,7 @@ struct Publication {
     counted: FollowedPersons,
     references: Arc<ReferenceCounts>,
     metrics: Arc<Metrics>,
+    views: Arc<Views>,
     topics: Topics,
     /// The cameras of `lookdown run`, which have a switch for detection.
     switched: Option<Arc<crate::cameras::Cameras>>,
@@ -101,6 +103,7 @@ impl Publisher {
         counted: FollowedPersons,
         references: Arc<ReferenceCounts>,
         metrics: Arc<Metrics>,
+        views: Arc<Views>,
     ) -> Result<Self, TlsError> {
         let connector = Connector::new(
             options.broker.clone(),
@@ -114,6 +117,7 @@ impl Publisher {
             counted,
             references,
             metrics,
+            views,
             switched: None,
         };
         Ok(Self {
@@ -137,6 +141,7 @@ impl Publisher {
             if let Some(every) = publication.options.image_every {
                 let images = Images {
                     results: Arc::clone(&publication.results),
+                    views: Arc::clone(&publication.views),
                     of: publication.options.discovery.images.clone(),
                     every,
                 };
@@ -276,6 +281,7 @@ impl Publication {
                 }
                 _ = numbers.tick() => {
                     session.publish(self.followed(cameras)).await?;
+                    session.publish(cameras.update_views(&self.views)).await?;
                     if let Some(switches) = &mut switches {
                         session.publish(switches.update(Instant::now()).await).await?;
                     }
@@ -283,8 +289,8 @@ impl Publication {
                 _ = checks.tick() => {
                     session.publish(self.without_removed(cameras).await).await?;
                 }
-                Some(CameraImage { camera, jpeg }) = images.recv() => {
-                    session.publish(cameras.image(&camera, jpeg)).await?;
+                Some(image) = images.recv() => {
+                    session.publish(cameras.image(image)).await?;
                 }
                 report = queue.recv() => match report {
                     Ok(report) => {
