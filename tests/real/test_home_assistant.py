@@ -252,7 +252,9 @@ class Views(unittest.TestCase):
         server = self.enterContext(lookdown(settings, calibrations=calibrations))
         put(server, "/cameras/office/views/door", {"width": 320, "height": 240})
         (folder / "home").mkdir()
-        mjpeg = {"mjpeg_url": f"http://{server.address}/cameras/office/views/door.mjpg", "verify_ssl": True}
+        url = f"http://{server.address}/cameras/office/views/door.mjpg"
+        mjpeg = {"mjpeg_url": url, "still_image_url": None, "authentication": "basic", "verify_ssl": True}
+        mjpeg |= {"username": None, "password": ""}
         (folder / "home" / "mjpeg.json").write_text(json.dumps(mjpeg), encoding="utf-8")
         home = self.enterContext(home_assistant(folder / "home", of))
         server.post(DETECT, OFFICE)
