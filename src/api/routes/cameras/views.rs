@@ -358,12 +358,12 @@ impl ImageRequest {
         if let Some(quality) = quality {
             options.quality = whole_number("quality", &quality, 1..=100)?;
         }
-        options.boxes = flag("boxes", boxes)?;
-        options.zones = flag("zones", zones)?;
-        options.lines = flag("lines", lines)?;
+        options.boxes = flag("boxes", boxes.as_deref())?;
+        options.zones = flag("zones", zones.as_deref())?;
+        options.lines = flag("lines", lines.as_deref())?;
         Ok(Self {
             options,
-            number: flag("number", number)?,
+            number: flag("number", number.as_deref())?,
             changes,
             key,
             caller,
@@ -516,8 +516,8 @@ async fn using_file<T: Send + 'static>(
     deadline.using(&CAMERAS, move || work(&views)).await
 }
 
-fn flag(name: &str, value: Option<String>) -> Result<bool, ParameterError> {
-    match value.as_deref() {
+fn flag(name: &str, value: Option<&str>) -> Result<bool, ParameterError> {
+    match value {
         None | Some("false") => Ok(false),
         Some("true") => Ok(true),
         Some(other) => Err(ParameterError::is_not(name, other, "true or false")),
