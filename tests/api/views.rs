@@ -204,7 +204,6 @@ async fn zones_lines_and_the_number_are_drawn_where_asked() {
         json!([{ "name": "door", "frame_px": [[50, 80], [50, 120]], "directions": ["in", "out"] }]);
     let put = service.put("/calibrations/lobby", &areas.to_string()).await;
     assert_eq!(put.status, 200, "{}", put.text());
-    service.show().await;
     for (view, zone, line) in [
         (json!({ "azimuth_deg": 0 }), true, false),
         (json!({ "azimuth_deg": 180 }), false, true),
@@ -216,6 +215,7 @@ async fn zones_lines_and_the_number_are_drawn_where_asked() {
         ),
     ] {
         service.put(VIEW, &view.to_string()).await;
+        service.show().await;
         let mut tags = std::collections::BTreeSet::new();
         for (option, color, is_drawn) in [
             ("zones", [126, 240, 110], zone),
@@ -228,7 +228,7 @@ async fn zones_lines_and_the_number_are_drawn_where_asked() {
             tags.insert(answer.header("etag").to_owned());
             let image = image_of(&answer);
             let drawn = colored(&image, color);
-            assert_eq!(drawn > 30, is_drawn, "{option} in {view}: {drawn}");
+            assert_eq!(drawn > 20, is_drawn, "{option} in {view}: {drawn}");
             // A stroke along the whole width would be the wrong way around.
             assert!(drawn < 6_000, "{option} in {view}: {drawn}");
         }
