@@ -89,7 +89,7 @@ async def images(hass) -> dict[str, int]:
     sizes = {}
     for domain in ("image", "camera"):
         component = hass.data.get(domain)
-        for entity in component.entities if component else ():
+        for entity in list(component.entities) if component else ():
             image = await (entity.async_image() if domain == "image" else entity.async_camera_image())
             sizes[entity.unique_id] = len(image or b"")
     return sizes
