@@ -190,20 +190,6 @@ impl App {
             Some(options) => Some(Arc::new(Tls::open(options, Arc::clone(&metrics))?)),
             None => None,
         };
-        let publisher = settings.mqtt.clone().map(|mut options| {
-            if options.image_every.is_some() {
-                options.discovery.images = settings.results.images_of.clone();
-            }
-            let followed = companions.followed();
-            let references = Arc::clone(&references);
-            Publisher::new(
-                options,
-                Arc::clone(&results),
-                followed,
-                references,
-                Arc::clone(&metrics),
-            )
-        });
         let access = match &keys {
             Some(keys) => Access::Keys(Arc::clone(keys)),
             None => Access::Open {
@@ -218,6 +204,21 @@ impl App {
         );
         views.load()?;
         let views = Arc::new(views);
+        let publisher = settings.mqtt.clone().map(|mut options| {
+            if options.image_every.is_some() {
+                options.discovery.images = settings.results.images_of.clone();
+            }
+            let followed = companions.followed();
+            let references = Arc::clone(&references);
+            Publisher::new(
+                options,
+                Arc::clone(&results),
+                followed,
+                references,
+                Arc::clone(&metrics),
+                Arc::clone(&views),
+            )
+        });
         let options = api_options(&settings, views, access, companions, references, tracer);
         let state = ApiState::new(
             Arc::new(workers),

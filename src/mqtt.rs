@@ -10,6 +10,7 @@ mod cameras;
 mod connector;
 mod counts;
 mod discovery;
+mod images;
 mod occupancy;
 mod publisher;
 mod retained;

@@ -261,19 +261,19 @@ impl Views {
         let _changing = self.changing.lock();
         let mut views = self.list(camera);
         change(&mut views)?;
-        let mut file = ViewFile {
-            version: Some(StoredFile::Views.version()),
-            cameras: BTreeMap::new(),
-        };
         let mut cameras = self.cameras.write();
         self.entry(&mut cameras, camera)?;
-        for (name, known) in &*cameras {
-            let views = if name == camera { &views } else { &known.views };
-            if !views.is_empty() {
-                file.cameras.insert(name.clone(), views.clone());
-            }
-        }
+        let stored = cameras
+            .iter()
+            .map(|(name, known)| (name.clone(), known.views.clone()));
+        let mut stored: BTreeMap<_, _> = stored.collect();
         drop(cameras);
+        stored.insert(camera.to_owned(), views.clone());
+        stored.retain(|_, views| !views.is_empty());
+        let file = ViewFile {
+            version: Some(StoredFile::Views.version()),
+            cameras: stored,
+        };
         let content = serde_json::to_string_pretty(&file).unwrap_or_default();
         self.folder.write(&self.folder.file(FILE), &content)?;
         let mut cameras = self.cameras.write();

@@ -57,12 +57,7 @@ impl Sketch {
     /// who are in no result.
     pub(super) fn concealed(&self, image_width: u32) -> Vec<Mark> {
         let factor = f64::from(image_width) / f64::from(self.frame_width.max(1));
-        let others = self.others.iter().map(|&bbox| Mark {
-            bbox,
-            oriented: None,
-            head: None,
-            label: String::new(),
-        });
+        let others = self.others.iter().map(|&bbox| Mark::new(bbox, ""));
         let marks = self.marks.iter().cloned().chain(others);
         marks.map(|mark| mark.scaled(factor)).collect()
     }

@@ -239,7 +239,7 @@ impl ApiState {
         of_settings || cameras.is_some_and(|cameras| cameras.keeps_image(camera))
     }
 
-    /// Returns the number of persons of a camera at its latest report.
+    /// Returns the headline number of the camera with this latest report.
     pub(super) async fn headline(&self, latest: &StoredReport) -> Result<Headline, Unreachable> {
         let companions = &self.options.companions;
         let (own, followed) = (companions.own_cameras(), companions.followed());

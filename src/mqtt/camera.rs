@@ -10,11 +10,11 @@ use tokio::time::Instant;
 use super::{
     discovery::{Discovery, OFFLINE, ONLINE},
     occupancy::Occupancy,
-    retained::withdrawal,
+    retained::{part_withdrawal, withdrawal},
     session::Message,
     topics::{self, Topics},
 };
-use crate::results::NewReport;
+use crate::{results::NewReport, views::StoredViews};
 
 /// The times after which states change without a report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,6 +35,8 @@ pub(super) struct Camera {
     frame_persons: usize,
     occupancy: Occupancy,
     zones: Vec<Zone>,
+    /// The views whose images are published.
+    views: StoredViews,
     attributes: Attributes,
     /// The time at which it becomes unavailable.
     expires_at: Option<Instant>,
@@ -60,7 +62,7 @@ struct Attributes {
 
 /// The changes by a report.
 pub(super) struct Changes {
-    /// The names of removed zones.
+    /// The removed zones, as parts of topics.
     pub(super) removed_zones: Vec<String>,
     /// True if there are other entities than before.
     pub(super) entities: bool,
@@ -103,6 +105,7 @@ impl Camera {
             frame_persons: 0,
             occupancy: Occupancy::default(),
             zones: Vec::new(),
+            views: StoredViews::new(),
             attributes: Attributes::default(),
             expires_at: None,
             is_available: false,
@@ -149,7 +152,10 @@ impl Camera {
         self.expires_at = rest.map(|rest| now + rest);
         self.is_available = rest != Some(Duration::ZERO);
         Changes {
-            removed_zones: earlier.into_iter().map(|zone| zone.name).collect(),
+            removed_zones: earlier
+                .iter()
+                .map(|zone| format!("zones/{}", zone.name))
+                .collect(),
             entities: has_other_zones,
             attributes: has_other_attributes,
         }
@@ -214,16 +220,48 @@ impl Camera {
         self.is_available
     }
 
-    /// Returns true if the name of a zone is this level of a topic.
-    pub(super) fn has_zone_level(&self, level: &str) -> bool {
+    /// Sets the views whose images are published. Returns the messages: none without a change.
+    pub(super) fn set_views(
+        &mut self,
+        views: StoredViews,
+        topics: &Topics,
+        discovery: &Discovery,
+    ) -> Vec<Message> {
+        if self.views == views {
+            return Vec::new();
+        }
+        let before = std::mem::replace(&mut self.views, views);
+        let gone = before.keys().filter(|name| !self.views.contains_key(*name));
+        let gone =
+            gone.flat_map(|name| part_withdrawal(topics, &self.name, &format!("views/{name}")));
+        let now = self.announced(topics, discovery);
+        gone.chain(now).chain(self.view_messages(topics)).collect()
+    }
+
+    /// The stored values of its views.
+    pub(super) fn view_messages(&self, topics: &Topics) -> Vec<Message> {
+        let views = self.views.iter().map(|(name, view)| {
+            let values = serde_json::to_string(view).unwrap_or_default();
+            Message::retained(topics.view(&self.name, name), values)
+        });
+        views.collect()
+    }
+
+    /// Returns true if a zone or a view has this part of a topic.
+    pub(super) fn has_part(&self, part: &str) -> bool {
         let mut zones = self.zones.iter();
-        zones.any(|zone| topics::level(&zone.name) == level)
+        match part.split_once('/') {
+            Some(("views", view)) => self.views.contains_key(view),
+            Some((_, level)) => zones.any(|zone| topics::level(&zone.name) == level),
+            None => false,
+        }
     }
 
     /// The announcements of its entities.
     pub(super) fn announced(&self, topics: &Topics, discovery: &Discovery) -> Vec<Message> {
         let zones = self.zones.iter().map(|zone| zone.name.as_str());
-        discovery.announcements(topics, &self.name, zones)
+        let views = self.views.keys().map(String::as_str);
+        discovery.announcements(topics, &self.name, zones, views)
     }
 
     /// The current state.
@@ -270,8 +308,9 @@ impl Camera {
 
     /// The messages that remove it from the broker and from Home Assistant.
     pub(super) fn withdrawal(&self, topics: &Topics) -> Vec<Message> {
-        let zones = self.zones.iter().map(|zone| zone.name.clone());
-        withdrawal(topics, &self.name, zones)
+        let zones = self.zones.iter().map(|zone| format!("zones/{}", zone.name));
+        let views = self.views.keys().map(|view| format!("views/{view}"));
+        withdrawal(topics, &self.name, zones.chain(views))
     }
 }
 

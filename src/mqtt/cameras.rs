@@ -6,7 +6,6 @@ use std::{
     time::Duration,
 };
 
-use bytes::Bytes;
 use lookdown_common::{Claim, OwnCameras, Place, makes_room};
 use lookdown_tracking::taught::NumberWithBar;
 use tokio::time::Instant;
@@ -14,11 +13,12 @@ use tokio::time::Instant;
 use super::{
     camera::{Camera, Delays},
     discovery::{Discovery, OFFLINE},
-    retained::{RetainedTopics, withdrawal, zone_withdrawal},
+    images::CameraImage,
+    retained::{RetainedTopics, part_withdrawal, withdrawal},
     session::Message,
     topics::{CameraTopic, Topics, level},
 };
-use crate::results::StoredReport;
+use crate::{results::StoredReport, views::Views};
 
 /// Time after the connection until unknown cameras are withdrawn, where none expire.
 const UNKNOWN_FOR: Duration = Duration::from_mins(10);
@@ -101,7 +101,7 @@ impl Cameras {
         let changes = camera.update(report, number, age, now, &self.delays);
         let topics = &self.topics;
         for zone in changes.removed_zones {
-            messages.extend(zone_withdrawal(topics, name, &zone));
+            messages.extend(part_withdrawal(topics, name, &zone));
         }
         if changes.entities || !is_known {
             messages.extend(camera.announced(topics, &self.discovery));
@@ -127,10 +127,28 @@ impl Cameras {
         self.known.remove(&key)
     }
 
-    /// The message with the latest image of a camera: none for a camera that is not published.
-    pub(super) fn image(&self, camera: &str, jpeg: Bytes) -> Option<Message> {
+    /// The message with the latest image of a camera or of one of its views: none for a camera that
+    /// is not published.
+    pub(super) fn image(&self, image: CameraImage) -> Option<Message> {
+        let camera = &image.camera;
+        let topic = match &image.view {
+            Some(view) => self.topics.view_image(camera, view),
+            None => self.topics.image(camera),
+        };
         let is_known = self.known.contains_key(&level(camera));
-        is_known.then(|| Message::passing(self.topics.image(camera), jpeg))
+        is_known.then(|| Message::passing(topic, image.jpeg))
+    }
+
+    /// Updates the views of the cameras whose images are published. Returns the messages.
+    pub(super) fn update_views(&mut self, views: &Views) -> Vec<Message> {
+        let (topics, discovery) = (&self.topics, &self.discovery);
+        let known = self.known.values_mut();
+        let shown = known.filter(|camera| discovery.images.include(camera.name()));
+        let messages = shown.flat_map(|camera| {
+            let views = views.list(camera.name());
+            camera.set_views(views, topics, discovery)
+        });
+        messages.collect()
     }
 
     /// The names of the cameras that send frames.
@@ -173,6 +191,7 @@ impl Cameras {
         let messages = known.flat_map(|camera| {
             camera.expire(now, topics);
             let mut messages = camera.announced(topics, &self.discovery);
+            messages.extend(camera.view_messages(topics));
             messages.push(camera.attributes(topics));
             messages.extend(camera.state(topics));
             messages
@@ -202,7 +221,7 @@ impl Cameras {
         if is_retained {
             // Without a time, the withdrawal of this connection is over.
             self.withdraw_at?;
-            let is_new = self.retained.note(topic.camera(), topic.zone());
+            let is_new = self.retained.note(topic.camera(), topic.part());
             let offline = || Message::retained(self.topics.availability(topic.camera()), OFFLINE);
             return (is_new && known.is_none()).then(offline);
         }
@@ -235,12 +254,12 @@ impl Cameras {
             .collect();
         if self.withdraw_at.is_some_and(|at| at <= now) {
             self.withdraw_at = None;
-            for (key, zones) in self.retained.take() {
+            for (key, parts) in self.retained.take() {
                 match self.known.get(&key) {
-                    None => messages.extend(withdrawal(topics, &key, zones)),
+                    None => messages.extend(withdrawal(topics, &key, parts)),
                     Some(camera) => {
-                        let gone = zones.iter().filter(|zone| !camera.has_zone_level(zone));
-                        messages.extend(gone.flat_map(|zone| zone_withdrawal(topics, &key, zone)));
+                        let gone = parts.iter().filter(|part| !camera.has_part(part));
+                        messages.extend(gone.flat_map(|part| part_withdrawal(topics, &key, part)));
                     }
                 }
             }

@@ -1,5 +1,5 @@
 //! Announces a camera's entities to Home Assistant (its documentation: MQTT, section "MQTT
-//! discovery"): occupancy and the number of persons, of the camera and of each zone.
+//! discovery"): occupancy and the number of persons, of the camera and of each zone, and its views.
 //!
 //! The announcement of an entity to Home Assistant: the fields that all entities have in common.
 
@@ -40,12 +40,13 @@ pub struct Discovery {
 type Entity = (&'static str, String, Value);
 
 impl Discovery {
-    /// The announcements of a camera and its zones. Empty without a discovery prefix.
+    /// The announcements of a camera, its zones and its views. Empty without a discovery prefix.
     pub(super) fn announcements<'a>(
         &self,
         topics: &Topics,
         camera: &str,
         zones: impl IntoIterator<Item = &'a str>,
+        views: impl IntoIterator<Item = &'a str>,
     ) -> Vec<Message> {
         let of_camera = [
             occupancy("Occupancy", None, &topics.occupancy(camera)),
@@ -63,18 +64,21 @@ impl Discovery {
         });
         let device = device(topics, camera);
         let image = self.images.include(camera).then(|| image(topics, camera));
+        let views = views.into_iter().map(|name| view(topics, camera, name));
         let all = of_camera.into_iter().chain(image).chain(zones);
-        all.filter_map(|(component, entity, config)| {
-            let availability = [topics.status(), topics.availability(camera)];
-            let mut config = self.completed(config, topics, camera);
-            // Images have no such field.
-            if let Some(expire_after) = self.expire_after.filter(|_| component != IMAGE) {
-                config["expire_after"] = json!(expire_after.as_secs());
-            }
-            device.announcement(topics, component, &entity, availability, config)
-        })
-        .map(|(topic, payload)| Message::retained(topic, payload))
-        .collect()
+        all.chain(views)
+            .filter_map(|(component, entity, config)| {
+                let availability = [topics.status(), topics.availability(camera)];
+                let mut config = self.completed(config, topics, camera);
+                // Images have no such field.
+                let is_image = [IMAGE, CAMERA].contains(&component);
+                if let Some(expire_after) = self.expire_after.filter(|_| !is_image) {
+                    config["expire_after"] = json!(expire_after.as_secs());
+                }
+                device.announcement(topics, component, &entity, availability, config)
+            })
+            .map(|(topic, payload)| Message::retained(topic, payload))
+            .collect()
     }
 
     /// The announcement of a camera's switch for detection, which is available while the server is.
@@ -139,6 +143,12 @@ pub(super) fn config_withdrawals(
     topics.map(Message::forget).collect()
 }
 
+/// The message that removes the entity of a view from Home Assistant.
+pub(super) fn view_withdrawal(topics: &Topics, camera: &str, view: &str) -> Option<Message> {
+    let id = device(topics, camera).entity_id(&view_id(view));
+    topics.config(CAMERA, &id).map(Message::forget)
+}
+
 fn occupancy(name: &str, zone: Option<&str>, state_topic: &str) -> Entity {
     let config = json!({
         "name": name,
@@ -184,6 +194,19 @@ fn image(topics: &Topics, camera: &str) -> Entity {
     (IMAGE, IMAGE.to_owned(), config)
 }
 
+/// A straight view, as a camera.
+fn view(topics: &Topics, camera: &str, name: &str) -> Entity {
+    let config = json!({
+        "name": format!("View {name}"),
+        "topic": topics.view_image(camera, name),
+    });
+    (CAMERA, view_id(name), config)
+}
+
+fn view_id(view: &str) -> String {
+    format!("view_{}", level(view))
+}
+
 fn occupancy_id(zone: Option<&str>) -> (&'static str, String) {
     let id = zone.map_or("occupancy".to_owned(), |zone| {
         format!("zone_{}_occupancy", level(zone))
@@ -203,6 +226,8 @@ pub(super) const BINARY_SENSOR: &str = "binary_sensor";
 
 /// The component of events.
 pub(super) const EVENT: &str = "event";
+/// The component of cameras: images that change.
+pub(super) const CAMERA: &str = "camera";
 /// The component of images.
 pub(super) const IMAGE: &str = "image";
 /// The component of switches.
@@ -266,7 +291,7 @@ mod tests {
     #[test]
     fn camera_and_zones_announce_occupancy_and_persons() {
         let discovery = Discovery::default();
-        let messages = discovery.announcements(&topics(), "north gate", ["till"]);
+        let messages = discovery.announcements(&topics(), "north gate", ["till"], []);
         let [occupancy, persons, frame, till, till_occupancy] = messages.as_slice() else {
             panic!("{messages:?}")
         };
@@ -320,7 +345,7 @@ mod tests {
             support_url: Some(url("https://help.example/")),
             images: ImagesOf::default(),
         };
-        for message in discovery.announcements(&topics(), "lobby", ["till"]) {
+        for message in discovery.announcements(&topics(), "lobby", ["till"], []) {
             let config = config(&message);
             assert_eq!(config["expire_after"], 600);
             let page = &config["device"]["configuration_url"];
@@ -335,9 +360,10 @@ mod tests {
             images: ImagesOf::All,
             ..Discovery::default()
         };
-        let announced = discovery.announcements(&topics(), "lobby", ["till"]);
+        let announced = discovery.announcements(&topics(), "lobby", ["till"], ["door"]);
         let mut withdrawn = config_withdrawals(&topics(), "lobby", None);
         withdrawn.extend(config_withdrawals(&topics(), "lobby", Some("till")));
+        withdrawn.extend(view_withdrawal(&topics(), "lobby", "door"));
         let sorted = |messages: &[Message]| {
             let topics = messages.iter().map(|message| message.topic.clone());
             topics.collect::<std::collections::BTreeSet<_>>()
@@ -355,7 +381,7 @@ mod tests {
             ..Discovery::default()
         };
         let image = |camera: &str| {
-            let announced = discovery.announcements(&topics(), camera, []);
+            let announced = discovery.announcements(&topics(), camera, [], []);
             let image = announced.into_iter().find(|message| {
                 message.topic == format!("homeassistant/image/lookdown_{camera}_image/config")
             });
@@ -366,6 +392,22 @@ mod tests {
         assert_eq!(image["image_topic"], "lookdown/cameras/lobby/image");
         assert_eq!(image["content_type"], "image/jpeg");
         assert!(image.get("expire_after").is_none());
+    }
+
+    #[test]
+    fn a_view_is_announced_as_a_camera_that_never_expires() {
+        let discovery = Discovery {
+            expire_after: Some(Duration::from_mins(1)),
+            ..Discovery::default()
+        };
+        let announced = discovery.announcements(&topics(), "lobby", [], ["door"]);
+        let view = announced.last().unwrap();
+        let topic = "homeassistant/camera/lookdown_lobby_view_door/config";
+        assert_eq!(view.topic, topic);
+        let config = config(view);
+        assert_eq!(config["topic"], "lookdown/cameras/lobby/views/door/image");
+        assert_eq!(config["name"], "View door");
+        assert!(config.get("expire_after").is_none());
     }
 
     #[test]
@@ -389,7 +431,7 @@ mod tests {
     #[test]
     fn nothing_is_announced_without_a_discovery_prefix() {
         let topics = Topics::new("lookdown", None);
-        let announced = Discovery::default().announcements(&topics, "lobby", ["till"]);
+        let announced = Discovery::default().announcements(&topics, "lobby", ["till"], ["door"]);
         assert!(announced.is_empty());
         assert!(config_withdrawals(&topics, "lobby", None).is_empty());
     }

@@ -1,12 +1,8 @@
 //! Publishes results to the broker: the subscription to the results, the queue, and the time
 //! without a broker.
-//!
-//! The latest images of cameras, with boxes: drawn one after the other, so that neither their
-//! number nor a slow broker takes more than one thread.
 
-use std::{collections::HashMap, num::NonZeroUsize, path::PathBuf, sync::Arc, time::Duration};
+use std::{num::NonZeroUsize, path::PathBuf, sync::Arc, time::Duration};
 
-use bytes::Bytes;
 use jiff::Timestamp;
 use lookdown_common::OwnCameras;
 use lookdown_detect::fairness::Client;
@@ -17,7 +13,6 @@ use tokio::{
         broadcast::{self, error::RecvError},
         mpsc,
     },
-    task::spawn_blocking,
     time::{Instant, MissedTickBehavior, interval, sleep, sleep_until},
 };
 
@@ -26,18 +21,16 @@ use super::{
     cameras::{self, Cameras},
     connector::Connector,
     discovery::{Discovery, OFFLINE, ONLINE},
+    images::{CameraImage, Images},
     session::{Message, Session, SessionError},
     switches::Switches,
     topics::Topics,
 };
 use crate::{
-    annotated_image::{AnnotationOptions, Layer},
     metrics::Metrics,
     reference_counts::ReferenceCounts,
-    results::{
-        self, FollowedPersons, Headline, ImagesOf, ListenError, ReportId, ResultStore, StoredImage,
-        StoredReport,
-    },
+    results::{self, FollowedPersons, Headline, ListenError, ResultStore, StoredReport},
+    views::Views,
 };
 
 /// Most reports that wait for the broker. When the queue is full, the oldest report is not sent.
@@ -48,7 +41,7 @@ const LISTEN_PAUSE: Duration = Duration::from_secs(1);
 /// Shortest time between two messages of the whole state. Any client of the broker can ask for it.
 const BIRTH_PAUSE: Duration = Duration::from_secs(10);
 
-/// Interval of the checks for followed numbers and for switches.
+/// Interval of the checks for followed numbers, for views and for switches.
 const NUMBER_CHECK: Duration = Duration::from_secs(1);
 
 /// Interval of the checks for cameras that another server with the same result store has removed.
@@ -89,6 +82,7 @@ struct Publication {
     counted: FollowedPersons,
     references: Arc<ReferenceCounts>,
     metrics: Arc<Metrics>,
+    views: Arc<Views>,
     topics: Topics,
     /// The cameras of `lookdown run`, which have a switch for detection.
     switched: Option<Arc<crate::cameras::Cameras>>,
@@ -107,6 +101,7 @@ impl Publisher {
         counted: FollowedPersons,
         references: Arc<ReferenceCounts>,
         metrics: Arc<Metrics>,
+        views: Arc<Views>,
     ) -> anyhow::Result<Self> {
         let connector = Connector::new(
             options.broker.clone(),
@@ -120,6 +115,7 @@ impl Publisher {
             counted,
             references,
             metrics,
+            views,
             switched: None,
         };
         Ok(Self {
@@ -143,6 +139,7 @@ impl Publisher {
             if let Some(every) = publication.options.image_every {
                 let images = Images {
                     results: Arc::clone(&publication.results),
+                    views: Arc::clone(&publication.views),
                     of: publication.options.discovery.images.clone(),
                     every,
                 };
@@ -282,6 +279,7 @@ impl Publication {
                 }
                 _ = numbers.tick() => {
                     session.publish(self.followed(cameras)).await?;
+                    session.publish(cameras.update_views(&self.views)).await?;
                     if let Some(switches) = &mut switches {
                         session.publish(switches.update(Instant::now()).await).await?;
                     }
@@ -289,8 +287,8 @@ impl Publication {
                 _ = checks.tick() => {
                     session.publish(self.without_removed(cameras).await).await?;
                 }
-                Some(CameraImage { camera, jpeg }) = images.recv() => {
-                    session.publish(cameras.image(&camera, jpeg)).await?;
+                Some(image) = images.recv() => {
+                    session.publish(cameras.image(image)).await?;
                 }
                 report = queue.recv() => match report {
                     Ok(report) => {
@@ -379,74 +377,3 @@ async fn hear(results: &Arc<dyn ResultStore>, queue: broadcast::Sender<Arc<Store
         }
     }
 }
-
-/// The widest image, pixels.
-const WIDTH: u32 = 1280;
-const JPEG_QUALITY: u8 = 80;
-/// Most bytes of an image. Larger ones are not published.
-const MAX_BYTES: usize = 1 << 20;
-
-/// An image of a camera.
-pub(super) struct CameraImage {
-    pub(super) camera: String,
-    pub(super) jpeg: Bytes,
-}
-
-/// The images that are published.
-pub(super) struct Images {
-    pub(super) results: Arc<dyn ResultStore>,
-    pub(super) of: ImagesOf,
-    /// Shortest time between two images of a camera.
-    pub(super) every: Duration,
-}
-
-impl Images {
-    /// Draws images and hands them over until the receiver is dropped. Waits while it is full.
-    pub(super) async fn draw(&self, to: mpsc::Sender<CameraImage>) {
-        let mut drawn = HashMap::<String, ReportId>::new();
-        let mut times = interval(self.every);
-        times.set_missed_tick_behavior(MissedTickBehavior::Delay);
-        loop {
-            tokio::select! {
-                _ = times.tick() => {}
-                () = to.closed() => return,
-            }
-            // Without an answer, the next time decides.
-            let cameras = self.results.cameras().await.unwrap_or_default();
-            drawn.retain(|camera, _| cameras.contains(camera));
-            for camera in cameras {
-                if !self.of.include(&camera) {
-                    continue;
-                }
-                let Ok(Some(stored)) = self.results.image(&camera).await else {
-                    continue;
-                };
-                let before = drawn.insert(camera.clone(), stored.id);
-                if before == Some(stored.id) {
-                    continue;
-                }
-                // A frame that cannot be drawn is logged where it is requested.
-                let Ok(Some(jpeg)) = spawn_blocking(move || image(&stored)).await else {
-                    continue;
-                };
-                if to.send(CameraImage { camera, jpeg }).await.is_err() {
-                    return;
-                }
-            }
-        }
-    }
-}
-
-/// Returns the image that is published, if it is small enough.
-fn image(stored: &StoredImage) -> Option<Bytes> {
-    let options = AnnotationOptions {
-        layers: vec![Layer::Oriented, Layer::Scores],
-        width: WIDTH,
-        quality: JPEG_QUALITY,
-    };
-    let jpeg = stored.frame.annotated(&options, &|| false).ok()?;
-    (jpeg.len() <= MAX_BYTES).then(|| jpeg.into())
-}
-
-#[cfg(test)]
-mod tests;

@@ -4,7 +4,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{discovery::config_withdrawals, session::Message, topics::Topics};
+use super::{
+    discovery::{config_withdrawals, view_withdrawal},
+    session::Message,
+    topics::Topics,
+};
 
 /// Most owners and parts that are noted. Further ones stay with the broker.
 const MAX_NOTED: usize = 10_000;
@@ -42,12 +46,12 @@ impl RetainedTopics {
     }
 }
 
-/// The messages that remove a camera from the broker and from Home Assistant. Camera and zones are
-/// names, or levels of topics.
+/// The messages that remove a camera from the broker and from Home Assistant, with these parts:
+/// `zones/` or `views/` and a name. Names may be levels of topics.
 pub(super) fn withdrawal(
     topics: &Topics,
     camera: &str,
-    zones: impl IntoIterator<Item = String>,
+    parts: impl IntoIterator<Item = String>,
 ) -> Vec<Message> {
     let of_camera = [
         topics.persons(camera),
@@ -58,14 +62,23 @@ pub(super) fn withdrawal(
     ];
     let mut messages = config_withdrawals(topics, camera, None);
     messages.extend(of_camera.map(Message::forget));
-    for zone in zones {
-        messages.extend(zone_withdrawal(topics, camera, &zone));
+    for part in parts {
+        messages.extend(part_withdrawal(topics, camera, &part));
     }
     messages
 }
 
-/// The messages that remove a zone from the broker and from Home Assistant.
-pub(super) fn zone_withdrawal(topics: &Topics, camera: &str, zone: &str) -> Vec<Message> {
+/// The messages that remove a zone or a view from the broker and from Home Assistant.
+pub(super) fn part_withdrawal(topics: &Topics, camera: &str, part: &str) -> Vec<Message> {
+    let zone = match part.split_once('/') {
+        Some(("views", view)) => {
+            let topic = topics.view(camera, view);
+            let config = view_withdrawal(topics, camera, view);
+            return config.into_iter().chain([Message::forget(topic)]).collect();
+        }
+        Some((_, zone)) => zone,
+        None => part,
+    };
     let mut messages = config_withdrawals(topics, camera, Some(zone));
     let of_zone = [
         topics.zone(camera, zone),

@@ -79,6 +79,16 @@ impl Topics {
         format!("{}/image", self.camera(camera))
     }
 
+    /// The topic of a straight view of a camera.
+    pub(super) fn view(&self, camera: &str, view: &str) -> String {
+        format!("{}/views/{}", self.camera(camera), level(view))
+    }
+
+    /// The topic of the newest image of a straight view.
+    pub(super) fn view_image(&self, camera: &str, view: &str) -> String {
+        format!("{}/image", self.view(camera, view))
+    }
+
     /// The topic of the state of a camera's switch for detection.
     pub(super) fn detection(&self, camera: &str) -> String {
         format!("{}/detection", self.camera(camera))
@@ -113,8 +123,8 @@ impl Topics {
     }
 
     /// Filters for the topics that [`Topics::camera_topic`] recognizes.
-    pub(super) fn camera_filters(&self) -> [String; 3] {
-        ["+/persons", "+/availability", "+/zones/+"]
+    pub(super) fn camera_filters(&self) -> [String; 4] {
+        ["+/persons", "+/availability", "+/zones/+", "+/views/+"]
             .map(|rest| format!("{}/cameras/{rest}", self.prefix))
     }
 
@@ -125,8 +135,9 @@ impl Topics {
             "persons" => Some(CameraTopic::Persons { camera }),
             "availability" => Some(CameraTopic::Availability { camera }),
             _ => {
-                let zone = rest.strip_prefix("zones/")?;
-                (!zone.contains('/')).then_some(CameraTopic::Zone { camera, zone })
+                let is_part = rest.starts_with("zones/") || rest.starts_with("views/");
+                let is_part = is_part && rest.matches('/').count() == 1;
+                is_part.then_some(CameraTopic::Part { camera, part: rest })
             }
         }
     }
@@ -166,8 +177,8 @@ pub(super) enum CameraTopic<'a> {
     Persons { camera: &'a str },
     /// The availability.
     Availability { camera: &'a str },
-    /// The number of persons in a zone.
-    Zone { camera: &'a str, zone: &'a str },
+    /// A part of the camera: `zones/`, with the number of persons, or `views/`, and its level.
+    Part { camera: &'a str, part: &'a str },
 }
 
 /// A topic of a camera's switch, by the level of its name.
@@ -184,13 +195,13 @@ impl<'a> CameraTopic<'a> {
         match self {
             Self::Persons { camera }
             | Self::Availability { camera }
-            | Self::Zone { camera, .. } => camera,
+            | Self::Part { camera, .. } => camera,
         }
     }
 
-    pub(super) fn zone(&self) -> Option<&'a str> {
+    pub(super) fn part(&self) -> Option<&'a str> {
         match self {
-            Self::Zone { zone, .. } => Some(zone),
+            Self::Part { part, .. } => Some(part),
             Self::Persons { .. } | Self::Availability { .. } => None,
         }
     }
@@ -242,17 +253,16 @@ mod tests {
     #[test]
     fn topics_of_cameras_are_recognized() {
         let topics = Topics::new("home/lookdown", None);
-        let (camera, zone) = ("lobby", "till");
+        let camera = "lobby";
+        let part = |part| CameraTopic::Part { camera, part };
         for (topic, expected) in [
             (topics.persons(camera), CameraTopic::Persons { camera }),
             (
                 topics.availability(camera),
                 CameraTopic::Availability { camera },
             ),
-            (
-                topics.zone(camera, zone),
-                CameraTopic::Zone { camera, zone },
-            ),
+            (topics.zone(camera, "till"), part("zones/till")),
+            (topics.view(camera, "door"), part("views/door")),
         ] {
             assert_eq!(topics.camera_topic(&topic), Some(expected));
         }
@@ -260,7 +270,8 @@ mod tests {
             topics.status(),
             topics.report(camera),
             topics.attributes(camera),
-            topics.zone_occupancy(camera, zone),
+            topics.zone_occupancy(camera, "till"),
+            topics.view_image(camera, "door"),
             "lookdown/cameras/lobby/persons".to_owned(),
         ] {
             assert_eq!(topics.camera_topic(&other), None, "{other}");

@@ -48,9 +48,9 @@ settings! {
         /// The time without a person after which occupancy is off: single frames that miss a person
         /// change nothing. 0: each frame counts.
         hold as "hold_seconds": Duration = Duration::from_secs(5) => seconds(0..=3600);
-        /// The shortest time between two images of a camera that are published, for cameras in
-        /// `results.images`. Images show persons, unless `results.conceal_images` conceals them.
-        /// 0: no images.
+        /// The shortest time between two images of a camera or of one of its views that are
+        /// published, for cameras in `results.images`. Images show persons, unless
+        /// `results.conceal_images` conceals them. 0: no images.
         image_every as "image_every_seconds": Option<Duration> = None
             => zero_is_none(seconds(0..=86_400));
         /// The time without a report after which a camera is unavailable. It must be longer than

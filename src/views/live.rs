@@ -19,7 +19,10 @@ use lookdown_detect::{
 };
 use lookdown_imaging::{
     Frame, MaskedPixels, RemapTable,
-    annotate::{Concealment, Drawing, EncodeError, Mark, annotate_unless, conceal, encode_jpeg},
+    annotate::{
+        Concealment, Drawing, EncodeError, Mark, ZoneOutline, annotate, conceal, encode_jpeg,
+        sketch_line_outlines,
+    },
     decode::{DecodeError, DecodeLimits, decode},
 };
 use lookdown_lens::geometry::OrientedBox;
@@ -28,29 +31,30 @@ use tokio::sync::{OnceCell, Semaphore, watch};
 
 use super::{
     follower::Follower,
-    view::{Direction, Part, Projection, View, ViewKind, box_in_view},
+    view::{Direction, Part, Projection, View, ViewKind, box_in_view, outlines_in_view},
 };
 use crate::annotated_image::marks_to_conceal;
 
-/// Most views of a frame that are kept for further viewers.
-const MAX_RENDERED: usize = 16;
-/// Most views of a camera whose remap tables are kept: a table of 960 × 720 takes 100 KiB.
-const MAX_TABLES: usize = 16;
+/// Most views of a frame that are kept for further viewers, and most views of a camera whose remap
+/// tables are kept: a table of 960 × 720 takes 100 KiB.
+const MAX_KEPT: usize = 16;
+/// Default quality of a JPEG: its loss is hardly visible in a moving image.
+const QUALITY: u8 = 80;
 /// The time after a frame from the camera for which frames of reports, which are older, wait.
 const FED: Duration = Duration::from_secs(2);
 
 /// A view cannot be shown.
-#[derive(Debug, Clone, thiserror::Error)]
+#[derive(Debug, thiserror::Error)]
 pub enum ViewError {
     /// A value that does not fit the camera.
     #[error(transparent)]
     Invalid(#[from] ParameterError),
     /// The frame cannot be decoded.
     #[error("the frame cannot be decoded: {0}")]
-    Decode(Arc<DecodeError>),
+    Decode(#[from] DecodeError),
     /// The view cannot be encoded.
     #[error("the view cannot be encoded: {0}")]
-    Encode(Arc<EncodeError>),
+    Encode(#[from] EncodeError),
     /// The frame has another size than those of its camera.
     #[error(
         "the frame has another size than the last one with a report: the next report changes that"
@@ -71,7 +75,11 @@ struct Scene {
 }
 
 /// A view with its remap tables.
-struct Tables(Vec<(Part, RemapTable)>);
+struct Tables {
+    parts: Vec<Part>,
+    /// A table for each part.
+    remap: Vec<RemapTable>,
+}
 
 /// The way in which a view is written.
 #[derive(Debug, Clone, PartialEq)]
@@ -82,6 +90,27 @@ pub struct Rendering {
     pub quality: u8,
     /// True to draw the boxes of the last report.
     pub boxes: bool,
+    /// True to draw the zones with their names.
+    pub zones: bool,
+    /// True to draw the counting lines with their names.
+    pub lines: bool,
+    /// The number of persons to write.
+    pub number: Option<usize>,
+}
+
+impl Rendering {
+    /// Writes a view in the default quality, without drawings.
+    #[must_use]
+    pub fn new(view: View) -> Self {
+        Self {
+            view,
+            quality: QUALITY,
+            boxes: false,
+            zones: false,
+            lines: false,
+            number: None,
+        }
+    }
 }
 
 /// A frame of a camera.
@@ -323,25 +352,18 @@ impl LiveFrame {
 
     fn cell(&self, rendering: &Rendering) -> Arc<OnceCell<Bytes>> {
         let mut rendered = self.rendered.lock();
-        if let Some((_, cell)) = rendered.iter().find(|(known, _)| known == rendering) {
-            return Arc::clone(cell);
-        }
-        if rendered.len() == MAX_RENDERED {
-            rendered.remove(0);
+        if let Some(cell) = known(&rendered, rendering) {
+            return cell;
         }
         let cell = Arc::<OnceCell<Bytes>>::default();
-        rendered.push((rendering.clone(), Arc::clone(&cell)));
+        keep(&mut rendered, rendering.clone(), &cell);
         cell
     }
 
     /// Decodes the frame, with its masks and with people concealed.
     fn decode(&self, limits: &DecodeLimits) -> Result<Arc<Frame>, ViewError> {
         let mut frame = match &self.image {
-            JobImage::Encoded(file) => {
-                let decoded = decode(file, limits);
-                let decoded = decoded.map_err(|error| ViewError::Decode(Arc::new(error)))?;
-                Arc::new(decoded.frame)
-            }
+            JobImage::Encoded(file) => Arc::new(decode(file, limits)?.frame),
             JobImage::Decoded(frame) => Arc::clone(frame),
         };
         if [frame.width(), frame.height()] != self.scene.size {
@@ -366,28 +388,54 @@ impl LiveFrame {
             _ => self.scene.tables(view)?,
         };
         let mut image = Frame::black(view.width, view.height);
-        for (part, table) in &tables.0 {
+        for (part, table) in tables.parts.iter().zip(&tables.remap) {
             table.paint(frame, part.size(), &mut image, part.origin);
         }
-        if rendering.boxes {
-            let parts: Vec<_> = tables.0.iter().map(|(part, _)| part.clone()).collect();
-            let camera = &self.scene.camera;
-            let boxes = self.persons.iter();
-            let boxes = boxes.filter_map(|person| box_in_view(&parts, person, camera));
-            let marks = boxes.map(|bbox| Mark {
-                bbox,
-                oriented: None,
-                head: None,
-                label: String::new(),
-            });
-            let mut drawing = Drawing::new(marks.collect());
-            drawing.oriented = false;
-            let _ = annotate_unless(&mut image, &drawing, &|| false);
-        }
-        let jpeg = encode_jpeg(&image, rendering.quality);
-        let jpeg = jpeg.map_err(|error| ViewError::Encode(Arc::new(error)))?;
-        Ok(jpeg.into())
+        self.draw(&mut image, &tables.parts, rendering);
+        Ok(encode_jpeg(&image, rendering.quality)?.into())
     }
+
+    /// Draws what the rendering has beside the view.
+    fn draw(&self, image: &mut Frame, parts: &[Part], rendering: &Rendering) {
+        let camera = &self.scene.camera;
+        let (areas, lens, mount) = (&camera.areas, &camera.lens, &camera.mount);
+        if rendering.lines {
+            let lines = areas.lines.iter();
+            let lines = lines.map(|line| ZoneOutline::for_line(line, lens, mount));
+            let lines = outlines_in_view(parts, &lines.collect::<Vec<_>>(), camera);
+            sketch_line_outlines(image, &lines);
+        }
+        let mut drawing = Drawing::new(Vec::new());
+        drawing.oriented = false;
+        if rendering.zones {
+            let zones = areas.zones.iter();
+            let zones = zones.map(|zone| ZoneOutline::new(zone, lens, mount));
+            drawing.zones = outlines_in_view(parts, &zones.collect::<Vec<_>>(), camera);
+        }
+        if rendering.boxes {
+            let boxes = self.persons.iter();
+            let boxes = boxes.filter_map(|person| box_in_view(parts, person, camera));
+            drawing.marks = boxes.map(|bbox| Mark::new(bbox, "")).collect();
+        }
+        if let Some(number) = rendering.number {
+            drawing.caption = format!("Persons: {number}");
+        }
+        annotate(image, &drawing);
+    }
+}
+
+/// Returns the kept value of a key.
+fn known<K: PartialEq, V>(kept: &[(K, Arc<V>)], key: &K) -> Option<Arc<V>> {
+    let (_, value) = kept.iter().find(|(known, _)| known == key)?;
+    Some(Arc::clone(value))
+}
+
+/// Keeps a value, in place of the oldest one where there are too many.
+fn keep<K, V>(kept: &mut Vec<(K, Arc<V>)>, key: K, value: &Arc<V>) {
+    if kept.len() == MAX_KEPT {
+        kept.remove(0);
+    }
+    kept.push((key, Arc::clone(value)));
 }
 
 /// Returns a copy of a file, so that the rest of its request body can be freed.
@@ -401,29 +449,21 @@ fn copied(image: &JobImage) -> JobImage {
 impl Scene {
     /// Returns the remap tables of a view.
     fn tables(&self, view: &View) -> Result<Arc<Tables>, ParameterError> {
-        let known = |tables: &[(View, Arc<Tables>)]| {
-            let mut tables = tables.iter();
-            tables.find_map(|(other, tables)| (other == view).then(|| Arc::clone(tables)))
-        };
-        if let Some(tables) = known(&self.tables.lock()) {
+        if let Some(tables) = known(&self.tables.lock(), view) {
             return Ok(tables);
         }
         let tables = Arc::new(self.new_tables(view, &view.direction())?);
-        let mut kept = self.tables.lock();
-        if kept.len() == MAX_TABLES {
-            kept.remove(0);
-        }
-        kept.push((view.clone(), Arc::clone(&tables)));
+        keep(&mut self.tables.lock(), view.clone(), &tables);
         Ok(tables)
     }
 
     fn new_tables(&self, view: &View, direction: &Direction) -> Result<Tables, ParameterError> {
-        let parts = view.parts(direction, &self.camera)?.into_iter();
-        let tables = parts.map(|part| {
-            let table = self.table(&part.projection);
-            (part, table)
-        });
-        Ok(Tables(tables.collect()))
+        let parts = view.parts(direction, &self.camera)?;
+        let remap = parts.iter().map(|part| self.table(&part.projection));
+        Ok(Tables {
+            remap: remap.collect(),
+            parts,
+        })
     }
 
     fn table(&self, projection: &Projection) -> RemapTable {

@@ -7,17 +7,20 @@ use std::{
 
 use lookdown_calibration::CameraGeometry;
 use lookdown_detect::parameters::ParameterError;
+use lookdown_imaging::annotate::ZoneOutline;
 use lookdown_lens::geometry::{
-    Mount, OrientedBox, Panorama, Pixel, Ray, VirtualView,
+    Mount, OrientedBox, Panorama, Pixel, VirtualView,
     pixels::{PixelConvention, cross_half_pixel},
 };
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 /// Sides of a view, pixels: a wall of screens is not wider.
-const SIDES: RangeInclusive<u32> = 64..=4096;
+const SIDES: RangeInclusive<f64> = 64.0..=4096.0;
 /// Most pixels of a view.
 const MAX_PIXELS: u32 = 4096 * 1024;
+/// A turn in both directions.
+const AZIMUTHS_DEG: RangeInclusive<f64> = -360.0..=360.0;
 /// A perspective image stretches its corners by 15 at 150°.
 const FIELDS_OF_VIEW_DEG: RangeInclusive<f64> = 10.0..=150.0;
 /// From straight down to the horizon.
@@ -31,6 +34,8 @@ const ONE_STRIP: f64 = 1.5;
 const QUARTER_TILT_DEG: f64 = 50.0;
 /// Points along each side of a box that is projected into a view.
 const BOX_STEPS: u32 = 4;
+/// Points between two of an outline: it ends within a 16th of their distance at a border.
+const LINE_STEPS: u32 = 16;
 
 /// The kinds of views.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -124,27 +129,16 @@ impl View {
     /// # Errors
     /// [`ParameterError`] with the field, its value and its range.
     pub fn check(&self) -> Result<(), ParameterError> {
-        for (name, side) in [("width", self.width), ("height", self.height)] {
-            if !SIDES.contains(&side) {
-                return Err(out_of_range(name, side, &SIDES, "pixels"));
-            }
-        }
-        if self.width * self.height > MAX_PIXELS {
-            let (width, height) = (self.width, self.height);
-            let problem =
-                format!("{width} × {height} are more than {MAX_PIXELS} pixels: lower one");
-            return Err(ParameterError::bad_value("width", problem));
-        }
-        if self.azimuth_deg.abs() > 360.0 {
-            let range = -360.0..=360.0;
-            return Err(out_of_range(
+        let [width, height] = [self.width, self.height].map(f64::from);
+        for (name, value, range, unit) in [
+            ("width", Some(width), SIDES, "pixels"),
+            ("height", Some(height), SIDES, "pixels"),
+            (
                 "azimuth_deg",
-                self.azimuth_deg,
-                &range,
+                Some(self.azimuth_deg),
+                AZIMUTHS_DEG,
                 "degrees",
-            ));
-        }
-        for (name, angle, range, unit) in [
+            ),
             (
                 "tilt_deg",
                 self.tilt_deg,
@@ -158,9 +152,16 @@ impl View {
                 "degrees",
             ),
         ] {
-            if let Some(angle) = angle.filter(|angle| !range.contains(angle)) {
-                return Err(out_of_range(name, angle, &range, unit));
+            let (least, most) = (range.start(), range.end());
+            if let Some(value) = value.filter(|value| !range.contains(value)) {
+                let problem = format!("{value} is not {least} to {most} {unit}");
+                return Err(ParameterError::bad_value(name, problem));
             }
+        }
+        if self.width * self.height > MAX_PIXELS {
+            let problem =
+                format!("{width} × {height} are more than {MAX_PIXELS} pixels: lower one");
+            return Err(ParameterError::bad_value("width", problem));
         }
         Ok(())
     }
@@ -254,16 +255,6 @@ impl View {
     }
 }
 
-fn out_of_range<T: std::fmt::Display>(
-    name: &str,
-    value: T,
-    range: &RangeInclusive<T>,
-    unit: &str,
-) -> ParameterError {
-    let (least, most) = (range.start(), range.end());
-    ParameterError::bad_value(name, format!("{value} is not {least} to {most} {unit}"))
-}
-
 impl Part {
     /// Width and height, pixels.
     pub(super) fn size(&self) -> [u32; 2] {
@@ -273,17 +264,76 @@ impl Part {
         }
     }
 
-    /// The point of the view (corner-origin pixels) at which a ray (camera frame) meets the part;
-    /// possibly beyond its borders.
-    fn project(&self, ray: &Ray) -> Option<Pixel> {
+    /// Left, top, right and bottom in the view, pixels.
+    fn borders(&self) -> [f64; 4] {
+        let ([left, top], [width, height]) = (self.origin, self.size());
+        [left, top, left + width, top + height].map(f64::from)
+    }
+
+    /// The point of the view at which the part shows a point of the frame, possibly beyond its
+    /// borders; both in corner-origin pixels.
+    fn project(&self, point: Pixel, camera: &CameraGeometry) -> Option<Pixel> {
+        let pixel = cross_half_pixel(point, PixelConvention::PixelCenter);
+        let ray = camera.lens.unproject(&pixel)?;
         let point = match &self.projection {
-            Projection::Pinhole(view) => view.project(ray),
-            Projection::Panorama(panorama) => panorama.project(ray),
+            Projection::Pinhole(view) => view.project(&ray),
+            Projection::Panorama(panorama) => panorama.project(&ray),
         };
         let point = cross_half_pixel(point?, PixelConvention::CornerOrigin);
         let [left, top] = self.origin.map(f64::from);
         Some(Pixel::new(point.x + left, point.y + top))
     }
+
+    /// The point at which the part shows a point of the frame, within its borders.
+    pub(super) fn shown(&self, point: Pixel, camera: &CameraGeometry) -> Option<Pixel> {
+        let [left, top, right, bottom] = self.borders();
+        let is_inside =
+            |at: &Pixel| (left..=right).contains(&at.x) && (top..=bottom).contains(&at.y);
+        self.project(point, camera).filter(is_inside)
+    }
+
+    /// The pieces of a line of the frame that the part shows. All points are corner-origin pixels.
+    fn pieces(&self, line: &[[f64; 2]], camera: &CameraGeometry) -> Vec<Vec<[f64; 2]>> {
+        let mut pieces = vec![Vec::<[f64; 2]>::new()];
+        for ends in line.windows(2) {
+            let [from, to] = [ends[0], ends[1]].map(Pixel::from);
+            for step in 0..=LINE_STEPS {
+                let share = f64::from(step) / f64::from(LINE_STEPS);
+                let at = self.shown(from + (to - from) * share, camera);
+                let last = pieces.last().and_then(|piece| piece.last());
+                // The ends of a panorama are neighbors.
+                let jump = f64::from(self.size()[0]) / 2.0;
+                let is_cut = |at: Pixel| last.is_some_and(|last| (last[0] - at.x).abs() > jump);
+                if at.is_none_or(is_cut) {
+                    pieces.push(Vec::new());
+                }
+                if let (Some(at), Some(piece)) = (at, pieces.last_mut()) {
+                    piece.push([at.x, at.y]);
+                }
+            }
+        }
+        pieces.retain(|piece| piece.len() > 1);
+        pieces
+    }
+}
+
+/// Returns the outlines in the frame as the parts show them.
+pub(super) fn outlines_in_view(
+    parts: &[Part],
+    outlines: &[ZoneOutline],
+    camera: &CameraGeometry,
+) -> Vec<ZoneOutline> {
+    let shown = parts.iter().flat_map(|part| {
+        outlines.iter().map(|outline| ZoneOutline {
+            name: outline.name.clone(),
+            lines: outline
+                .lines
+                .iter()
+                .flat_map(|line| part.pieces(line, camera))
+                .collect(),
+        })
+    });
+    shown.collect()
 }
 
 /// Returns the box of a person in a view: left, top, right and bottom, corner-origin pixels. `None`
@@ -293,52 +343,30 @@ pub(super) fn box_in_view(
     person: &OrientedBox,
     camera: &CameraGeometry,
 ) -> Option<[f64; 4]> {
-    let ray_at = |point: Pixel| {
-        let pixel = cross_half_pixel(point, PixelConvention::PixelCenter);
-        camera.lens.unproject(&pixel)
-    };
-    let center = ray_at(person.center)?;
-    let borders = |part: &Part| {
-        let ([left, top], [width, height]) = (part.origin, part.size());
-        [left, top, left + width, top + height].map(f64::from)
-    };
-    let part = parts.iter().find(|part| {
-        let [left, top, right, bottom] = borders(part);
-        let at = part.project(&center);
-        at.is_some_and(|at| (left..=right).contains(&at.x) && (top..=bottom).contains(&at.y))
-    })?;
+    let mut shown = parts.iter();
+    let (part, center) = shown.find_map(|part| Some((part, part.shown(person.center, camera)?)))?;
+    let [left, top, right, bottom] = part.borders();
     let corners = person.corners();
-    let mut found = [
-        f64::INFINITY,
-        f64::INFINITY,
-        f64::NEG_INFINITY,
-        f64::NEG_INFINITY,
-    ];
+    let mut found = [right, bottom, left, top];
     for (index, corner) in corners.iter().enumerate() {
         let next = corners[(index + 1) % 4];
         for step in 0..BOX_STEPS {
             let share = f64::from(step) / f64::from(BOX_STEPS);
-            let ray = ray_at(corner + (next - corner) * share);
             // The rim cuts off boxes there.
-            let Some(at) = ray.and_then(|ray| part.project(&ray)) else {
+            let Some(mut at) = part.project(corner + (next - corner) * share, camera) else {
                 continue;
             };
-            let [left, top, right, bottom] = found;
+            if let Projection::Panorama(panorama) = &part.projection {
+                // The ends of a panorama are neighbors.
+                at.x -= panorama.turn() * ((at.x - center.x) / panorama.turn()).round();
+            }
             found = [
-                left.min(at.x),
-                top.min(at.y),
-                right.max(at.x),
-                bottom.max(at.y),
+                found[0].min(at.x.max(left)),
+                found[1].min(at.y.max(top)),
+                found[2].max(at.x.min(right)),
+                found[3].max(at.y.min(bottom)),
             ];
         }
     }
-    let [left, top, right, bottom] = borders(part);
-    let [x_min, y_min, x_max, y_max] = found;
-    let clipped = [
-        x_min.max(left),
-        y_min.max(top),
-        x_max.min(right),
-        y_max.min(bottom),
-    ];
-    (clipped[0] < clipped[2] && clipped[1] < clipped[3]).then_some(clipped)
+    (found[0] < found[2] && found[1] < found[3]).then_some(found)
 }

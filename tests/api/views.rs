@@ -158,6 +158,7 @@ async fn the_image_of_a_view_changes_with_the_frame_and_the_view() {
         ("quality=0", 422),
         ("width=1", 422),
         ("boxes=2", 422),
+        ("number=2", 422),
         ("a=1", 400),
     ] {
         let answer = service.get(&format!("{JPEG}?{query}")).await;
@@ -190,6 +191,59 @@ async fn masks_and_concealment_hold_in_every_view() {
         // The gray of silhouettes.
         assert!(count(&image, 96) > 500, "people in {view}");
     }
+}
+
+#[tokio::test]
+async fn zones_lines_and_the_number_are_drawn_where_asked() {
+    let service = Service::start();
+    let mut areas = service.get("/calibrations/lobby").await.json();
+    // The azimuths of the middles of the zone and of the line are 0° and 180°.
+    areas["zones"] =
+        json!([{ "name": "till", "frame_px": [[130, 80], [170, 80], [170, 120], [130, 120]] }]);
+    areas["lines"] =
+        json!([{ "name": "door", "frame_px": [[50, 80], [50, 120]], "directions": ["in", "out"] }]);
+    let put = service.put("/calibrations/lobby", &areas.to_string()).await;
+    assert_eq!(put.status, 200, "{}", put.text());
+    for (view, zone, line) in [
+        (json!({ "azimuth_deg": 0 }), true, false),
+        (json!({ "azimuth_deg": 180 }), false, true),
+        (json!({ "kind": "quarters" }), true, true),
+        (
+            json!({ "kind": "panorama", "azimuth_deg": 180, "width": 960, "height": 300 }),
+            true,
+            true,
+        ),
+    ] {
+        service.put(VIEW, &view.to_string()).await;
+        service.show().await;
+        let mut tags = std::collections::BTreeSet::new();
+        for (option, color, is_drawn) in [
+            ("zones", [126, 240, 110], zone),
+            ("lines", [255, 214, 60], line),
+            ("number", [255, 255, 255], true),
+        ] {
+            let answer = service
+                .get(&format!("{JPEG}?{option}=true&quality=95"))
+                .await;
+            tags.insert(answer.header("etag").to_owned());
+            let image = image_of(&answer);
+            let drawn = colored(&image, color);
+            assert_eq!(drawn > 20, is_drawn, "{option} in {view}: {drawn}");
+            // A stroke along the whole width would be the wrong way around.
+            assert!(drawn < 6_000, "{option} in {view}: {drawn}");
+        }
+        assert_eq!(tags.len(), 3);
+    }
+}
+
+/// The number of pixels of about this color.
+fn colored(frame: &Frame, color: [u8; 3]) -> usize {
+    let pixels = frame.pixels().as_chunks::<3>().0.iter();
+    let is_color = |pixel: &&[u8; 3]| {
+        let mut channels = pixel.iter().zip(color);
+        channels.all(|(value, wanted)| value.abs_diff(wanted) < 30)
+    };
+    pixels.filter(is_color).count()
 }
 
 /// The next part of a stream; `None` at its end.

@@ -2,7 +2,8 @@
 
 It runs in the environment of the tests' part `home_assistant`, connects to the broker at localhost, and writes its
 states and devices to `FOLDER/states.json` every half second, with its notifications and images. `FOLDER/automations.yaml`
-is a part of its configuration, and `FOLDER/press.json` turns a switch. SIGTERM stops it.
+is a part of its configuration, `FOLDER/mjpeg.json` has the options of an "MJPEG IP Camera", and `FOLDER/press.json`
+turns a switch. SIGTERM stops it.
 """
 
 import asyncio
@@ -28,16 +29,23 @@ def prepare(folder: Path, port: int, user: str, password: str) -> None:
         http = f"http:\n  server_host: 127.0.0.1\n  server_port: {free.getsockname()[1]}\n"
     text = f"homeassistant:\n  name: Test\n{http}{automation}"
     (folder / "configuration.yaml").write_text(text, encoding="utf-8")
-    entry = {
-        "entry_id": "mqtt", "version": 1, "minor_version": 1, "domain": "mqtt", "title": "MQTT", "options": {},
-        "data": {"broker": "localhost", "port": port, "username": user, "password": password, "discovery": True},
-        "pref_disable_new_entities": False, "pref_disable_polling": False, "source": "user", "unique_id": None,
-        "disabled_by": None,
-    }  # fmt: skip
-    entries = {"version": 1, "minor_version": 2, "key": "core.config_entries", "data": {"entries": [entry]}}
+    data = {"broker": "localhost", "port": port, "username": user, "password": password, "discovery": True}
+    entries = [entry("mqtt", data=data)]
+    if (mjpeg := folder / "mjpeg.json").exists():
+        entries.append(entry("mjpeg", options=json.loads(mjpeg.read_text(encoding="utf-8"))))
+    entries = {"version": 1, "minor_version": 2, "key": "core.config_entries", "data": {"entries": entries}}
     file = folder / ".storage" / "core.config_entries"
     if not file.exists():
         file.write_text(json.dumps(entries), encoding="utf-8")
+
+
+def entry(domain: str, **more: dict) -> dict:
+    """An integration as the user interface stores it."""
+    return {
+        "entry_id": domain, "version": 1, "minor_version": 1, "domain": domain, "title": domain, "options": {}, "data": {},
+        "pref_disable_new_entities": False, "pref_disable_polling": False, "source": "user", "unique_id": None,
+        "disabled_by": None,
+    } | more  # fmt: skip
 
 
 def snapshot(hass) -> dict:
@@ -77,12 +85,13 @@ async def press(hass, folder: Path) -> None:
 
 
 async def images(hass) -> dict[str, int]:
-    """The sizes of the images of all image entities."""
-    component = hass.data.get("image")
+    """The sizes of the images of all image and camera entities."""
     sizes = {}
-    for entity in component.entities if component else ():
-        image = await entity.async_image()
-        sizes[entity.unique_id] = len(image or b"")
+    for domain in ("image", "camera"):
+        component = hass.data.get(domain)
+        for entity in list(component.entities) if component else ():
+            image = await (entity.async_image() if domain == "image" else entity.async_camera_image())
+            sizes[entity.unique_id] = len(image or b"")
     return sizes
 
 

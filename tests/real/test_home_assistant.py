@@ -17,6 +17,7 @@ from mosquitto import PASSWORD, USER, Broker, broker
 from state import wait_until
 from support.lookdown import lookdown
 from test_count import CountedCamera
+from test_views import put
 
 HERE = Path(__file__).resolve().parent
 PYTHON = ROOT / ".setup" / "real" / "home_assistant" / "bin" / "python"
@@ -28,6 +29,7 @@ NO_PERSONS = f"{DETECT}&score_threshold=1"
 PERSONS = "lookdown_office_persons"
 OCCUPANCY = "lookdown_office_occupancy"
 LEFT = "lookdown_office_zone_left"
+VIEW = "lookdown_office_view_door"
 LEFT_OCCUPANCY = f"{LEFT}_occupancy"
 ENTITIES = {PERSONS, OCCUPANCY, LEFT, LEFT_OCCUPANCY}
 LEFT_HALF = {"name": "left", "frame_px": [[0, 0], [480, 0], [480, 960], [0, 960]]}
@@ -232,6 +234,41 @@ class RunEntities(unittest.TestCase):
                 self.home.press("switch.gate_detection", "turn_on")
                 self.home.until({"lookdown_gate_detection": "on"})
                 wait_until(lambda: json.loads(server.get("/results")), "the camera is read again", 60)
+
+
+class Views(unittest.TestCase):
+    """Straight live views, in both ways of docs/home-automation.md."""
+
+    def test_a_view_is_a_camera_over_mqtt_and_mjpeg(self):
+        folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
+        of = self.enterContext(broker(folder))
+        settings = {
+            "STATE__PATH": folder / "state",
+            "MQTT__URL": of.url,
+            "MQTT__IMAGE_EVERY_SECONDS": "1",
+            "RESULTS__IMAGES": "office",
+        }
+        calibrations = office_calibration(folder / "calibrations")
+        server = self.enterContext(lookdown(settings, calibrations=calibrations))
+        put(server, "/cameras/office/views/door", {"width": 320, "height": 240})
+        (folder / "home").mkdir()
+        url = f"http://{server.address}/cameras/office/views/door.mjpg"
+        mjpeg = {"mjpeg_url": url, "still_image_url": None, "authentication": "basic", "verify_ssl": True}
+        mjpeg |= {"username": None, "password": ""}
+        (folder / "home" / "mjpeg.json").write_text(json.dumps(mjpeg), encoding="utf-8")
+        home = self.enterContext(home_assistant(folder / "home", of))
+        server.post(DETECT, OFFICE)
+
+        def sizes() -> dict[str, int]:
+            images = home.shown()["images"]
+            return {name: images.get(name, 0) for name in (VIEW, "mjpeg")}
+
+        wait_until(lambda: server.post(DETECT, OFFICE) and min(sizes().values()) > 1000, "both cameras have images", 60)
+        print("\n", sizes(), home.entities()[VIEW])
+        self.assertEqual(home.entities()[VIEW]["entity"], "camera.office_view_door")
+        self.assertEqual(server.delete("/cameras/office/views/door"), 204)
+        wait_until(lambda: VIEW not in home.entities(), "the entity of the view is gone")
+        self.assertFalse([topic for topic in of.retained() if "view" in topic])
 
 
 class CountEntities(CountedCamera):

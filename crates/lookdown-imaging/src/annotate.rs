@@ -16,7 +16,9 @@ mod style;
 mod text;
 
 use super::frame::Frame;
-pub use area_sketch::{ZoneOutline, sketch_areas, sketch_foot_filter, sketch_lines};
+pub use area_sketch::{
+    ZoneOutline, sketch_areas, sketch_foot_filter, sketch_line_outlines, sketch_lines,
+};
 use canvas::{Outline, Rgb, Stroke};
 pub use caption::Caption;
 pub use conceal::{Concealment, conceal};

@@ -118,7 +118,7 @@ impl Camera {
             let shown = self.lens.project(&Ray::new(x, y, camera_m - z))?;
             Some(Pixel::new(shown.x + 0.5, shown.y + 0.5))
         };
-        let middle = pixel(place.x, place.y, (body.hidden_m + body.top_m) / 2.0)?;
+        let middle = pixel(place.x, place.y, f64::midpoint(body.hidden_m, body.top_m))?;
         let up = vertical_in_frame(middle, &self.lens, &self.mount);
         let across = Vector2::new(-up.y, up.x);
         // A round body with narrower feet and head.

@@ -39,6 +39,7 @@ const CHANGE_S: f64 = 1.5;
 
 /// The visible part of a person above a place of the floor.
 #[derive(Clone, Copy)]
+#[expect(clippy::struct_field_names, reason = "their unit")]
 pub struct Body {
     pub top_m: f64,
     /// The height from which on the person is seen.
@@ -193,8 +194,8 @@ impl Person {
             return;
         }
         self.pause_s -= STEP_S;
-        let change = STEP_S / CHANGE_S * if self.pause_s > CHANGE_S { 1.0 } else { -1.0 };
-        self.rest_share = (self.rest_share + change).clamp(0.0, 1.0);
+        let share_step = STEP_S / CHANGE_S * if self.pause_s > CHANGE_S { 1.0 } else { -1.0 };
+        self.rest_share = (self.rest_share + share_step).clamp(0.0, 1.0);
         let wanted = if self.pause_s > 0.0 {
             Vector2::zeros()
         } else {

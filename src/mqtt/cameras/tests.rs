@@ -1,9 +1,13 @@
 use std::collections::BTreeSet;
 
 use jiff::Timestamp;
+use lookdown_imaging::decode::DecodeLimits;
 
 use super::*;
-use crate::results::{ImagesOf, NewReport, ReportId};
+use crate::{
+    results::{ImagesOf, NewReport, ReportId},
+    views::{View, Views},
+};
 
 const HOLD: Duration = Duration::from_secs(5);
 const EXPIRY: Duration = Duration::from_mins(10);
@@ -235,6 +239,60 @@ fn removed_cameras_are_withdrawn() {
     assert_eq!(topics(&removed), topics(&announced));
     assert!(removed.iter().all(|message| message.payload.is_empty()));
     assert!(cameras.retain(&["gate".to_owned()]).is_empty());
+}
+
+#[test]
+fn views_of_cameras_with_images_are_published_and_withdrawn() {
+    let discovery = Discovery {
+        images: ImagesOf::Some(["lobby".to_owned()].into()),
+        ..Discovery::default()
+    };
+    let (mut cameras, begin) = (cameras_with(discovery, 10), Instant::now());
+    let folder = tempfile::tempdir().unwrap();
+    let views = Views::new(folder.path().to_owned(), DecodeLimits::default(), None);
+    for camera in ["lobby", "gate"] {
+        update(&mut cameras, &report(camera, 1, ""));
+        views.put(camera, "door", View::default()).unwrap();
+    }
+    let config = "homeassistant/camera/lookdown_lobby_view_door/config";
+    let (topic, values) = (
+        "lookdown/cameras/lobby/views/door",
+        r#"{"kind":"fixed","azimuth_deg":0.0,"width":960,"height":720}"#,
+    );
+    let messages = cameras.update_views(&views);
+    assert!(messages.iter().all(|message| message.retained));
+    assert!(messages.iter().any(|message| message.topic == config));
+    assert_eq!(
+        published(&messages).0,
+        [(topic.to_owned(), values.to_owned())]
+    );
+    assert!(cameras.update_views(&views).is_empty());
+    let all = cameras.all(begin);
+    assert!(all.iter().any(|message| message.topic == topic));
+    // A view that another process has deleted.
+    cameras.begin_connection(begin);
+    let retained = |camera: &str, view: &str| topics().view(camera, view);
+    for (camera, view) in [("lobby", "gone"), ("lobby", "door"), ("old", "door")] {
+        cameras.compare(&retained(camera, view), b"{}", true);
+    }
+    let removed = cameras.expire(begin + EXPIRY);
+    let removed: Vec<_> = removed.iter().map(|message| &*message.topic).collect();
+    for (view, is_gone) in [
+        ("lobby/views/gone", true),
+        ("lobby/views/door", false),
+        ("old/views/door", true),
+    ] {
+        let topic = format!("lookdown/cameras/{view}");
+        assert_eq!(removed.contains(&&*topic), is_gone, "{topic}");
+    }
+    views.delete("lobby", "door").unwrap();
+    let gone = cameras.update_views(&views);
+    for topic in [topic, config] {
+        assert!(
+            gone.contains(&Message::forget(topic.to_owned())),
+            "{gone:?}"
+        );
+    }
 }
 
 #[test]

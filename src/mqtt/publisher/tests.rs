@@ -1,6 +1,7 @@
 use bytes::Bytes;
 use futures_util::{SinkExt, StreamExt};
 use jiff::Timestamp;
+use lookdown_imaging::decode::DecodeLimits;
 use rumqttc::{Codec, ConnAck, Connect, ConnectReturnCode, Packet, QoS};
 use tokio::net::{TcpListener, TcpStream};
 use tokio_util::codec::Framed;
@@ -57,6 +58,7 @@ async fn setup_with(image_every: Option<Duration>) -> Setup {
             FollowedPersons::default(),
             Arc::default(),
             Arc::clone(&metrics),
+            Arc::new(Views::new("state".into(), DecodeLimits::default(), None)),
         )
         .unwrap(),
         metrics,

@@ -36,6 +36,12 @@ impl ZoneOutline {
         Self::in_pieces(&zone.name, &zone.outline(lens, mount, POINTS_PER_EDGE))
     }
 
+    /// A counting line given in frame pixels, or on the floor and projected through `lens`.
+    #[must_use]
+    pub fn for_line(line: &CountingLine, lens: &Lens, mount: &Mount) -> Self {
+        Self::in_pieces(&line.name, &line.outline(lens, mount, POINTS_PER_EDGE))
+    }
+
     /// The outline of these points, cut where the lens does not see them.
     fn in_pieces(name: &str, outline: &[Option<Pixel>]) -> Self {
         let pieces = outline.split(Option::is_none);
@@ -70,12 +76,7 @@ impl ZoneOutline {
                 a[3].max(b[3]),
             ]
         })?;
-        let mark = Mark {
-            bbox,
-            oriented: None,
-            head: None,
-            label: self.name.clone(),
-        };
+        let mark = Mark::new(bbox, &self.name);
         mark.is_drawable().then_some(mark)
     }
 }
@@ -118,12 +119,14 @@ pub fn sketch_foot_filter(frame: &mut Frame, filter: &FootFilter, lens: &Lens, m
 /// Draws counting lines with their names. They are in frame pixels or on the floor and projected
 /// through `lens`.
 pub fn sketch_lines(frame: &mut Frame, lines: &[CountingLine], lens: &Lens, mount: &Mount) {
-    let outlines = lines.iter().map(|line| {
-        let outline = line.outline(lens, mount, POINTS_PER_EDGE);
-        ZoneOutline::in_pieces(&line.name, &outline)
-    });
-    let outlines: Vec<_> = outlines.collect();
-    sketch_outlines(frame, &outlines, LINE);
+    let outlines = lines.iter();
+    let outlines = outlines.map(|line| ZoneOutline::for_line(line, lens, mount));
+    sketch_line_outlines(frame, &outlines.collect::<Vec<_>>());
+}
+
+/// Draws the outlines of counting lines with their names.
+pub fn sketch_line_outlines(frame: &mut Frame, outlines: &[ZoneOutline]) {
+    sketch_outlines(frame, outlines, LINE);
 }
 
 /// Draws outlines with their names in a color.

@@ -45,6 +45,17 @@ pub struct Head {
 }
 
 impl Mark {
+    /// A mark of an axis-aligned box alone. An empty `label` draws no plate.
+    #[must_use]
+    pub fn new(bbox: [f64; 4], label: &str) -> Self {
+        Self {
+            bbox,
+            oriented: None,
+            head: None,
+            label: label.to_owned(),
+        }
+    }
+
     /// The mark for the same frame scaled by `factor`.
     pub fn scaled(self, factor: f64) -> Self {
         Self {

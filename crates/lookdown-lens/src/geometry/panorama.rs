@@ -1,5 +1,7 @@
 //! Panoramas: the ring around the nadir, unrolled.
 
+use std::f64::consts::TAU;
+
 use nalgebra::Rotation3;
 
 use super::{Mount, Pixel, Ray};
@@ -43,6 +45,12 @@ impl Panorama {
         self.height
     }
 
+    /// The width of a whole turn, pixels.
+    #[must_use]
+    pub fn turn(&self) -> f64 {
+        TAU / self.radians_per_pixel
+    }
+
     /// The ray (camera frame, unit length) through a pixel (pixel centers).
     pub fn ray_in_camera(&self, pixel: &Pixel) -> Ray {
         let right = pixel.x + 0.5 - f64::from(self.width) / 2.0;
@@ -75,7 +83,7 @@ fn latitude(tilt: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use std::f64::consts::{FRAC_PI_2, TAU};
+    use std::f64::consts::FRAC_PI_2;
 
     use nalgebra::{Unit, Vector3};
 

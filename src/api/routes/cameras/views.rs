@@ -44,8 +44,6 @@ use crate::{
 
 /// The separator of the parts of an MJPEG stream.
 const BOUNDARY: &str = "frame";
-/// Quality of a JPEG: its loss is hardly visible in a moving image.
-const QUALITY: u8 = 80;
 /// Longest wait of a request for the first frame of a camera.
 const FIRST_FRAME: Duration = Duration::from_secs(5);
 
@@ -59,6 +57,12 @@ struct ImageQuery {
     quality: Option<u8>,
     /// `true` to draw the boxes of the last report.
     boxes: Option<bool>,
+    /// `true` to draw the zones with their names.
+    zones: Option<bool>,
+    /// `true` to draw the counting lines with their names.
+    lines: Option<bool>,
+    /// `true` to write the number of persons.
+    number: Option<bool>,
     /// The key, for clients that send neither a header nor a password.
     key: Option<String>,
     /// A kind instead of the stored one. This and the next five need the scope `admin`; the name
@@ -233,7 +237,7 @@ async fn get_image(
 ) -> Result<Response, Problem> {
     let request = ImageRequest::begin(&state, &parts, camera, name)?;
     let deadline = RequestContext::from_extensions(&parts.extensions)?.deadline;
-    let rendering = request.rendering(&state, camera, name)?;
+    let rendering = request.rendering(&state, camera, name).await?;
     let live = request.live(&state, camera, name)?;
     let frame = newest(&state, &live, camera, deadline).await?;
     let tag = frame.tag(&rendering);
@@ -306,8 +310,9 @@ async fn get_stream(
 
 /// The query of an image, and its caller.
 struct ImageRequest {
-    quality: u8,
-    boxes: bool,
+    /// The options, with another view and no number.
+    options: Rendering,
+    number: bool,
     /// Values instead of the stored ones.
     changes: Vec<(&'static str, Value)>,
     key: Option<String>,
@@ -317,7 +322,13 @@ struct ImageRequest {
 impl ImageRequest {
     /// Checks the key and the query.
     fn begin(state: &ApiState, parts: &Parts, camera: &str, name: &str) -> Result<Self, Problem> {
-        const NAMES: [&str; 6] = [
+        const NAMES: [&str; 12] = [
+            "quality",
+            "key",
+            "boxes",
+            "zones",
+            "lines",
+            "number",
             "kind",
             "azimuth_deg",
             "tilt_deg",
@@ -325,32 +336,14 @@ impl ImageRequest {
             "width",
             "height",
         ];
-        let [
-            quality,
-            boxes,
-            key,
-            kind,
-            azimuth,
-            tilt,
-            field_of_view,
-            width,
-            height,
-        ] = parameters_named(
-            &parts.uri,
-            [
-                "quality", "boxes", "key", NAMES[0], NAMES[1], NAMES[2], NAMES[3], NAMES[4],
-                NAMES[5],
-            ],
-        )?;
+        let [quality, key, boxes, zones, lines, number, given @ ..] =
+            parameters_named(&parts.uri, NAMES)?;
         let (_, holder) = RequireView::with_key(state, &parts.headers, key.as_deref())?;
         let context = RequestContext::from_extensions(&parts.extensions)?;
         let caller = context.caller.clone();
         let caller = caller.with_holder(&state.options.access, holder.as_ref());
-        let given = NAMES
-            .into_iter()
-            .zip([kind, azimuth, tilt, field_of_view, width, height]);
         let mut changes = Vec::new();
-        for (name, value) in given {
+        for (name, value) in NAMES[6..].iter().copied().zip(given) {
             let Some(value) = value else { continue };
             // A number in JSON, or else a word.
             let parsed = value.parse::<serde_json::Number>();
@@ -361,53 +354,56 @@ impl ImageRequest {
         } else if !state.options.views.list(camera).contains_key(name) {
             return Err(unknown(state, camera, name));
         }
-        let boxes = match boxes.as_deref() {
-            None | Some("false") => false,
-            Some("true") => true,
-            Some(other) => {
-                return Err(ParameterError::is_not("boxes", other, "true or false").into());
-            }
-        };
-        let quality = quality.map(|quality| whole_number("quality", &quality, 1..=100));
+        let mut options = Rendering::new(View::default());
+        if let Some(quality) = quality {
+            options.quality = whole_number("quality", &quality, 1..=100)?;
+        }
+        options.boxes = flag("boxes", boxes.as_deref())?;
+        options.zones = flag("zones", zones.as_deref())?;
+        options.lines = flag("lines", lines.as_deref())?;
         Ok(Self {
-            quality: quality.transpose()?.unwrap_or(QUALITY),
-            boxes,
+            options,
+            number: flag("number", number.as_deref())?,
             changes,
             key,
             caller,
         })
     }
 
-    /// Returns the view as the request changes it.
-    fn rendering(&self, state: &ApiState, camera: &str, name: &str) -> Result<Rendering, Problem> {
-        let mut view = state.options.views.list(camera).remove(name);
-        if !self.changes.is_empty() {
-            let mut fields = serde_json::to_value(view.unwrap_or_default());
-            for (name, value) in &self.changes {
-                if let Ok(fields) = &mut fields {
-                    fields[*name] = value.clone();
-                }
-                let changed = fields
-                    .as_ref()
-                    .ok()
-                    .cloned()
-                    .map(serde_json::from_value::<View>);
-                if !matches!(changed, Some(Ok(_))) {
-                    let value = value.to_string();
-                    return Err(ParameterError::is_not(name, &value, "a value of a view").into());
-                }
-            }
-            let changed: View = fields
-                .and_then(serde_json::from_value)
-                .map_err(Problem::internal)?;
-            changed.check()?;
-            view = Some(changed);
+    /// Returns the view as the request changes it, with the options.
+    async fn rendering(
+        &self,
+        state: &ApiState,
+        camera: &str,
+        name: &str,
+    ) -> Result<Rendering, Problem> {
+        let mut rendering = self.options.clone();
+        rendering.view = match stored(state, camera, name) {
+            view if self.changes.is_empty() => view?,
+            view => self.changed(view.unwrap_or_default())?,
+        };
+        // Without an answer of the result store, there is no number.
+        if self.number
+            && let Ok(Some(latest)) = state.results.latest(camera).await
+            && let Ok(headline) = state.headline(&latest).await
+        {
+            rendering.number = headline.number.map(|number| number.persons);
         }
-        Ok(Rendering {
-            view: view.ok_or_else(|| unknown(state, camera, name))?,
-            quality: self.quality,
-            boxes: self.boxes,
-        })
+        Ok(rendering)
+    }
+
+    /// Returns a view with the values of the request.
+    fn changed(&self, mut view: View) -> Result<View, Problem> {
+        for (name, value) in &self.changes {
+            let mut fields = serde_json::to_value(view).map_err(Problem::internal)?;
+            fields[*name] = value.clone();
+            let changed = serde_json::from_value(fields);
+            view = changed.map_err(|_| {
+                ParameterError::is_not(name, &value.to_string(), "a value of a view")
+            })?;
+        }
+        view.check()?;
+        Ok(view)
     }
 
     /// Returns the newest frame of the camera.
@@ -449,7 +445,7 @@ impl Viewer {
             let rendering = self
                 .request
                 .rendering(&self.state, &self.camera, &self.name);
-            let rendering = rendering.ok()?;
+            let rendering = rendering.await.ok()?;
             let frame = self.frames.borrow_and_update().clone();
             let Some(frame) = frame else { continue };
             match self.live.jpeg(&frame, &rendering).await {
@@ -518,6 +514,14 @@ async fn using_file<T: Send + 'static>(
 ) -> Result<T, Problem> {
     let views = Arc::clone(&state.options.views);
     deadline.using(&CAMERAS, move || work(&views)).await
+}
+
+fn flag(name: &str, value: Option<&str>) -> Result<bool, ParameterError> {
+    match value {
+        None | Some("false") => Ok(false),
+        Some("true") => Ok(true),
+        Some(other) => Err(ParameterError::is_not(name, other, "true or false")),
+    }
 }
 
 fn stored(state: &ApiState, camera: &str, name: &str) -> Result<View, Problem> {
