@@ -291,8 +291,7 @@ impl Chance {
             .0
             .wrapping_mul(6_364_136_223_846_793_005)
             .wrapping_add(1_442_695_040_888_963_407);
-        let share = (self.0 >> 33) as f64 / (1_u64 << 31) as f64;
-        share
+        (self.0 >> 33) as f64 / (1_u64 << 31) as f64
     }
 
     /// A standard normal number, nearly: the sum of twelve uniform ones.
