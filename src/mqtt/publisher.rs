@@ -377,3 +377,6 @@ async fn hear(results: &Arc<dyn ResultStore>, queue: broadcast::Sender<Arc<Store
         }
     }
 }
+
+#[cfg(test)]
+mod tests;
