@@ -30,7 +30,6 @@ macro_rules! annotation_formats {
 
         impl AnnotationFormat {
             /// Returns the name of the tools or the standard, and the files.
-            #[must_use]
             pub fn description(self) -> &'static str {
                 match self {
                     $(Self::$variant => concat!($($description),+).trim_ascii(),)+
@@ -66,13 +65,11 @@ annotation_formats! {
 
 impl AnnotationFormat {
     /// Returns true if the format can have oriented boxes as its shapes.
-    #[must_use]
     pub fn has_oriented_boxes(self) -> bool {
         self.spec().boxes != SupportedBoxes::AxisParallel
     }
 
     /// Returns the formats that can have oriented boxes, for messages.
-    #[must_use]
     pub fn names_with_oriented_boxes() -> String {
         let formats = Self::VARIANTS.iter();
         let formats = formats.filter(|format| format.has_oriented_boxes());
@@ -80,7 +77,6 @@ impl AnnotationFormat {
     }
 
     /// Returns the media type of a document.
-    #[must_use]
     pub const fn media_type(self) -> &'static str {
         self.spec().media_type
     }
@@ -88,7 +84,6 @@ impl AnnotationFormat {
     /// Returns the files that describe `images`. `boxes` applies only if the format has both kinds.
     /// Images whose names differ only in their extensions share a
     /// file in YOLO and VOC: the last one is written.
-    #[must_use]
     pub fn files(self, images: &[AnnotatedImage], boxes: BoxKind) -> Vec<AnnotationFile> {
         match self.spec().layout {
             Layout::OneFile { path, document } => vec![file(path, document(images, boxes))],
@@ -106,7 +101,6 @@ impl AnnotationFormat {
     }
 
     /// Returns the document of one image: its own file, or that of a folder with this image only.
-    #[must_use]
     pub fn document(self, image: &AnnotatedImage, boxes: BoxKind) -> String {
         match self.spec().layout {
             Layout::OneFile { document, .. } => document(std::slice::from_ref(image), boxes),
@@ -115,7 +109,6 @@ impl AnnotationFormat {
     }
 
     /// The path of the image's own file, if the format has one.
-    #[must_use]
     pub fn own_file(self, image_file_name: &str) -> Option<String> {
         match self.spec().layout {
             Layout::OneFile { .. } => None,

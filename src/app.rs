@@ -150,7 +150,6 @@ pub struct App {
 
 impl App {
     /// Returns the metrics of the server.
-    #[must_use]
     pub fn metrics(&self) -> &Metrics {
         &self.state.metrics
     }
@@ -240,7 +239,6 @@ impl App {
     }
 
     /// The cameras and counts of this process.
-    #[must_use]
     pub fn companions(&self) -> Companions {
         self.state.options.companions.clone()
     }
@@ -256,20 +254,17 @@ impl App {
     }
 
     /// Returns the connection of parts of this process to the server.
-    #[must_use]
     pub fn in_process(&self) -> InProcess {
         let router = api::in_process_router(self.state.clone());
         api::in_process(router, self.companions().own_cameras())
     }
 
     /// The readiness of the app. Clones share its state.
-    #[must_use]
     pub fn readiness(&self) -> Readiness {
         self.state.readiness.clone()
     }
 
     /// The tracer of the requests. The caller shuts it down at the end of the process.
-    #[must_use]
     pub fn tracer(&self) -> Tracer {
         self.state.options.tracer.clone()
     }

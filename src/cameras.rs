@@ -58,7 +58,6 @@ pub struct Cameras {
 
 impl Cameras {
     /// Creates the cameras of a state folder, which may be missing.
-    #[must_use]
     pub fn new(folder: PathBuf, own: OwnCameras, metrics: Arc<Metrics>) -> Self {
         Self {
             folder: StateFolder::new(folder),
@@ -79,14 +78,12 @@ impl Cameras {
     }
 
     /// Returns the viewers of the cameras.
-    #[must_use]
     pub fn viewers(&self) -> &Arc<Viewers> {
         self.metrics.viewers()
     }
 
     /// Returns the states of the cameras that are watched: those of the settings and these stored
     /// ones. A camera that was deleted may still end.
-    #[must_use]
     pub fn states(&self, stored: &Stored) -> Vec<CameraState> {
         let configured = self.configured.read();
         let mut states = self.metrics.states();
@@ -97,13 +94,11 @@ impl Cameras {
     }
 
     /// Returns the stored cameras that cannot be watched, with the reasons.
-    #[must_use]
     pub fn problems(&self) -> BTreeMap<String, String> {
         self.problems.read().clone()
     }
 
     /// Returns true while frames of the camera are read.
-    #[must_use]
     pub fn is_watched(&self, name: &str) -> bool {
         self.metrics.states().iter().any(|state| state.name == name)
     }

@@ -83,7 +83,6 @@ enum Command {
 /// Runs a command line, whose first argument is the name of the program. `commit` is the commit
 /// from which the binary was built, if it is known. Ends the process if the command line is
 /// invalid.
-#[must_use]
 pub fn run(arguments: impl IntoIterator<Item = OsString>, commit: Option<&str>) -> ExitCode {
     let arguments: Vec<_> = arguments.into_iter().collect();
     match complete::complete(&arguments, || command(commit)) {

@@ -89,7 +89,6 @@ pub struct ReferenceCounts {
 impl ReferenceCounts {
     /// Reads the reference counts in a state folder, which may be missing. A file that is none is
     /// logged and left out. Blocks.
-    #[must_use]
     pub fn open(state: &Path, now: Timestamp) -> Self {
         let folder = state.join(FOLDER);
         let mut cameras = BTreeMap::new();
@@ -118,7 +117,6 @@ impl ReferenceCounts {
     }
 
     /// Returns the reference counts of a camera that still count, oldest first.
-    #[must_use]
     pub fn counts(&self, camera: &str, now: Timestamp) -> Vec<ReferenceCount> {
         let cameras = self.cameras.read();
         let counts = cameras.get(camera).map(|taught| taught.counts.clone());
@@ -128,7 +126,6 @@ impl ReferenceCounts {
     }
 
     /// Returns the number of a camera with enough reference counts.
-    #[must_use]
     pub fn number(&self, camera: &str) -> Option<Arc<TaughtNumber>> {
         self.cameras.read().get(camera)?.number.clone()
     }
@@ -242,7 +239,6 @@ impl Taught {
 
 /// Returns the reason why a reference count of a frame with this time and number would help, if it
 /// would.
-#[must_use]
 pub fn good_moment(
     counts: &[ReferenceCount],
     now: Timestamp,

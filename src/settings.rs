@@ -104,7 +104,6 @@ pub struct Settings {
 
 impl Settings {
     /// The longest time that requests may take after the grace period.
-    #[must_use]
     pub fn drain_timeout(&self) -> Duration {
         let own = self.shutdown.drain_timeout;
         own.unwrap_or(self.server.request_timeout)

@@ -49,7 +49,6 @@ impl Tls {
     }
 
     /// Interval between two reads of the files, seconds. `None` disables the reload.
-    #[must_use]
     pub fn poll_seconds(&self) -> Option<NonZeroU64> {
         self.options.poll_seconds
     }

@@ -69,7 +69,6 @@ struct ViewFile {
 impl Views {
     /// Creates the views of a state folder, which may be missing. `limits` bound
     /// the frames, in which people are concealed by `concealment`.
-    #[must_use]
     pub fn new(folder: PathBuf, limits: DecodeLimits, concealment: Option<Concealment>) -> Self {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
         Self {
@@ -110,7 +109,6 @@ impl Views {
     }
 
     /// Returns the views of a camera.
-    #[must_use]
     pub fn list(&self, camera: &str) -> StoredViews {
         let cameras = self.cameras.read();
         let known = cameras.get(camera);
@@ -118,7 +116,6 @@ impl Views {
     }
 
     /// Returns the newest frame of a camera with views.
-    #[must_use]
     pub fn live(&self, camera: &str) -> Option<Arc<LiveCamera>> {
         let cameras = self.cameras.read();
         Some(Arc::clone(&cameras.get(camera)?.live))
@@ -215,7 +212,6 @@ impl Views {
 
     /// Adds a viewer of a camera, so that it delivers all of its frames. Where people are concealed
     /// only frames with a report are shown, because others may show people elsewhere.
-    #[must_use]
     pub fn add_viewer(&self, camera: &str) -> Option<Viewing> {
         let viewers = self.viewers.get().filter(|_| self.concealment.is_none())?;
         Some(viewers.add(camera))

@@ -28,13 +28,11 @@ pub struct KeyDigest([u8; BYTES]);
 
 impl KeyDigest {
     /// Computes the digest of a key as it was sent.
-    #[must_use]
     pub fn new(key: &[u8]) -> Self {
         Self(Sha256::digest(key).into())
     }
 
     /// Parses a digest of 64 hexadecimal digits.
-    #[must_use]
     pub fn parse(text: &str) -> Option<Self> {
         let mut bytes = [0; BYTES];
         hex::decode_to_slice(text, &mut bytes).ok()?;
@@ -42,7 +40,6 @@ impl KeyDigest {
     }
 
     /// Returns the digest as 64 hexadecimal digits.
-    #[must_use]
     pub fn hexadecimal(&self) -> String {
         hex::encode(self.0)
     }

@@ -38,7 +38,6 @@ impl FromStr for KeyName {
 
 impl KeyName {
     /// The name as text.
-    #[must_use]
     pub fn as_str(&self) -> &str {
         &self.0
     }
@@ -113,13 +112,11 @@ impl KeyList {
     }
 
     /// The number of keys.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.0.len()
     }
 
     /// Returns true if there is no key.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
@@ -131,7 +128,6 @@ impl KeyList {
 
     /// Returns the holder of this key, or `None` if the key is unknown. The time depends only on
     /// the number of keys: all are compared in constant time.
-    #[must_use]
     pub fn holder_of(&self, key: &[u8]) -> Option<&Holder> {
         let digest = KeyDigest::new(key);
         let mut found = 0_u64;

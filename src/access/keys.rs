@@ -66,13 +66,11 @@ impl AccessKeys {
     }
 
     /// Returns the holder of this key, or `None` if the key is unknown.
-    #[must_use]
     pub fn holder_of(&self, key: &[u8]) -> Option<Holder> {
         self.known().holder_of(key).cloned()
     }
 
     /// The keys that are known now.
-    #[must_use]
     pub fn known(&self) -> Arc<KeyList> {
         Arc::clone(&self.known.read())
     }

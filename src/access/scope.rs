@@ -29,7 +29,6 @@ pub enum Scope {
 
 impl Scope {
     /// Returns the name, as in files and commands.
-    #[must_use]
     pub fn name(self) -> &'static str {
         self.into()
     }
@@ -41,7 +40,6 @@ pub struct Scopes(Vec<Scope>);
 
 impl Scopes {
     /// Creates a set of these scopes. Returns `None` if there is none.
-    #[must_use]
     pub fn new(given: &[Scope]) -> Option<Self> {
         let given = Scope::VARIANTS.iter().filter(|scope| given.contains(scope));
         let given: Vec<_> = given.copied().collect();
@@ -49,13 +47,11 @@ impl Scopes {
     }
 
     /// Returns true if `wanted` is among them. `admin` includes all.
-    #[must_use]
     pub fn allow(&self, wanted: Scope) -> bool {
         self.0.contains(&wanted) || self.0.contains(&Scope::Admin)
     }
 
     /// Their names, separated by `separator`.
-    #[must_use]
     pub fn joined(&self, separator: &str) -> String {
         let names: Vec<_> = self.0.iter().map(|scope| scope.name()).collect();
         names.join(separator)

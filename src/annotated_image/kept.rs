@@ -85,7 +85,6 @@ impl StoredFrame {
     }
 
     /// Returns the memory that it takes, bytes.
-    #[must_use]
     pub fn bytes(&self) -> usize {
         self.jpeg.len() + self.sketch.len()
     }

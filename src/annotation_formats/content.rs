@@ -32,7 +32,6 @@ pub struct AnnotatedImage {
 
 impl AnnotatedImage {
     /// Returns the persons of a report as annotations of the image with this file name.
-    #[must_use]
     pub fn new(report: &DetectionReport, file_name: String) -> Self {
         let calibration = &report.calibration;
         let is_assumed = calibration.assumed_circle.is_some();

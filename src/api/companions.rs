@@ -71,13 +71,11 @@ impl Companions {
     }
 
     /// Returns the cameras of this process.
-    #[must_use]
     pub fn own_cameras(&self) -> OwnCameras {
         self.0.read().own_cameras.clone()
     }
 
     /// Returns the numbers of persons that the counts follow.
-    #[must_use]
     pub fn followed(&self) -> FollowedPersons {
         self.0.read().followed.clone()
     }

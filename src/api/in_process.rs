@@ -16,7 +16,6 @@ use tower::ServiceExt;
 use super::http::context::OwnRequest;
 
 /// Returns the connection of parts of this process to the server with these routes.
-#[must_use]
 pub fn in_process(router: Router, own_cameras: OwnCameras) -> InProcess {
     InProcess::new(own_cameras, move |request| {
         let mut request = request.map(Body::new);

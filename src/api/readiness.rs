@@ -41,7 +41,6 @@ impl Readiness {
     }
 
     /// Returns the current phase.
-    #[must_use]
     pub fn phase(&self) -> Phase {
         *self.0.borrow()
     }

@@ -119,13 +119,11 @@ impl ApiOptions {
 
     /// Returns the time without progress of the workers after which the server is not ready. Each
     /// request ends within half of it.
-    #[must_use]
     pub fn stall_limit(&self) -> Duration {
         self.request_timeout * 2
     }
 
     /// Options for tests: small bodies, and no access control.
-    #[must_use]
     pub fn for_testing() -> Self {
         Self {
             max_body_bytes: 1 << 20,
@@ -186,7 +184,6 @@ pub struct Shared {
 
 impl ApiState {
     /// Creates the state around the workers.
-    #[must_use]
     pub fn new(
         workers: Arc<WorkerPool>,
         models: Arc<ModelRepository>,
@@ -267,7 +264,6 @@ impl ApiState {
     }
 
     /// Returns the time without progress of the workers after which the server is not ready.
-    #[must_use]
     pub fn stall_limit(&self) -> Duration {
         self.options.stall_limit()
     }

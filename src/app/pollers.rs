@@ -77,7 +77,6 @@ pub struct Reloader {
 
 impl App {
     /// The reloader of the files that the app uses.
-    #[must_use]
     pub fn reloader(&self) -> Reloader {
         Reloader {
             keys: self.keys.clone(),

@@ -119,27 +119,23 @@ impl Calibrations {
 
     /// Returns true when the store was read once. Before that, calibrations are unknown that the
     /// store has.
-    #[must_use]
     pub fn is_read(&self) -> bool {
         self.is_read.load(Ordering::Relaxed)
     }
 
     /// Returns the entry of the calibration `id` that serves: of the store, else of a sample frame.
     /// Does not block.
-    #[must_use]
     pub fn entry(&self, id: &CalibrationId) -> Option<Arc<CalibrationEntry>> {
         let now = self.now();
         now.entry_or_sample(id).cloned()
     }
 
     /// Every calibration of the store that serves or should, by ID. Does not block.
-    #[must_use]
     pub fn rows(&self) -> Vec<CalibrationRow> {
         self.now().rows()
     }
 
     /// Returns the health of the calibrations. Does not block.
-    #[must_use]
     pub fn health(&self) -> CalibrationsHealth {
         self.now().health()
     }

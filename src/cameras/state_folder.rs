@@ -177,7 +177,6 @@ pub struct StoredCamera {
 
 impl StoredCamera {
     /// Returns the source without its query, which may hold a token.
-    #[must_use]
     pub fn shown_source(&self) -> String {
         let location = Location::parse(&self.url);
         location.map_or_else(|_| String::new(), |(location, _)| location.to_string())

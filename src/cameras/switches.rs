@@ -21,7 +21,6 @@ impl Cameras {
     }
 
     /// Returns true if the latest image of the camera is kept.
-    #[must_use]
     pub fn keeps_image(&self, name: &str) -> bool {
         self.with_image.read().contains(name)
     }

@@ -95,7 +95,6 @@ impl Headline {
 
 /// Returns the median of each report and those before it in the window, in the order of the
 /// reports.
-#[must_use]
 pub fn medians(reports: &[Arc<StoredReport>], taught: Option<&TaughtNumber>) -> Vec<NumberWithBar> {
     let numbers: Vec<_> = reports
         .iter()
@@ -151,7 +150,6 @@ impl FollowedPersons {
     }
 
     /// Returns the number of a camera; `None` while it is unknown.
-    #[must_use]
     pub fn at(&self, camera: &str) -> Option<usize> {
         let source = self.0.read().clone()?;
         usize::try_from(source(camera)?).ok()

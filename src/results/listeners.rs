@@ -70,7 +70,6 @@ struct Group {
 
 impl Listeners {
     /// Creates a group of at most `most` listeners, of which half may be of one client.
-    #[must_use]
     pub fn new(most: NonZeroUsize, metrics: Arc<Metrics>) -> Self {
         Self {
             budget: SharedBudget::new(most.get()),
@@ -124,7 +123,6 @@ impl Listeners {
     }
 
     /// Returns a receiver that changes when a camera is removed from the store by this process.
-    #[must_use]
     pub fn removals(&self) -> watch::Receiver<u64> {
         self.removals.subscribe()
     }

@@ -27,7 +27,6 @@ pub struct MemoryResults {
 
 impl MemoryResults {
     /// Creates an empty store.
-    #[must_use]
     pub fn new(limits: ResultLimits, metrics: Arc<Metrics>) -> Self {
         metrics.results_store_up.set(1);
         Self {
@@ -38,7 +37,6 @@ impl MemoryResults {
     }
 
     /// Never removes these cameras for others.
-    #[must_use]
     pub fn with_own(mut self, own: OwnCameras) -> Self {
         self.kept.get_mut().own = own;
         self

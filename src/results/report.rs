@@ -15,25 +15,21 @@ pub struct ReportId(u64);
 
 impl ReportId {
     /// Returns the ID that follows `last` at the time `now`.
-    #[must_use]
     pub fn next(last: Self, now: Timestamp) -> Self {
         Self::at(now).max(Self(last.0.saturating_add(1)))
     }
 
     /// Returns the ID of a report that was stored at this time. Times before 1970 count as 1970.
-    #[must_use]
     pub fn at(time: Timestamp) -> Self {
         Self(u64::try_from(time.as_microsecond()).unwrap_or(0))
     }
 
     /// Returns the ID of this number.
-    #[must_use]
     pub(super) fn from_micros(micros: u64) -> Self {
         Self(micros)
     }
 
     /// The time at which the report was stored, to the microsecond.
-    #[must_use]
     pub fn time(self) -> Timestamp {
         let micros = i64::try_from(self.0).unwrap_or(i64::MAX);
         Timestamp::from_microsecond(micros).unwrap_or(Timestamp::MAX)
@@ -72,7 +68,6 @@ pub struct NewReport {
 
 impl NewReport {
     /// The approximate memory that it takes when it is stored, bytes.
-    #[must_use]
     pub fn bytes(&self) -> usize {
         let scores = self
             .scores

@@ -172,7 +172,6 @@ pub enum ImagesOf {
 
 impl ImagesOf {
     /// Returns true if the image of this camera may be kept.
-    #[must_use]
     pub fn include(&self, camera: &str) -> bool {
         match self {
             Self::All => true,

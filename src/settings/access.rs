@@ -43,7 +43,6 @@ settings! {
 
 impl AccessSettings {
     /// Returns `true` if requests need an API key.
-    #[must_use]
     pub fn needs_keys(&self) -> bool {
         !self.keys.is_empty() || self.keys_file.is_some()
     }

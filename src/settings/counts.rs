@@ -57,7 +57,6 @@ settings! {
 
 impl CountSettings {
     /// The settings of the counts, not checked yet.
-    #[must_use]
     pub fn entry(&self) -> CountEntry {
         CountEntry {
             listen: Some(self.listen),

@@ -3,7 +3,6 @@
 use lookdown_detect::inference::InferenceError;
 
 /// Returns the text of an error of the engine, with the setting that it depends on and the remedy.
-#[must_use]
 pub fn explain(error: &InferenceError) -> String {
     match error {
         InferenceError::Runtime { .. } => {

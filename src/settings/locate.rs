@@ -82,7 +82,6 @@ pub fn find_calibrations(folder: &Path) -> Result<Option<PathBuf>, SettingsError
 }
 
 /// Returns the existing file or folder of the installation at a relative path.
-#[must_use]
 pub fn find_installed(path: &Path) -> Option<PathBuf> {
     let mut candidates = installation_folders()
         .into_iter()
@@ -91,7 +90,6 @@ pub fn find_installed(path: &Path) -> Option<PathBuf> {
 }
 
 /// Returns true if a file is one of the installation, of [`PackagedFiles`] included.
-#[must_use]
 pub fn is_installed(path: &Path) -> bool {
     let Ok(path) = path.canonicalize() else {
         return false;

@@ -28,7 +28,6 @@ pub fn start_logs(settings: &LogSettings) -> Result<(), TryInitError> {
 
 /// Returns the subscriber that writes log lines according to the settings. Lines of a request carry
 /// its fields: in text before the message, in JSON in the object `span`.
-#[must_use]
 pub fn log_subscriber(
     settings: &LogSettings,
     writer: impl for<'writer> MakeWriter<'writer> + Send + Sync + 'static,

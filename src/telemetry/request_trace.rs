@@ -51,7 +51,6 @@ impl RequestTrace {
     }
 
     /// The ID of the trace, 32 hexadecimal digits. `None` if the request belongs to no trace.
-    #[must_use]
     pub fn id(&self) -> Option<impl fmt::Display + use<>> {
         self.id
     }

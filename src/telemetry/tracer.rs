@@ -76,7 +76,6 @@ impl Tracer {
 
     /// Starts the trace of a request. Its span ends with [`RequestTrace::end`], or with its last
     /// clone.
-    #[must_use]
     pub fn request(&self, name: impl FnOnce() -> String, incoming: &IncomingTrace) -> RequestTrace {
         let parent = incoming.context();
         let Some(Exporting { tracer, .. }) = &self.0 else {

@@ -100,7 +100,6 @@ pub struct Rendering {
 
 impl Rendering {
     /// Writes a view in the default quality, without drawings.
-    #[must_use]
     pub fn new(view: View) -> Self {
         Self {
             view,
@@ -162,7 +161,6 @@ impl LiveCamera {
     }
 
     /// Returns a receiver of the newest frame.
-    #[must_use]
     pub fn frames(&self) -> watch::Receiver<Option<Arc<LiveFrame>>> {
         self.newest.subscribe()
     }
@@ -318,13 +316,11 @@ impl LiveCamera {
 
 impl LiveFrame {
     /// The time since the frame came.
-    #[must_use]
     pub fn age(&self) -> Duration {
         self.shown.elapsed()
     }
 
     /// The entity tag of a view of this frame.
-    #[must_use]
     pub fn tag(&self, rendering: &Rendering) -> String {
         let mut hasher = DefaultHasher::new();
         format!("{rendering:?}").hash(&mut hasher);

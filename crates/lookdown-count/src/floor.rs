@@ -149,10 +149,7 @@ impl PersonDown {
         }
         if is_down {
             self.up_since_ms = None;
-            let (posture, _) = track.posture();
-            if posture == Posture::Lying || self.posture != Posture::Lying {
-                self.posture = posture;
-            }
+            self.posture = track.posture().0;
             self.center_px = track.center_px();
             self.length_px = track.length_px();
             self.zone = zone_of(track, definition, false);

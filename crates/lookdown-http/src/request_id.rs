@@ -35,7 +35,6 @@ impl RequestId {
 }
 
 /// Returns a new ID that begins with the time, which is 1970 where the clock is before it.
-#[must_use]
 pub fn new_id() -> Uuid {
     id_at(SystemTime::now())
 }

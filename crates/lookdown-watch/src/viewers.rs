@@ -38,7 +38,6 @@ impl Viewers {
     }
 
     /// Adds a viewer of a camera.
-    #[must_use]
     pub fn add(self: &Arc<Self>, camera: &str) -> Viewing {
         self.counts.send_modify(|counts| {
             *counts.entry(camera.to_owned()).or_default() += 1;

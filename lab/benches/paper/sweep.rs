@@ -20,7 +20,6 @@ const SIGMAS: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
 
 /// The parameters of all cells: `base` with hard NMS and with linear Soft-NMS at every `N_t`, then
 /// with Gaussian Soft-NMS at every `C_t` and σ.
-#[must_use]
 pub fn cells(base: &DetectParameters) -> Vec<DetectParameters> {
     let cell = |refinement: RefinementParameters| DetectParameters {
         refinement,
@@ -51,7 +50,6 @@ pub fn cells(base: &DetectParameters) -> Vec<DetectParameters> {
 }
 
 /// Returns the figures of all cells as comma-separated values with a header.
-#[must_use]
 pub fn table(cells: &[(DetectedRow, EvaluatedRow)]) -> String {
     let mut lines = String::from(
         "refine,score_threshold,iou_threshold,sigma,boxes,ap50,ap75,ap50_95,f1,recall\n",
@@ -81,7 +79,6 @@ pub fn table(cells: &[(DetectedRow, EvaluatedRow)]) -> String {
 }
 
 /// Plots AP over `N_t`, at `O_t` = 0.5, and dashed at 0.75.
-#[must_use]
 pub fn iou_threshold_plot(title: String, cells: &[(DetectedRow, EvaluatedRow)]) -> LinePlot {
     let line = |refinement: Refinement, name: &str| {
         let along = |ap: fn(&EvaluatedRow) -> f64| {

@@ -20,7 +20,6 @@ use crate::rounding::{
 };
 
 /// Converts a report of the pipeline.
-#[must_use]
 pub fn to_report(report: &DetectionReport) -> Report {
     let refinement = &report.refinement;
     Report {

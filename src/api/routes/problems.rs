@@ -87,7 +87,6 @@ pub(in crate::api) async fn get_problem(
 }
 
 /// Returns the table of all problem types with their remedies as Markdown.
-#[must_use]
 pub fn problem_table() -> String {
     let mut table = "| type | status | remedy |\n|---|---|---|\n".to_owned();
     for kind in ProblemKind::ALL {

@@ -93,7 +93,6 @@ pub fn defaults(detect: &BTreeMap<String, NativeValue>) -> Result<DetectDefaults
 
 impl CalibrationEntry {
     /// The content of its native file.
-    #[must_use]
     pub fn native_file(&self) -> String {
         // The native format has a place for everything.
         let exported = Target::Native.write(&self.native);

@@ -26,7 +26,6 @@ pub struct FolderStore {
 
 impl FolderStore {
     /// The folder at `path`, which must be there when it is listed.
-    #[must_use]
     pub fn new(path: &Path) -> Self {
         Self {
             path: path.to_owned(),
@@ -35,7 +34,6 @@ impl FolderStore {
     }
 
     /// The folder at `path`; while there is none, it counts as empty.
-    #[must_use]
     pub fn that_may_be_missing(path: &Path) -> Self {
         Self {
             may_be_missing: true,

@@ -37,7 +37,6 @@ impl ZoneOutline {
     }
 
     /// A counting line given in frame pixels, or on the floor and projected through `lens`.
-    #[must_use]
     pub fn for_line(line: &CountingLine, lens: &Lens, mount: &Mount) -> Self {
         Self::in_pieces(&line.name, &line.outline(lens, mount, POINTS_PER_EDGE))
     }

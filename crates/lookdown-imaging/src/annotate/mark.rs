@@ -46,7 +46,6 @@ pub struct Head {
 
 impl Mark {
     /// A mark of an axis-aligned box alone. An empty `label` draws no plate.
-    #[must_use]
     pub fn new(bbox: [f64; 4], label: &str) -> Self {
         Self {
             bbox,

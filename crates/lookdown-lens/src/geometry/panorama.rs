@@ -46,7 +46,6 @@ impl Panorama {
     }
 
     /// The width of a whole turn, pixels.
-    #[must_use]
     pub fn turn(&self) -> f64 {
         TAU / self.radians_per_pixel
     }

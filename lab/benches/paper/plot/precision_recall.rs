@@ -7,7 +7,6 @@ use super::{Line, LinePlot};
 /// Plots precision over recall of named rows at `O_t` = 0.5, and dashed at 0.75. The precision at a
 /// recall is the maximum at that recall or a higher one: the area under a line is its average
 /// precision.
-#[must_use]
 pub fn precision_recall_plot<'a>(
     title: String,
     rows: impl IntoIterator<Item = (String, &'a EvaluatedRow)>,
