@@ -1,8 +1,5 @@
-//! The files of the state folder, which only this user can read.
-//!
-//! The reasons why a camera cannot be stored, removed or read.
-//!
-//! A stored camera, and the file of all.
+//! The files of the state folder, which only this user can read: the stored cameras, their
+//! passwords, and the reasons why one cannot be stored, removed or read.
 
 use std::{
     collections::BTreeMap,

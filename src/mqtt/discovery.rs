@@ -1,7 +1,6 @@
 //! Announces a camera's entities to Home Assistant (its documentation: MQTT, section "MQTT
-//! discovery"): occupancy and the number of persons, of the camera and of each zone, and its views.
-//!
-//! The announcement of an entity to Home Assistant: the fields that all entities have in common.
+//! discovery"): occupancy and the number of persons, of the camera and of each zone, its views, and
+//! the fields that all entities have in common.
 
 use std::time::Duration;
 

@@ -2,8 +2,8 @@
 //! parameters, the size of the frames, and two lines about the rectification
 //! (<https://github.com/JakobEngel/dso#geometric-calibration-file>).
 //!
-//! Where `cx` and `cy` are below 1, `fx fy cx cy` are shares of the width and the height, and the
-//! first pixel begins at 0. Old files have no name of a model: 5 parameters are `FOV`, 8 `RadTan`.
+//! `fx fy cx cy` are shares of the width and the height if `cx` and `cy` are below 1, and the first
+//! pixel then begins at 0. Old files have no name of a model: 5 parameters are `FOV`, 8 `RadTan`.
 
 use super::{
     Camera, FormatError,
