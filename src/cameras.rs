@@ -15,7 +15,7 @@ use lookdown_common::{ConfigError, OwnCameras, Secret};
 use lookdown_watch::{
     Camera, CameraEntry, CameraState, Frame, Location, MAX_CAMERAS, Metrics, Viewers, first_frame,
 };
-use parking_lot::{Mutex, RwLock};
+use parking_lot::RwLock;
 use secrecy::ExposeSecret;
 use state_folder::{CameraFile, FILE, TEST, check_name, entry};
 use tokio::sync::Semaphore;
@@ -39,8 +39,6 @@ const WITH_IMAGE: &str = "images.json";
 /// The cameras of this process.
 pub struct Cameras {
     folder: StateFolder,
-    /// Locked while the file is changed.
-    changing: Mutex<()>,
     /// The cameras of the settings file and the command line.
     configured: RwLock<BTreeMap<String, Camera>>,
     /// The values of keys that a stored camera does not have.
@@ -61,7 +59,6 @@ impl Cameras {
     pub fn new(folder: PathBuf, own: OwnCameras, metrics: Arc<Metrics>) -> Self {
         Self {
             folder: StateFolder::new(folder),
-            changing: Mutex::default(),
             configured: RwLock::default(),
             defaults: RwLock::default(),
             problems: RwLock::default(),
@@ -190,7 +187,6 @@ impl Cameras {
         mut camera: StoredCamera,
         password: Option<&Secret>,
     ) -> Result<bool, CameraError> {
-        let _changing = self.changing.lock();
         let _locked = self.folder.lock()?;
         let mut file = self.file()?;
         let before = file.cameras.get(name);
@@ -241,7 +237,6 @@ impl Cameras {
     /// # Errors
     /// [`CameraError`].
     pub fn delete(&self, name: &str) -> Result<bool, CameraError> {
-        let _changing = self.changing.lock();
         let _locked = self.folder.lock()?;
         let mut file = self.file()?;
         if file.cameras.remove(name).is_none() && file.invalid.remove(name).is_none() {

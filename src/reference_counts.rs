@@ -142,7 +142,7 @@ impl ReferenceCounts {
         now: Timestamp,
     ) -> Result<bool, ReferenceError> {
         let _changing = self.changing.lock();
-        let mut counts = self.counts(camera, now);
+        let (_locked, mut counts) = self.stored(camera, now)?;
         if counts.is_empty() && self.cameras.read().len() >= MAX_CAMERAS {
             return Err(ReferenceError::Full);
         }
@@ -170,7 +170,7 @@ impl ReferenceCounts {
         now: Timestamp,
     ) -> Result<bool, ReferenceError> {
         let _changing = self.changing.lock();
-        let mut counts = self.counts(camera, now);
+        let (_locked, mut counts) = self.stored(camera, now)?;
         let before = counts.len();
         counts.retain(|count| count.report != report);
         if counts.len() == before {
@@ -186,10 +186,28 @@ impl ReferenceCounts {
     /// [`ReferenceError`].
     pub fn forget(&self, camera: &str, now: Timestamp) -> Result<(), ReferenceError> {
         let _changing = self.changing.lock();
-        if self.cameras.read().contains_key(camera) {
+        let (_locked, counts) = self.stored(camera, now)?;
+        if !counts.is_empty() {
             self.store(camera, Vec::new(), now)?;
         }
         Ok(())
+    }
+
+    /// Locks the files against other processes, and returns the reference counts of a camera that
+    /// still count.
+    fn stored(
+        &self,
+        camera: &str,
+        now: Timestamp,
+    ) -> Result<(Option<fs::File>, Vec<ReferenceCount>), ReferenceError> {
+        let Some(folder) = &self.folder else {
+            return Ok((None, self.counts(camera, now)));
+        };
+        let locked = folder.lock()?;
+        let content = read(&folder.file(&file_of(camera)));
+        let mut counts = content.map_or_else(|_| Vec::new(), |content| content.counts);
+        counts.retain(|count| !is_old(count, now));
+        Ok((Some(locked), counts))
     }
 
     /// Writes the reference counts of a camera, and learns from them.
@@ -200,7 +218,7 @@ impl ReferenceCounts {
         now: Timestamp,
     ) -> Result<(), ReferenceError> {
         if let Some(folder) = &self.folder {
-            let path = folder.file(&format!("{FOLDER}/{}.json", revision_of(camera.as_bytes())));
+            let path = folder.file(&file_of(camera));
             if counts.is_empty() {
                 StateFolder::remove(&path)?;
             } else {
@@ -271,6 +289,11 @@ pub fn good_moment(
     (number.high - number.low > persons.max(4)).then_some("unsure")
 }
 
+/// Returns the file of a camera in the state folder.
+fn file_of(camera: &str) -> String {
+    format!("{FOLDER}/{}.json", revision_of(camera.as_bytes()))
+}
+
 fn is_old(count: &ReferenceCount, now: Timestamp) -> bool {
     now.duration_since(count.at) > SignedDuration::from_hours(24 * MAX_AGE_DAYS)
 }
@@ -329,6 +352,17 @@ mod tests {
                 .counts("hall", now())
                 .is_empty()
         );
+    }
+
+    #[test]
+    fn reference_counts_of_two_processes_are_all_stored() {
+        let folder = tempfile::tempdir().unwrap();
+        let [one, other] = [(); 2].map(|()| ReferenceCounts::open(folder.path(), now()));
+        for (counts, report) in [(&one, 1), (&other, 2), (&one, 3)] {
+            assert!(counts.put("hall", count(report, 1), now()).unwrap());
+        }
+        assert_eq!(one.counts("hall", now()).len(), 3);
+        assert!(other.delete("hall", "3", now()).unwrap());
     }
 
     #[test]

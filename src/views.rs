@@ -17,7 +17,7 @@ use lookdown_common::{ConfigError, StoredFile, plain_name};
 use lookdown_detect::pipeline::{DetectedFrame, JobImage};
 use lookdown_imaging::{annotate::Concealment, decode::DecodeLimits};
 use lookdown_watch::{Viewers, Viewing};
-use parking_lot::{Mutex, RwLock};
+use parking_lot::RwLock;
 use serde::{Deserialize, Serialize};
 use tokio::sync::Semaphore;
 
@@ -41,8 +41,6 @@ pub type StoredViews = BTreeMap<String, View>;
 /// The views of all cameras.
 pub struct Views {
     folder: StateFolder,
-    /// Locked while the file is changed.
-    changing: Mutex<()>,
     cameras: RwLock<BTreeMap<String, CameraViews>>,
     /// The permits of rendering.
     workers: Arc<Semaphore>,
@@ -73,7 +71,6 @@ impl Views {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
         Self {
             folder: StateFolder::new(folder),
-            changing: Mutex::default(),
             cameras: RwLock::default(),
             // The other half of the processors is left to detection.
             workers: Arc::new(Semaphore::new(threads.div_ceil(2))),
@@ -88,11 +85,7 @@ impl Views {
     /// # Errors
     /// [`ConfigError`] if the file is none of this program.
     pub fn load(&self) -> Result<(), ConfigError> {
-        let file: ViewFile = self.folder.read(FILE)?;
-        if let Some(version) = file.version {
-            let checked = StoredFile::Views.check(&version.to_string());
-            checked.map_err(|problem| self.folder.refused(FILE, &problem))?;
-        }
+        let file = self.file()?;
         let mut cameras = self.cameras.write();
         for (camera, views) in file.cameras.into_iter().take(MAX_CAMERAS) {
             let views = views.into_iter().filter(|(_, view)| view.check().is_ok());
@@ -248,28 +241,30 @@ impl Views {
         Ok(entry.or_insert_with(|| self.without_views()))
     }
 
+    /// Reads the file, which may be missing.
+    fn file(&self) -> Result<ViewFile, ConfigError> {
+        let file: ViewFile = self.folder.read(FILE)?;
+        if let Some(version) = file.version {
+            let checked = StoredFile::Views.check(&version.to_string());
+            checked.map_err(|problem| self.folder.refused(FILE, &problem))?;
+        }
+        Ok(file)
+    }
+
     /// Changes the views of a camera in the file, then in memory.
     fn change(
         &self,
         camera: &str,
         change: impl FnOnce(&mut StoredViews) -> Result<(), CameraError>,
     ) -> Result<(), CameraError> {
-        let _changing = self.changing.lock();
-        let mut views = self.list(camera);
-        change(&mut views)?;
-        let mut cameras = self.cameras.write();
-        self.entry(&mut cameras, camera)?;
-        let stored = cameras
-            .iter()
-            .map(|(name, known)| (name.clone(), known.views.clone()));
-        let mut stored: BTreeMap<_, _> = stored.collect();
-        drop(cameras);
-        stored.insert(camera.to_owned(), views.clone());
-        stored.retain(|_, views| !views.is_empty());
-        let file = ViewFile {
-            version: Some(StoredFile::Views.version()),
-            cameras: stored,
-        };
+        let _locked = self.folder.lock()?;
+        let mut file = self.file()?;
+        let views = file.cameras.entry(camera.to_owned()).or_default();
+        change(views)?;
+        let views = views.clone();
+        self.entry(&mut self.cameras.write(), camera)?;
+        file.version = Some(StoredFile::Views.version());
+        file.cameras.retain(|_, views| !views.is_empty());
         let content = serde_json::to_string_pretty(&file).unwrap_or_default();
         self.folder.write(&self.folder.file(FILE), &content)?;
         let mut cameras = self.cameras.write();

@@ -66,7 +66,6 @@ impl Cameras {
         paused: Option<bool>,
         keep_image: Option<bool>,
     ) -> Result<bool, CameraError> {
-        let _changing = self.changing.lock();
         let _locked = self.folder.lock()?;
         let configured: BTreeSet<_> = self.configured.read().keys().cloned().collect();
         if configured.contains(name) {

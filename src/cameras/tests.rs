@@ -3,6 +3,7 @@ use std::{fs, os::unix::fs::PermissionsExt, path::Path};
 use lookdown_common::{Reload, ServerEntry};
 use lookdown_watch::{Origin, WatchOptions, watch};
 use serde_json::Value;
+use tokio::time::timeout;
 
 use super::*;
 
@@ -13,8 +14,8 @@ pub(crate) fn cameras(folder: &Path) -> Cameras {
 }
 
 /// Changes of the cameras wait until this is dropped, as for a folder that hangs.
-pub(crate) fn hold(cameras: &Cameras) -> impl Drop + '_ {
-    cameras.changing.lock()
+pub(crate) fn hold(cameras: &Cameras) -> impl Sized {
+    cameras.folder.lock().unwrap()
 }
 
 /// A camera of the settings.
@@ -347,9 +348,12 @@ async fn a_few_cameras_are_tested_at_a_time() {
         let (cameras, camera) = (Arc::clone(&cameras), camera(&url));
         tests.spawn(async move { cameras.test(&camera, None).await });
     }
-    while cameras.tests.available_permits() > 0 {
-        tokio::task::yield_now().await;
-    }
+    let all_taken = async {
+        while cameras.tests.available_permits() > 0 {
+            tokio::task::yield_now().await;
+        }
+    };
+    timeout(TEST_TIMEOUT, all_taken).await.unwrap();
     let refused = cameras.test(&camera(&url), None).await;
     assert!(matches!(refused, Err(CameraError::Busy)));
     tests.shutdown().await;

@@ -39,6 +39,14 @@ impl Service {
         let request = with_host(request.body(Body::empty()).unwrap());
         self.router.clone().oneshot(request).await.unwrap()
     }
+
+    /// The views that another process reads.
+    fn stored(&self) -> Views {
+        let state = self.folder.path().join("state");
+        let views = Views::new(state, DecodeLimits::default(), None);
+        views.load().unwrap();
+        views
+    }
 }
 
 fn image_of(answer: &Answer) -> Frame {
@@ -64,13 +72,7 @@ async fn a_view_is_stored_listed_and_deleted() {
     let wanted = json!({ "kind": "fixed", "azimuth_deg": 0.0, "tilt_deg": 40.0, "width": 320, "height": 240 });
     assert_eq!(service.get(VIEW).await.json(), wanted);
     // After a restart.
-    let stored = Views::new(
-        service.folder.path().join("state"),
-        DecodeLimits::default(),
-        None,
-    );
-    stored.load().unwrap();
-    assert_eq!(stored.list("hall").len(), 1);
+    assert_eq!(service.stored().list("hall").len(), 1);
     let mut named = wanted;
     named["name"] = json!("door");
     let listed = service.get("/cameras/hall/views").await;
@@ -82,6 +84,20 @@ async fn a_view_is_stored_listed_and_deleted() {
         let detail = answer.problem()["detail"].to_string();
         assert!(detail.contains("it has none"), "{detail}");
     }
+}
+
+#[tokio::test]
+async fn views_of_two_processes_are_all_stored() {
+    let service = Service::start();
+    let other = service.stored();
+    assert_eq!(service.put(VIEW, SMALL).await.status, 201);
+    let view = serde_json::from_str(SMALL).unwrap();
+    assert!(other.put("porch", "door", view).unwrap());
+    let second = "/cameras/hall/views/desk";
+    assert_eq!(service.put(second, SMALL).await.status, 201);
+    let stored = service.stored();
+    let numbers = ["hall", "porch"].map(|camera| stored.list(camera).len());
+    assert_eq!(numbers, [2, 1]);
 }
 
 #[tokio::test]
