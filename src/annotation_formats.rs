@@ -53,7 +53,7 @@ annotation_formats! {
     /// YOLO as Ultralytics reads it, also with oriented boxes (OBB): labels/, data.yaml,
     /// classes.txt.
     Yolo = yolo,
-    /// Pascal VOC: Annotations/.
+    /// Pascal VOC: Annotations/, ImageSets/.
     Voc = voc,
     /// GeoJSON with the oriented boxes as polygons in pixels: features/.
     GeoJson = geojson,
@@ -95,7 +95,7 @@ impl AnnotationFormat {
                 let own = images
                     .iter()
                     .map(|image| file(&path(&image.file_name), document(image, boxes)));
-                others().into_iter().chain(own).collect()
+                others(images).into_iter().chain(own).collect()
             }
         }
     }

@@ -160,7 +160,7 @@ pub(super) enum Layout {
         /// Returns the path of the file of the image with this name.
         path: fn(&str) -> String,
         document: fn(&AnnotatedImage, BoxKind) -> String,
-        others: fn() -> Vec<AnnotationFile>,
+        others: fn(&[AnnotatedImage]) -> Vec<AnnotationFile>,
     },
 }
 

@@ -18,7 +18,7 @@ pub(super) const FORMAT: FormatSpec = FormatSpec {
     layout: Layout::FilePerImage {
         path: |image_file_name| format!("features/{}.geojson", stem(image_file_name)),
         document: |image, _| document(image),
-        others: Vec::new,
+        others: |_| Vec::new(),
     },
 };
 

@@ -141,6 +141,8 @@ fn voc_has_corners_in_a_file_per_image() {
                    <ymax>10.00</ymax>";
     assert!(text.contains(corners), "{text}");
     assert_eq!(text.matches("<object>").count(), 2);
+    let list = content(AnnotationFormat::Voc, "ImageSets/Main/default.txt");
+    assert_eq!(list, "hall/a & b\nc\n");
 }
 
 #[test]

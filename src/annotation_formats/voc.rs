@@ -1,10 +1,11 @@
-//! Pascal VOC: an XML file per image, in `Annotations/`. Boxes are corner-origin pixels with two
-//! decimals, as current annotation tools write and read them.
+//! Pascal VOC: an XML file per image, in `Annotations/`, and their list. Boxes are corner-origin
+//! pixels with two decimals, as current annotation tools write and read them.
 
 use std::fmt::Write;
 
 use super::content::{
-    AnnotatedImage, DECLARATION, FormatSpec, LABEL, Layout, SupportedBoxes, escaped, stem,
+    AnnotatedImage, AnnotationFile, DECLARATION, FormatSpec, LABEL, Layout, SupportedBoxes,
+    escaped, file, stem,
 };
 
 /// The format.
@@ -14,9 +15,16 @@ pub(super) const FORMAT: FormatSpec = FormatSpec {
     layout: Layout::FilePerImage {
         path: |image_file_name| format!("Annotations/{}.xml", stem(image_file_name)),
         document: |image, _| document(image),
-        others: Vec::new,
+        others,
     },
 };
+
+/// The list of the images, as datumaro needs it.
+fn others(images: &[AnnotatedImage]) -> Vec<AnnotationFile> {
+    let names = images.iter().map(|image| stem(&image.file_name));
+    let names: String = names.map(|name| format!("{name}\n")).collect();
+    vec![file("ImageSets/Main/default.txt", names)]
+}
 
 fn document(image: &AnnotatedImage) -> String {
     let path = image.file_name.rsplit_once('/');

@@ -25,7 +25,7 @@ fn path(image_file_name: &str) -> String {
     format!("labels/{}.txt", stem(image_file_name))
 }
 
-fn others() -> Vec<AnnotationFile> {
+fn others(_: &[AnnotatedImage]) -> Vec<AnnotationFile> {
     let data = format!("path: .\ntrain: images\nval: images\nnames:\n  0: {LABEL}\n");
     let classes = format!("{LABEL}\n");
     vec![file("data.yaml", data), file("classes.txt", classes)]

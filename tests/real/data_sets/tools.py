@@ -22,11 +22,7 @@ def layouts(folder: Path) -> Path:
     shutil.copy(folder / "coco/annotations.json", made / "coco/annotations/instances_default.json")
     shutil.copytree(folder / "images", made / "cvat/images")
     shutil.copy(folder / "cvat/annotations.xml", made / "cvat/default.xml")
-    shutil.copytree(folder / "images", made / "voc/JPEGImages")
-    shutil.copytree(folder / "voc/Annotations", made / "voc/Annotations")
-    (made / "voc/ImageSets/Main").mkdir(parents=True)
-    names = "\n".join(sorted(image.stem for image in (folder / "images").iterdir()))
-    (made / "voc/ImageSets/Main/default.txt").write_text(names + "\n", encoding="utf-8")
+    shutil.copytree(folder / "voc", made / "voc")
     shutil.copytree(folder / "images", made / "yolo/images/train")
     shutil.copytree(folder / "yolo/labels", made / "yolo/labels/train")
     data = "path: .\ntrain: images/train\nnames: [person]\n"
