@@ -237,7 +237,7 @@ fn any_file_name_is_read_back_from_the_xml() {
     let nasty = "<a> \"b\" 'c' &amp; \t\n\r\u{1}\u{ffff}.jpg";
     let expected = "<a> \"b\" 'c' &amp; \u{fffd}\u{fffd}\u{fffd}\u{fffd}\u{fffd}.jpg";
     for format in [AnnotationFormat::Cvat, AnnotationFormat::Voc] {
-        let text = &format.files(&[image(nasty)], BoxKind::AxisParallel)[0].content;
+        let text = &format.document(&image(nasty), BoxKind::AxisParallel);
         let read: NamedImage = quick_xml::de::from_str(text).unwrap();
         let name = read.filename.or(read.image.map(|image| image.name));
         assert_eq!(name.as_deref(), Some(expected), "{text}");
