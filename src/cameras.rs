@@ -112,6 +112,8 @@ impl Cameras {
         defaults: &CameraEntry,
     ) -> Result<(), ConfigError> {
         self.defaults.write().clone_from(defaults);
+        // No URL is read with a password that another request has just changed.
+        let _locked = self.folder.lock_to_read();
         let named = cameras
             .iter()
             .map(|camera| (camera.name.clone(), camera.clone()));
@@ -246,7 +248,10 @@ impl Cameras {
             return Ok(false);
         }
         self.store(&file)?;
-        StateFolder::remove(&self.folder.password(name))?;
+        // The others are those of a change that did not end.
+        for ending in ["", "new~", "new~.part", "old~"] {
+            StateFolder::remove(&self.folder.password(&format!("{name}{ending}")))?;
+        }
         Ok(true)
     }
 
@@ -281,6 +286,7 @@ impl Cameras {
         if configured.is_some() {
             return Ok(configured);
         }
+        let _locked = self.folder.lock_to_read();
         let stored = self.stored()?;
         let loaded = stored.get(name).map(|camera| self.loaded(name, camera));
         loaded.transpose()

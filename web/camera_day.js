@@ -48,9 +48,15 @@ export function crossingsOf(steps) {
   return lines;
 }
 
+/** The hour of a time by the clock. A day on which the clock changes has 23 or 25 hours, two of them with one number. */
+function hourOf(time, midnight) {
+  const isOwnZone = new Date(midnight).getHours() === 0;
+  return isOwnZone ? new Date(time).getHours() : Math.min(23, (time - midnight) / HOUR);
+}
+
 /** Bars over 24 hours: the most persons at once in each hour. An hour without reports has none. */
 function bars(midnight, steps, most) {
-  const x = (time) => ((time - midnight) / (24 * HOUR)) * WIDTH;
+  const x = (time) => (hourOf(time, midnight) / 24) * WIDTH;
   const height = (count) => (count / Math.max(1, most)) * (HEIGHT - TOP - BOTTOM);
   const base = HEIGHT - BOTTOM;
   const known = steps.filter(({ persons }) => persons);

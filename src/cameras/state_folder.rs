@@ -9,7 +9,9 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use lookdown_common::{ConfigError, Replacement, Secret, StoredFile, plain_name, read_file};
+use lookdown_common::{
+    ConfigError, Replacement, Secret, StoredFile, files::MAX_SETTINGS_BYTES, plain_name, read_file,
+};
 use lookdown_watch::{CameraEntry, Location, SourceError};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::{Map, Value};
@@ -86,8 +88,20 @@ impl StateFolder {
         Ok(file)
     }
 
+    /// Locks the folder as for a change while it is read, unless it is missing or cannot be written.
+    pub(super) fn lock_to_read(&self) -> Option<fs::File> {
+        self.0.exists().then(|| self.lock().ok()).flatten()
+    }
+
     /// Writes a file that only this user can read, in one step.
     pub(crate) fn write(&self, path: &Path, content: &str) -> Result<(), CameraError> {
+        if content.len() as u64 >= MAX_SETTINGS_BYTES {
+            let problem = format!(
+                "{} would be too large to be read again: delete entries, or shorten them",
+                path.display()
+            );
+            return Err(ConfigError::problem("state.path", &problem).into());
+        }
         let unwritable = |error| CameraError::Folder(path.to_owned(), error);
         create(path.parent().unwrap_or(&self.0)).map_err(unwritable)?;
         Replacement::for_secret(path).fill(unwritable, |file| {

@@ -246,6 +246,39 @@ fn changes_of_two_processes_are_all_stored() {
 }
 
 #[test]
+fn a_camera_is_read_with_its_own_password_while_it_changes() {
+    let folder = tempfile::tempdir().unwrap();
+    let writer = cameras(folder.path());
+    let hosts = ["10.0.0.8", "10.0.0.9"];
+    let put = |host: &str| {
+        let camera = camera(&format!("rtsp://{host}/s2"));
+        writer.put("hall", camera, Some(&host.into())).unwrap();
+    };
+    put(hosts[0]);
+    std::thread::scope(|scope| {
+        scope.spawn(|| (0..100).for_each(|number| put(hosts[number % 2])));
+        let reader = cameras(folder.path());
+        for _ in 0..300 {
+            let camera = reader.get("hall").unwrap().unwrap();
+            let host = camera.location.to_string();
+            let password = camera.credentials.unwrap().password;
+            assert!(host.contains(password.expose_secret()), "{host}");
+        }
+    });
+}
+
+#[test]
+fn a_file_that_could_not_be_read_again_is_not_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let cameras = cameras(folder.path());
+    let url = format!("rtsp://10.0.0.8/{}", "x".repeat(15_000));
+    let put = |number: u32| cameras.put(&number.to_string(), camera(&url), None);
+    let refused = (0..80).find_map(|number| put(number).err()).unwrap();
+    assert!(refused.to_string().contains("too large"), "{refused}");
+    assert!(cameras.stored().unwrap().len() > 60);
+}
+
+#[test]
 fn a_damaged_file_is_named_with_its_line() {
     let folder = tempfile::tempdir().unwrap();
     let cameras = cameras(folder.path());

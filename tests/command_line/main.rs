@@ -206,6 +206,16 @@ fn a_missing_calibration_is_refused_before_loading() {
 }
 
 #[test]
+fn a_recording_in_the_last_year_is_refused() {
+    let walks = "tests/real/walks/walks.mp4";
+    let calibration = "tests/real/walks/calibration.json";
+    let start = ["--start", "9999-12-30T21:59:59Z"];
+    let arguments = ["count", walks, "--calibration", calibration];
+    let output = lookdown(&[&arguments[..], &start].concat(), &[]);
+    assert_fails_with(&output, &[walks, "begins at 9999-12-30", "--start"]);
+}
+
+#[test]
 fn every_image_gives_a_report_or_an_error_line() {
     let office = concat!(env!("CARGO_MANIFEST_DIR"), "/samples/office.jpg");
     let calibration = concat!(

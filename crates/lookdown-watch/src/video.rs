@@ -17,6 +17,8 @@ use crate::{
     stderr_line::LastLine,
 };
 
+/// Longest duration of a recording, a year: a header with a longer one is damaged.
+const MAX_DURATION: Duration = Duration::from_hours(24 * 366);
 /// Longest time to read the duration of a file.
 const DURATION_TIMEOUT: Duration = Duration::from_secs(10);
 
@@ -65,7 +67,8 @@ impl VideoFrames {
 /// Returns the duration of a video file, if `ffprobe` can read it.
 pub async fn video_duration(path: &Path, options: &VideoOptions) -> Option<Duration> {
     let seconds = probed(path, "format=duration", options).await?;
-    Duration::try_from_secs_f64(seconds.parse().ok()?).ok()
+    let duration = Duration::try_from_secs_f64(seconds.parse().ok()?).ok()?;
+    (duration <= MAX_DURATION).then_some(duration)
 }
 
 /// Returns the time at which a video file says that it was created.

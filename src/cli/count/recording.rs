@@ -295,6 +295,9 @@ impl Counting<'_> {
     }
 }
 
+/// Latest start of a recording, the year 9000: later frames might have no time.
+const LATEST_START: Timestamp = Timestamp::constant(221_845_392_000, 0);
+
 /// Returns the recordings with their times. Each begins at the end of the one before, or later if
 /// its file says so.
 fn clips(
@@ -321,9 +324,16 @@ fn clips(
                 None => modified_at(path)? - duration.unwrap_or_default(),
             },
         };
+        let start = after.map_or(own, |after| after.max(own));
+        if start > LATEST_START {
+            bail!(
+                "{}: it begins at {start}: give --start with the true time",
+                path.display()
+            );
+        }
         clips.push(Clip {
             path: path.clone(),
-            start: after.map_or(own, |after| after.max(own)),
+            start,
             duration,
         });
     }
