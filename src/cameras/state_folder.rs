@@ -88,7 +88,7 @@ impl StateFolder {
         Ok(file)
     }
 
-    /// Locks the folder as for a change while it is read, unless it is missing or cannot be written.
+    /// Locks the folder while it is read, unless it is missing or cannot be written.
     pub(super) fn lock_to_read(&self) -> Option<fs::File> {
         self.0.exists().then(|| self.lock().ok()).flatten()
     }
