@@ -1,6 +1,5 @@
 //! The composition root: settings → engine → workers → service.
 
-mod api_options;
 mod models;
 mod pollers;
 mod serving;
@@ -9,20 +8,19 @@ use std::{sync::Arc, time::Duration};
 
 use anyhow::Context;
 use jiff::Timestamp;
+use lookdown_common::{InProcess, OwnCameras, ServerClient, ServerOptions};
+use lookdown_count::{PersonsByCamera, read_persons};
 use lookdown_detect::{
     inference::ModelRepository,
     parameters::DetectParameters,
     pipeline::{BatchOptions, DefaultModels, Engine, EngineOptions, WorkerPool},
 };
 use lookdown_imaging::decode::DecodeLimits;
-
-use lookdown_common::{InProcess, OwnCameras, ServerClient, ServerOptions};
-use lookdown_count::{PersonsByCamera, read_persons};
 use tokio::sync::watch;
 
 use crate::{
     access::AccessKeys,
-    api::{self, Access, ApiState, Companions, Readiness},
+    api::{self, Access, ApiOptions, ApiState, Companions, Readiness, RequestRate},
     calibration_store::{Calibrations, FolderStore},
     cameras::Cameras,
     metrics::Metrics,
@@ -37,12 +35,9 @@ use crate::{
     views::Views,
 };
 
+pub(crate) use models::onnx_options;
 pub use pollers::Reloader;
 pub use serving::Sockets;
-
-pub(crate) use models::onnx_options;
-
-use api_options::api_options;
 
 /// Longest time that the start waits for the calibrations. The rest is read while the server
 /// listens, and the server is ready after that.
@@ -335,4 +330,46 @@ fn companions(settings: &CountSettings) -> anyhow::Result<Companions> {
         companions.forward_counts(client, lookdown_count::openapi_document);
     }
     Ok(companions)
+}
+
+/// Returns the options of the API.
+fn api_options(
+    settings: &Settings,
+    views: Arc<Views>,
+    access: Access,
+    companions: Companions,
+    references: Arc<ReferenceCounts>,
+    tracer: Tracer,
+) -> ApiOptions {
+    ApiOptions {
+        max_body_bytes: settings.server.max_body_bytes,
+        max_upload_bytes: settings.limits.max_upload_bytes,
+        max_header_bytes: settings.connections.max_header_bytes,
+        max_headers: settings.connections.max_headers,
+        detect_defaults: settings.detect.clone(),
+        zone_metrics: settings.calibrations.zone_metrics,
+        camera_metrics: settings.results.camera_metrics,
+        images_of: Arc::new(settings.results.images_of.clone()),
+        image_age: settings.results.limits.max_age,
+        conceal_images: settings.results.conceal_images,
+        lens: settings.calibrations.lens,
+        apply_suggested_calibrations: settings.calibrations.apply_suggested,
+        metrics_elsewhere: settings.server.metrics_listen.is_some(),
+        request_timeout: settings.server.request_timeout,
+        min_upload_bytes_per_second: settings.limits.min_upload_bytes_per_second,
+        request_rate: settings
+            .limits
+            .requests_per_second
+            .map(|per_second| RequestRate {
+                per_second,
+                burst: settings.limits.request_burst,
+            }),
+        views,
+        access,
+        cors_origins: settings.access.cors_origins.clone(),
+        hosts: settings.access.hosts.clone(),
+        companions,
+        references,
+        tracer,
+    }
 }

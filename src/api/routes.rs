@@ -56,7 +56,7 @@ pub(super) fn client_routes() -> OpenApiRouter<ApiState> {
             cameras::reference_counts::delete
         ))
         .routes(routes!(results::list))
-        .routes(routes!(results::delete::delete))
+        .routes(routes!(results::delete))
         .routes(routes!(results::latest::get_latest))
         .routes(routes!(results::latest::get_latest_image))
         .routes(routes!(results::history::get_history))

@@ -6,9 +6,8 @@ use lookdown_lens::geometry::{Posture, PostureBelief};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::Observation;
 use crate::{
-    Plane, TrackId, TrackerSettings, evidence::Evidence, furniture::START_AFTER_S,
+    Observation, Plane, TrackerSettings, evidence::Evidence, furniture::START_AFTER_S,
     measurement::Measurement, motion::Motion,
 };
 
@@ -249,3 +248,7 @@ impl Track {
         self.tail.iter()
     }
 }
+
+/// Identifies a track within its tracker, and a later one of the same person who came back.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct TrackId(pub u64);

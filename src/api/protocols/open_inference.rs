@@ -6,9 +6,7 @@
 
 mod answer;
 pub(in crate::api) mod describe;
-mod document;
 pub(in crate::api) mod infer;
-mod infer_parameters;
 mod own_metadata;
 mod persons;
 mod request;

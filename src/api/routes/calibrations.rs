@@ -1,7 +1,6 @@
 //! The calibration resources: the scope `read` reads them, the scope `admin` changes them.
 
 pub(in crate::api) mod fit;
-mod row;
 mod upload;
 pub(in crate::api) mod views;
 
@@ -14,17 +13,16 @@ use axum::{
     },
     response::{IntoResponse, Response},
 };
+use lookdown_calibration::AreaShare;
+use lookdown_common::report::ReportWarning;
 use lookdown_http::entity_tags::{entity_tag, is_unmodified};
+use serde::Serialize;
+use utoipa::ToSchema;
 
-use self::{
-    row::CalibrationInfo,
-    upload::CalibrationUpload,
-    upload::write_condition,
-    upload::{CalibrationAddress, NewCalibrationAddress},
-};
 use crate::{
     api::{
         ApiState,
+        detect::report::to_warning,
         http::{
             deadline::{CALIBRATIONS, Deadline},
             problem::{Problem, ProblemKind},
@@ -32,8 +30,10 @@ use crate::{
         openapi::RawBytes,
         require_scope::{RequireAdmin, RequireRead},
     },
-    calibration_store::ChangeError,
+    calibration_store::{CalibrationEntry, CalibrationRow, ChangeError},
 };
+
+use upload::{CalibrationAddress, CalibrationUpload, NewCalibrationAddress, write_condition};
 
 /// List calibrations
 ///
@@ -177,4 +177,96 @@ fn unknown(state: &ApiState, id: &lookdown_calibration::CalibrationId) -> Proble
         None => ChangeError::Unknown { id: id.clone() }.to_string(),
     };
     Problem::new(ProblemKind::UnknownCalibration, detail)
+}
+
+/// A calibration.
+#[derive(Serialize, ToSchema)]
+#[schema(example = json!({
+    "id": "lobby", "revision": "6b2a0c51f7d3", "file": "lobby.json",
+    "image": { "width": 1680, "height": 1680 }, "lens": "equidistant"
+}))]
+pub(in crate::api) struct CalibrationInfo {
+    /// The ID of the calibration.
+    id: String,
+    /// The revision in use, as in reports; absent when no revision is in use.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    revision: Option<String>,
+    /// The name of the file.
+    file: String,
+    /// The size of the frames that the calibration was made for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    image: Option<ImageSize>,
+    /// The lens model.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    lens: Option<&'static str>,
+    /// The reason why the newest version of the file is not used.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    problem: Option<String>,
+    /// The shares of the frame that zones, masks, areas and ignored places in the frame cover.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    coverage: Vec<Coverage>,
+    /// Assumptions made when the file was read, and implausible properties.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    warnings: Vec<ReportWarning>,
+}
+
+/// The share of the frame that an area covers.
+#[derive(Serialize, ToSchema)]
+struct Coverage {
+    /// The field of the area, such as `masks[0]`.
+    field: String,
+    /// The share, percent.
+    percent: f64,
+}
+
+/// A frame size.
+#[derive(Serialize, ToSchema)]
+struct ImageSize {
+    /// Pixels.
+    width: u32,
+    /// Pixels.
+    height: u32,
+}
+
+impl From<&CalibrationEntry> for CalibrationInfo {
+    fn from(entry: &CalibrationEntry) -> Self {
+        let calibration = &entry.calibration;
+        let (width, height) = calibration.image_size();
+        let mut warnings: Vec<_> = entry.notes.iter().map(to_warning).collect();
+        warnings.extend(calibration.warnings().iter().map(to_warning));
+        let shares = calibration.areas().shares(width, height).into_iter();
+        let coverage = shares.map(|AreaShare { field, percent }| Coverage {
+            field,
+            percent: (percent * 1000.0).round() / 1000.0,
+        });
+        Self {
+            id: calibration.id().to_string(),
+            revision: Some(calibration.revision().to_owned()),
+            file: entry.file.clone(),
+            image: Some(ImageSize { width, height }),
+            lens: Some(calibration.lens().model()),
+            problem: None,
+            coverage: coverage.collect(),
+            warnings,
+        }
+    }
+}
+
+impl From<CalibrationRow> for CalibrationInfo {
+    fn from(row: CalibrationRow) -> Self {
+        let known = row.entry.as_deref().map(Self::from);
+        Self {
+            problem: row.problem,
+            ..known.unwrap_or(Self {
+                id: row.id.to_string(),
+                revision: None,
+                file: row.file,
+                image: None,
+                lens: None,
+                problem: None,
+                coverage: Vec::new(),
+                warnings: Vec::new(),
+            })
+        }
+    }
 }

@@ -1,19 +1,17 @@
 //! Stored reports, for dashboards: the latest one of each camera, earlier ones, and a stream of new
 //! ones.
 
-mod address;
-pub(in crate::api) mod delete;
 pub(in crate::api) mod events;
 pub(in crate::api) mod history;
 pub(in crate::api) mod latest;
-mod row;
 
 use axum::{
     Json,
-    extract::State,
+    extract::{FromRequestParts, Path, State},
     http::{
         HeaderMap, HeaderValue, StatusCode,
         header::{CACHE_CONTROL, ETAG},
+        request::Parts,
     },
     response::{IntoResponse, Response},
 };
@@ -21,15 +19,17 @@ use jiff::Timestamp;
 use lookdown_calibration::revision::revision_of;
 use lookdown_common::text::Quoted;
 use lookdown_http::entity_tags::{is_unmodified, weak_entity_tag};
+use serde::Serialize;
+use utoipa::ToSchema;
 
-use self::row::CameraRow;
+use super::counts;
 use crate::{
     api::{
         ApiState,
         http::problem::{Problem, ProblemKind},
-        require_scope::RequireRead,
+        require_scope::{RequireAdmin, RequireRead},
     },
-    results::{ListenError, Unreachable},
+    results::{Headline, ListenError, StoredReport, Unreachable},
 };
 
 /// Clients may cache the response, but must revalidate it before use.
@@ -104,5 +104,106 @@ impl From<ListenError> for Problem {
                 Self::new(ProblemKind::TooManyListeners, detail)
             }
         }
+    }
+}
+
+/// A camera and its latest report.
+#[derive(Debug, Serialize, ToSchema)]
+struct CameraRow {
+    /// The name of the camera.
+    #[schema(example = "lobby")]
+    camera: String,
+    /// The ID of the latest report: its `ETag` without the quotes.
+    #[schema(example = "1763717400412345")]
+    id: String,
+    /// Time at which the frame of that report arrived (RFC 3339).
+    #[schema(format = DateTime, example = "2025-11-21T09:30:00.412Z")]
+    received_at: String,
+    /// Age of the report in seconds.
+    #[schema(minimum = 0, example = 0.731)]
+    age_seconds: f64,
+    /// Number of persons there now: what reference counts teach, else those whom the counts follow
+    /// while their number is known, else the median of the reports of the last 5 s; `null` while
+    /// the camera is paused.
+    #[schema(example = 3)]
+    persons: Option<usize>,
+    /// In 90 % of frames, the true number is at least this one.
+    #[schema(example = 2)]
+    persons_low: Option<usize>,
+    /// In 90 % of frames, the true number is at most this one.
+    #[schema(example = 5)]
+    persons_high: Option<usize>,
+    /// The origin of `persons`: `taught`, `tracks`, `median` or `paused`.
+    #[schema(example = "median")]
+    persons_source: &'static str,
+    /// Number of persons in the latest report.
+    #[schema(example = 4)]
+    frame_persons: usize,
+}
+
+impl CameraRow {
+    /// Returns the values that change with a report or a number, not with time.
+    fn state(&self) -> (&str, &str, [Option<usize>; 3], &'static str) {
+        let numbers = [self.persons, self.persons_low, self.persons_high];
+        (&self.camera, &self.id, numbers, self.persons_source)
+    }
+
+    fn at(latest: &StoredReport, headline: Headline, now: Timestamp) -> Self {
+        let age = now.duration_since(latest.id.time()).as_secs_f64();
+        Self {
+            camera: latest.report.camera.clone(),
+            id: latest.id.to_string(),
+            received_at: format!("{:.3}", latest.report.received_at),
+            // The clock may have been set back since.
+            age_seconds: (age.max(0.0) * 1000.0).round() / 1000.0,
+            persons: headline.number.map(|number| number.persons),
+            persons_low: headline.number.map(|number| number.low),
+            persons_high: headline.number.map(|number| number.high),
+            persons_source: headline.source.into(),
+            frame_persons: latest.report.persons,
+        }
+    }
+}
+
+/// Delete a camera's reports
+///
+/// Deletes all stored reports of a camera and its image. Home Assistant removes its entities, and
+/// the counts keep the history only of a camera that this process does not read. The camera returns
+/// with its next frame.
+#[utoipa::path(
+    delete, path = "/results/{camera}", tag = "results", operation_id = "delete_results",
+    params(("camera" = String, Path, description = "The name of the camera.", example = "lobby")),
+    security((), ("bearer" = ["admin"]), ("api_key" = ["admin"])),
+    responses((status = NO_CONTENT, description = "The reports are deleted."))
+)]
+pub(super) async fn delete(
+    State(state): State<ApiState>,
+    _admin: RequireAdmin,
+    CameraAddress(camera): CameraAddress,
+) -> Result<StatusCode, Problem> {
+    state.options.views.forget(&camera);
+    let had_reports = state.results.delete(&camera).await?;
+    // The furniture that a user confirmed belongs to a camera until that is removed.
+    let is_own = state.options.companions.own_cameras().contains(&camera);
+    // The counts may know a camera that has had no frame since the start of the server.
+    if is_own || counts::remove(&state, &camera).await || had_reports {
+        tracing::info!(camera, "all reports of the camera were deleted");
+        Ok(StatusCode::NO_CONTENT)
+    } else {
+        Err(unknown(&camera))
+    }
+}
+
+/// The name of a camera; it need not have reports.
+pub(in crate::api) struct CameraAddress(pub(super) String);
+
+impl FromRequestParts<ApiState> for CameraAddress {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &ApiState) -> Result<Self, Problem> {
+        let camera = Path::from_request_parts(parts, state).await;
+        // A path segment that is not UTF-8 is not a name.
+        let Path(camera) = camera.map_err(|_| unknown(parts.uri.path()))?;
+        Ok(Self(camera))
     }
 }

@@ -4,24 +4,24 @@
 //! A model is put into service only after it was loaded, checked and run once. If that fails, the
 //! previous model stays in service.
 
-mod error;
-mod folder;
-
-use std::{collections::BTreeMap, num::NonZeroUsize, path::Path, sync::Arc};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    num::NonZeroUsize,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use parking_lot::{Mutex, MutexGuard};
 
 use super::{
     error::InferenceError,
+    manifest::{FILE_NAME, ModelManifest, is_name},
     model::{Model, ModelFiles},
-    registry::ModelRegistry,
+    registry::{ModelRegistry, RegistryFull},
     remote::RemoteServer,
     stamp::{Stamp, files_of, stamp},
 };
 use crate::metrics::{DetectMetrics, replace_info, start_at_zero};
-
-pub use error::RepositoryError;
-pub use folder::{ModelFolder, is_fetched, model_names};
 
 /// Loads a model from its folder or ONNX file.
 pub type ModelLoader = Box<dyn Fn(&Path) -> Result<Model, InferenceError> + Send + Sync>;
@@ -221,5 +221,132 @@ impl ModelRepository {
     fn lock(&self) -> MutexGuard<'_, Memory> {
         // After a panic the maps contain only complete entries.
         self.memory.lock()
+    }
+}
+
+/// Most entries of the folder that are read for a listing.
+const MAX_ENTRIES: usize = 1000;
+/// Most characters of a name that an error message repeats.
+const MAX_NAME_CHARS: usize = 64;
+
+/// A folder with one subfolder per model, named like the model.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ModelFolder {
+    /// The folder.
+    pub path: PathBuf,
+    /// Name and path of a model outside the folder: a folder or an ONNX file.
+    pub elsewhere: Option<(String, PathBuf)>,
+}
+
+impl ModelFolder {
+    /// Returns the path of the model with that name.
+    pub(super) fn find(&self, name: &str) -> Result<PathBuf, RepositoryError> {
+        match &self.elsewhere {
+            Some((there, path)) if there == name => return Ok(path.clone()),
+            _ => {}
+        }
+        let path = self.path.join(name);
+        if is_name(name) && path.join(FILE_NAME).is_file() {
+            return Ok(path);
+        }
+        Err(RepositoryError::Unknown {
+            name: name.chars().take(MAX_NAME_CHARS).collect(),
+            known: self.names().join(", "),
+        })
+    }
+
+    /// The names of all models, sorted.
+    pub(super) fn names(&self) -> Vec<String> {
+        let entries = std::fs::read_dir(&self.path).into_iter().flatten();
+        let folders = entries.take(MAX_ENTRIES).flatten().filter_map(|entry| {
+            let name = entry.file_name().into_string().ok()?;
+            (is_name(&name) && entry.path().join(FILE_NAME).is_file()).then_some(name)
+        });
+        let elsewhere = self.elsewhere.iter().map(|(name, _)| name.clone());
+        let names: BTreeSet<_> = folders.chain(elsewhere).collect();
+        names.into_iter().collect()
+    }
+}
+
+/// Returns the names of the models in a folder, sorted.
+pub fn model_names(folder: &Path) -> Vec<String> {
+    let folder = ModelFolder {
+        path: folder.to_owned(),
+        elsewhere: None,
+    };
+    folder.names()
+}
+
+/// Returns true if a model's ONNX file exists. Weights are fetched, manifests are not.
+pub fn is_fetched(model: &Path) -> bool {
+    ModelManifest::locate(model).is_ok_and(|manifest| manifest.onnx.is_file())
+}
+
+/// A model that was not loaded. Every message is one sentence that includes the remedy.
+#[derive(Debug, thiserror::Error)]
+pub enum RepositoryError {
+    /// There is no such model.
+    #[error("model: there is no {name:?} in the repository; there are {known}")]
+    Unknown {
+        /// The requested name.
+        name: String,
+        /// The available names.
+        known: String,
+    },
+    /// The manifest's name differs from its folder's.
+    #[error(
+        "model: {path} has the name {found:?}: rename it to {name:?} like its folder or rename \
+         the folder"
+    )]
+    OtherName {
+        /// The requested name.
+        name: String,
+        /// The name in the manifest.
+        found: String,
+        /// Path of the model.
+        path: PathBuf,
+    },
+    /// One model is loaded at a time.
+    #[error("another model is being loaded: try again in a second")]
+    Busy,
+    /// The largest number of models is loaded.
+    #[error(transparent)]
+    Full(#[from] RegistryFull),
+    /// It cannot be read, failed its check, or failed to run.
+    #[error("{text}")]
+    Refused {
+        /// The cause.
+        cause: InferenceError,
+        /// The cause as [`RepositoryOptions::explain`] describes it.
+        ///
+        /// [`RepositoryOptions::explain`]: super::RepositoryOptions::explain
+        text: String,
+    },
+}
+
+impl RepositoryError {
+    /// Returns true if a retry after a short time may succeed without a change.
+    pub fn is_passing(&self) -> bool {
+        matches!(
+            self,
+            Self::Busy
+                | Self::Refused {
+                    cause: InferenceError::Remote { .. } | InferenceError::RemoteBusy { .. },
+                    ..
+                }
+        )
+    }
+
+    /// Returns true if the error is caused by the model itself, so that it persists until the files
+    /// change.
+    pub fn is_of_model(&self) -> bool {
+        let is_denied = matches!(
+            self,
+            Self::Refused {
+                cause: InferenceError::RemoteDenied { .. },
+                ..
+            }
+        );
+        !self.is_passing() && !is_denied
     }
 }

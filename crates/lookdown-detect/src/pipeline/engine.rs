@@ -1,14 +1,15 @@
 //! The engine: converts the bytes of a frame to its report. The calling thread decodes the frame
 //! and merges detections; the inference threads render views and run inference.
 
+#[cfg(test)]
+mod area_tests;
 mod camera;
-mod crop_pass;
-mod detail_pass;
 mod first_pass;
 mod follow_pass;
+#[cfg(test)]
+mod follow_tests;
 mod further_looks;
 mod observation;
-mod placed;
 
 use std::{
     num::NonZeroUsize,
@@ -17,11 +18,15 @@ use std::{
 };
 
 use lookdown_calibration::warning::{Warning, WarningCode};
+use lookdown_imaging::{
+    Frame,
+    decode::{DecodeLimits, decode},
+    with_even_light,
+};
+use lookdown_lens::geometry::{FootFilter, FootPlace};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use strum::VariantNames as _;
 
-pub use self::observation::Observation;
-use self::{first_pass::FirstPass, placed::Placed};
 use super::{
     BatchOptions, CalibrationLookup, DefaultModels, DetectJob, DetectedFrame, DetectionReport,
     JobImage, Person, PipelineError, Search, Stage, StageTimings,
@@ -38,11 +43,10 @@ use crate::{
     metrics::{DetectMetrics, start_at_zero},
     parameters::DetectParameters,
 };
-use lookdown_imaging::{
-    Frame,
-    decode::{DecodeLimits, decode},
-    with_even_light,
-};
+
+use first_pass::FirstPass;
+
+pub use observation::Observation;
 
 /// The smallest frame side that can hold a lens image, pixels.
 const MIN_FRAME_SIDE: u32 = 32;
@@ -373,9 +377,42 @@ fn check_size(frame: &Frame) -> Result<(), PipelineError> {
     Ok(())
 }
 
-#[cfg(test)]
-mod area_tests;
-#[cfg(test)]
-mod follow_tests;
+/// The persons of a frame by the places of their feet.
+#[derive(Default)]
+struct Placed {
+    /// Those who count.
+    persons: Vec<Person>,
+    /// Those in the margin of an area; `None` without areas.
+    margin: Option<Vec<Person>>,
+    /// All others.
+    outside: Vec<Person>,
+}
+
+impl Placed {
+    /// Sorts persons by the places of their feet, in their order.
+    fn new(persons: Vec<Person>, filter: &FootFilter) -> Self {
+        let mut placed = Self {
+            margin: (!filter.areas.is_empty()).then(Vec::new),
+            ..Self::default()
+        };
+        for person in persons {
+            match filter.place(person.oriented_box.foot(), person.floor) {
+                FootPlace::Inside => placed.persons.push(person),
+                FootPlace::Margin => placed.margin.get_or_insert_default().push(person),
+                FootPlace::Outside => placed.outside.push(person),
+            }
+        }
+        placed
+    }
+
+    /// Removes those of lower scores than the threshold.
+    fn retain(&mut self, score_threshold: f64) {
+        let margin = self.margin.iter_mut();
+        for persons in margin.chain([&mut self.persons, &mut self.outside]) {
+            persons.retain(|person| person.score >= score_threshold);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests;

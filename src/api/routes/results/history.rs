@@ -17,7 +17,7 @@ use lookdown_detect::parameters::{ParameterError, whole_number};
 use lookdown_tracking::taught::NumberWithBar;
 use utoipa::ToSchema;
 
-use super::{NO_CACHE, address::CameraAddress, unknown};
+use super::{CameraAddress, NO_CACHE, unknown};
 use crate::{
     api::{
         ApiState,

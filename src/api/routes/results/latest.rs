@@ -21,7 +21,7 @@ use lookdown_detect::parameters::whole_number;
 use lookdown_http::entity_tags::{entity_tag, is_unmodified};
 use tokio::time::timeout_at;
 
-use super::{NO_CACHE, address::CameraAddress, unknown};
+use super::{CameraAddress, NO_CACHE, unknown};
 use crate::{
     annotated_image::{AnnotationOptions, StoredFrameError},
     api::{
