@@ -13,6 +13,7 @@ use lookdown_imaging::{
 };
 use lookdown_lens::{
     geometry::{Lens, Mount, Pixel, Ray, VirtualView},
+    saturating::to_u32,
     self_calibration::RoomFit,
 };
 
@@ -135,10 +136,5 @@ fn nearest(frame: &Frame, at: &Pixel) -> Option<[u8; 3]> {
     let (x, y) = (at.x.round(), at.y.round());
     let is_inside =
         x >= 0.0 && y >= 0.0 && x < f64::from(frame.width()) && y < f64::from(frame.height());
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "inside the frame"
-    )]
-    is_inside.then(|| frame.pixel(x as u32, y as u32))
+    is_inside.then(|| frame.pixel(to_u32(x), to_u32(y)))
 }

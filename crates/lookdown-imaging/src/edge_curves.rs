@@ -9,7 +9,7 @@ mod gradient;
 mod plane;
 mod surround;
 
-use lookdown_lens::self_calibration::EdgeCurve;
+use lookdown_lens::{saturating::to_usize, self_calibration::EdgeCurve};
 
 use crate::{frame::Frame, lens_circle::LensCircle};
 
@@ -277,12 +277,7 @@ fn is_parabola(piece: &[[f64; 2]], first: [f64; 2], last: [f64; 2], length: f64)
 /// Averages groups of points to supports, whose noise is smaller.
 fn supports(piece: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let wanted = (count(piece.len()) / SUPPORT_DISTANCE).clamp(3.0, MAX_SUPPORTS);
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "3 to 24"
-    )]
-    let wanted = wanted.round() as usize;
+    let wanted = to_usize(wanted.round());
     let mean = |index: usize| {
         let group = &piece[index * piece.len() / wanted..(index + 1) * piece.len() / wanted];
         let share = 1.0 / count(group.len()).max(1.0);

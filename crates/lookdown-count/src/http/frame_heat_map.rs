@@ -7,6 +7,7 @@ use axum::{
     response::Response,
 };
 use lookdown_http::problem::Problem;
+use lookdown_lens::saturating::to_u32;
 use lookdown_tracking::heat_map::Cell;
 
 use super::{
@@ -51,14 +52,7 @@ pub(super) async fn png(
 fn drawn(cells: &BTreeMap<Cell, u64>, definition: &Arc<CameraDefinition>) -> (Vec<u8>, u32) {
     let key = &definition.key;
     let scale = f64::from(key.width) / f64::from(WIDTH);
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "at least one pixel and at most 16 times the width"
-    )]
-    let height = (f64::from(key.height) / scale)
-        .round()
-        .clamp(1.0, 16.0 * f64::from(WIDTH)) as u32;
+    let height = to_u32((f64::from(key.height) / scale).round()).clamp(1, 16 * WIDTH);
     let seconds = |milliseconds: u64| milliseconds as f64 / 1000.0;
     let most = cells.values().copied().max().map_or(0.0, seconds);
     let mut pixels = Vec::with_capacity(WIDTH as usize * height as usize * 4);

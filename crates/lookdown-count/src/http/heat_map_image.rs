@@ -5,6 +5,7 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use lookdown_http::problem::Problem;
+use lookdown_lens::saturating::to_u8;
 
 /// Pixels of a cell.
 const CELL_PX: usize = 8;
@@ -56,15 +57,7 @@ pub(super) fn color(seconds: f64, most: f64) -> [u8; 4] {
         return [0; 4];
     }
     let share = (1.0 + seconds).ln() / (1.0 + most).ln();
-    let channel = |value: f64| {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "clamped"
-        )]
-        let channel = (value.clamp(0.0, 1.0) * 255.0).round() as u8;
-        channel
-    };
+    let channel = |value: f64| to_u8((value * 255.0).round());
     [
         channel(2.0 * share - 0.6),
         channel(1.2 - (2.4 * share - 1.2).abs()),

@@ -1,5 +1,6 @@
 //! Graphs that include suppression.
 
+use lookdown_lens::saturating::to_usize;
 use serde::Deserialize;
 
 use super::{
@@ -93,13 +94,8 @@ impl EndToEndHead {
 
 /// The view with the number `raw`, if it is less than `views`.
 fn view_number(raw: f32, views: usize) -> Option<usize> {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "the cast saturates and negative numbers are excluded"
-    )]
     (raw > -0.5)
-        .then_some(raw.round() as usize)
+        .then_some(to_usize(raw.round().into()))
         .filter(|&view| view < views)
 }
 
