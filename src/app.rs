@@ -89,7 +89,7 @@ fn assemble_with(
         rig_cache_bytes: settings.calibrations.cache_bytes,
     };
     let known = Arc::clone(&calibrations);
-    let registry = Arc::clone(models.registry());
+    let registry = Arc::clone(&models.registry);
     let engine = Engine::new(registry, Some(known), options, Arc::clone(&metrics.detect))
         .context("the operating system gives no threads")?;
     Ok(Assembly {
@@ -121,7 +121,7 @@ pub fn engine_for(settings: &Settings, requests: &[DetectParameters]) -> anyhow:
     let Assembly { engine, models, .. } = assembly;
     for request in requests {
         for name in engine.default_models().needed_by(request) {
-            if models.registry().get(name).is_none() {
+            if models.registry.get(name).is_none() {
                 models.load(name)?;
             }
         }

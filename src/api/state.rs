@@ -199,7 +199,7 @@ impl ApiState {
         }
         let suggestions = Suggestions::new(
             Arc::clone(&calibrations),
-            workers.engine().options().decode_limits,
+            workers.engine().options.decode_limits,
             options.lens,
             options.apply_suggested_calibrations,
             options.companions.own_cameras(),
@@ -254,9 +254,9 @@ impl ApiState {
             );
             return Err(Problem::new(ProblemKind::Stalled, detail));
         }
-        let remote = self.models.remote();
+        let remote = &self.models.remote;
         match self.readiness.phase() {
-            Phase::Ready if remote.is_none_or(|remote| remote.is_available()) => Ok(()),
+            Phase::Ready if remote.as_ref().is_none_or(|remote| remote.is_available()) => Ok(()),
             Phase::Ready => Err(PipelineError::InferenceUnavailable.into()),
             Phase::WarmingUp => Err(Problem::warming_up()),
             Phase::Stopping => Err(Problem::shutting_down()),

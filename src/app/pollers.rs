@@ -56,7 +56,7 @@ impl App {
         });
         let results = Arc::clone(&self.state.results);
         let expiry = Poller::start("result-expiry", EXPIRY_EVERY, move || results.expire());
-        let remote = self.state.models.remote().cloned();
+        let remote = self.state.models.remote.clone();
         let remote_poller = remote.map(|remote| {
             Poller::start("remote-watcher", REMOTE_EVERY, move || {
                 remote.check_health();

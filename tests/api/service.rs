@@ -194,7 +194,7 @@ pub(crate) fn assembly(gate: &Arc<Gate>) -> (Assembly, TempDir) {
     let options = EngineOptions::for_testing("eager");
     let store = Box::new(FolderStore::new(folder.path()));
     let calibrations = Arc::new(Calibrations::open(store, true, Arc::clone(&metrics)).unwrap());
-    let registry = Arc::clone(models.registry());
+    let registry = Arc::clone(&models.registry);
     let known = Arc::clone(&calibrations);
     let engine = Engine::new(registry, Some(known), options, Arc::clone(&metrics.detect)).unwrap();
     let models = Arc::new(models);

@@ -87,7 +87,7 @@ impl Follower {
     /// Follows one connection until it ends.
     async fn follow(&mut self, log: &mut LogOnce) -> StreamError {
         let client = self.client.clone();
-        let last_event = self.counter.lock().last_event();
+        let last_event = self.counter.lock().last_event;
         let mut stop = self.stop.clone();
         let opened = tokio::select! {
             opened = EventStream::open(&client, last_event) => opened,
@@ -115,7 +115,7 @@ impl Follower {
                     }
                 }
             }
-            let is_urgent = self.counter.lock().is_urgent() || !self.messages.is_empty();
+            let is_urgent = self.counter.lock().is_urgent || !self.messages.is_empty();
             if is_urgent || Instant::now() >= self.next_commit {
                 self.commit().await;
             }
@@ -215,7 +215,7 @@ impl Follower {
         }
         let batch = batch.unwrap_or_else(|| {
             let counter = self.counter.lock();
-            Batch::empty(counter.last_event(), counter.stored_totals().clone())
+            Batch::empty(counter.last_event, counter.stored_totals.clone())
         });
         let batch = Arc::new((batch, messages, held));
         let mut backoff = Backoff::new(FIRST_PAUSE, LONGEST_PAUSE);

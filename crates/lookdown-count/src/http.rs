@@ -132,7 +132,7 @@ struct Dropping {
 impl CountedCamera {
     /// Returns the row of a camera without a counted report.
     fn new(name: &str, counter: &Counter) -> Self {
-        let drops = counter.drops().for_camera(name);
+        let drops = counter.drops.for_camera(name);
         let since_ms = drops.and_then(|drops| drops.since_ms);
         let dropping = drops.zip(since_ms).map(|(drops, since_ms)| Dropping {
             since: time_of(since_ms),
@@ -177,7 +177,7 @@ async fn cameras(State(api): State<Shared>) -> Json<Vec<CountedCamera>> {
         };
         rows.insert(camera.name, row);
     }
-    for (name, _) in counter.drops().iter() {
+    for (name, _) in counter.drops.iter() {
         let entry = rows.entry(name.to_owned());
         entry.or_insert_with(|| CountedCamera::new(name, &counter));
     }

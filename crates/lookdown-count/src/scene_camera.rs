@@ -47,7 +47,7 @@ pub(crate) struct SceneCamera {
     /// The last report of this camera, counted or not.
     pub(crate) last_report: Option<ReportKey>,
     /// Arrival of the last counted report at this process.
-    arrived: Option<Instant>,
+    pub(crate) arrived: Option<Instant>,
     /// Arrival of the first of the late reports since the last one in order.
     pub(crate) late_since: Option<Instant>,
     clock_log: LogPause,
@@ -119,8 +119,8 @@ impl SceneCamera {
         CameraState {
             name: self.name.clone(),
             key: self.definition.key.clone(),
-            lines: self.lines.state().clone(),
-            zones: self.zones.state().clone(),
+            lines: self.lines.state.clone(),
+            zones: self.zones.state.clone(),
             presence: self.presence,
             zone_persons: self.zone_persons.clone(),
             last_report: self.last_report,
@@ -140,11 +140,6 @@ impl SceneCamera {
             clock_log: self.clock_log,
             ..Self::new(&self.name, definition)
         };
-    }
-
-    /// Returns the arrival of the last counted report at this process.
-    pub(crate) fn arrived(&self) -> Option<Instant> {
-        self.arrived
     }
 
     /// Returns true if a refused report shows that a clock was set back: no report of this camera
@@ -173,10 +168,6 @@ impl SceneCamera {
         }
     }
 
-    pub(crate) fn presence(&self) -> &Presence {
-        &self.presence
-    }
-
     /// Returns the rate of the frames, if the camera has lines, which need a certain one.
     pub(crate) fn rate(&self) -> Option<FrameRate> {
         (!self.definition.lines.is_empty()).then_some(self.rate)
@@ -193,12 +184,12 @@ impl SceneCamera {
 
     /// Returns each zone with its persons now.
     pub(crate) fn occupancy(&self) -> impl Iterator<Item = (&str, usize)> {
-        let names = self.zones.zones().iter().map(|zone| zone.name.as_str());
+        let names = self.zones.zones.iter().map(|zone| zone.name.as_str());
         names.zip(self.zones.occupancy())
     }
 
     fn zone_of(&self, index: usize) -> ZoneOf {
-        let zone = self.zones.zones().get(index);
+        let zone = self.zones.zones.get(index);
         ZoneOf {
             camera: self.name.clone(),
             zone: zone.map(|zone| zone.name.clone()).unwrap_or_default(),
@@ -214,7 +205,7 @@ impl SceneCamera {
     ) -> Vec<NamedCrossing> {
         let mut named = Vec::new();
         for crossing in self.lines.update(tracks.iter().copied()) {
-            let line = &self.lines.lines()[crossing.line];
+            let line = &self.lines.lines[crossing.line];
             let direction = match crossing.direction {
                 Direction::In => 0,
                 Direction::Out => 1,

@@ -267,7 +267,7 @@ impl Conditions {
                             let mut zones = of.occupancy().filter(|(name, _)| name == zone);
                             zones.next().map(|(_, persons)| persons as u64)
                         }
-                        None => Some(of.presence().persons),
+                        None => Some(of.presence.persons),
                     });
                     let Some(persons) = persons else {
                         continue;

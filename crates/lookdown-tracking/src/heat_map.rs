@@ -39,8 +39,8 @@ impl HeatMap {
     pub fn update<'a>(&mut self, tracks: impl IntoIterator<Item = &'a Track>) {
         let mut counted = BTreeMap::new();
         for track in tracks {
-            let first = track.first_seen_s();
-            let mut until = self.counted_s.get(&track.id()).copied().unwrap_or(first);
+            let first = track.first_seen_s;
+            let mut until = self.counted_s.get(&track.id).copied().unwrap_or(first);
             for point in track.tail() {
                 if point.at_s <= until {
                     continue;
@@ -51,7 +51,7 @@ impl HeatMap {
                 }
                 until = point.at_s;
             }
-            counted.insert(track.id(), until);
+            counted.insert(track.id, until);
         }
         self.counted_s = counted;
     }

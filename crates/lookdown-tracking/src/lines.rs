@@ -64,8 +64,10 @@ pub struct LineError(String);
 /// The lines over the tracks of one tracker.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LineCounter {
-    lines: Vec<Line>,
-    state: LineState,
+    /// The lines.
+    pub lines: Vec<Line>,
+    /// The state to be stored with that of the tracker.
+    pub state: LineState,
 }
 
 /// The part of a counter that must survive a restart together with the tracker.
@@ -111,23 +113,13 @@ impl LineCounter {
         Ok(Self { lines, state })
     }
 
-    /// Returns the lines.
-    pub fn lines(&self) -> &[Line] {
-        &self.lines
-    }
-
-    /// Returns the state to be stored with that of the tracker.
-    pub fn state(&self) -> &LineState {
-        &self.state
-    }
-
     /// Returns the crossings since the last call. `tracks` are all confirmed tracks of the tracker,
     /// after each of its updates.
     pub fn update<'a>(&mut self, tracks: impl IntoIterator<Item = &'a Track>) -> Vec<Crossing> {
         let mut crossings = Vec::new();
         let mut states = BTreeMap::new();
         for track in tracks {
-            let known = self.state.tracks.remove(&track.id());
+            let known = self.state.tracks.remove(&track.id);
             let mut approaches =
                 known.unwrap_or_else(|| vec![Approach::default(); self.lines.len()]);
             for (index, (line, approach)) in self.lines.iter().zip(&mut approaches).enumerate() {
@@ -135,12 +127,12 @@ impl LineCounter {
                     crossings.push(Crossing {
                         line: index,
                         direction,
-                        track: track.id(),
+                        track: track.id,
                         at_s,
                     });
                 }
             }
-            states.insert(track.id(), approaches);
+            states.insert(track.id, approaches);
         }
         self.state.tracks = states;
         crossings

@@ -132,7 +132,7 @@ fn router() -> Router {
         rig_cache_bytes: 1 << 24,
         ..EngineOptions::for_testing(MODEL)
     };
-    let registry = Arc::clone(models.registry());
+    let registry = Arc::clone(&models.registry);
     let engine = Engine::new(
         registry,
         Some(calibrations.clone()),

@@ -150,7 +150,7 @@ pub(in crate::api) fn with_failures(routes: Router<ApiState>) -> Router<ApiState
 /// Changes the problem of a failed response.
 async fn as_deepstack(method: Method, uri: Uri, mut response: Response) -> Response {
     if let Some(problem) = Problem::take_from(&mut response, method.as_str(), uri.path()) {
-        let status = status_of(problem.kind());
+        let status = status_of(problem.kind);
         let problem = problem.with_status(status).with_member("success", false);
         *response.status_mut() = status;
         response.extensions_mut().insert(problem);

@@ -62,7 +62,7 @@ fn service(folder: &Path) -> (Router, Arc<ModelRepository>) {
         ..EngineOptions::for_testing("person")
     };
     let engine = Engine::new(
-        Arc::clone(models.registry()),
+        Arc::clone(&models.registry),
         None,
         engine,
         Arc::clone(&metrics.detect),
@@ -139,12 +139,7 @@ async fn a_model_is_swapped_under_load_without_a_failed_request() {
         // The files must be unchanged between two checks.
         let reload = move || (0..2).for_each(|_| reloading.reload_changed());
         spawn_blocking(reload).await.unwrap();
-        let revision = models
-            .registry()
-            .get("person")
-            .unwrap()
-            .revision()
-            .to_owned();
+        let revision = models.registry.get("person").unwrap().revision.to_owned();
         // A frame that starts now uses the new model.
         let (_, report) = post(&router, "/detect?profile=fast", frame.clone()).await;
         assert_eq!(report["model"]["revision"], revision.as_str());

@@ -41,9 +41,11 @@ pub struct RepositoryOptions {
 /// The models of a folder, loaded or not.
 pub struct ModelRepository {
     options: RepositoryOptions,
-    registry: Arc<ModelRegistry>,
+    /// The loaded models.
+    pub registry: Arc<ModelRegistry>,
     loader: ModelLoader,
-    remote: Option<Arc<RemoteServer>>,
+    /// The server on which the networks run, or `None` if they run locally.
+    pub remote: Option<Arc<RemoteServer>>,
     /// Locked while a model is loaded, so that only one is loaded at a time.
     memory: Mutex<Memory>,
     metrics: Arc<DetectMetrics>,
@@ -84,21 +86,11 @@ impl ModelRepository {
         }
     }
 
-    /// The server on which the networks run, or `None` if they run locally.
-    pub fn remote(&self) -> Option<&Arc<RemoteServer>> {
-        self.remote.as_ref()
-    }
-
     /// Returns false while the inference server is unavailable.
     pub fn is_remote_available(&self) -> bool {
         self.remote
             .as_ref()
             .is_none_or(|remote| remote.is_available())
-    }
-
-    /// The loaded models.
-    pub fn registry(&self) -> &Arc<ModelRegistry> {
-        &self.registry
     }
 
     /// Loads or reloads the model with that name. Blocks.
@@ -126,8 +118,8 @@ impl ModelRepository {
         }
         let mut memory = self.lock();
         for model in self.registry.all() {
-            let Some(files) = model.files() else { continue };
-            let name = model.name();
+            let Some(files) = &model.files else { continue };
+            let name = &model.name;
             let found = stamp(&files_of(&files.path));
             let is_changed =
                 found.is_some() && found != files.stamp && memory.refused.get(name) != Some(&found);
@@ -138,7 +130,7 @@ impl ModelRepository {
                 // The error is already logged.
                 let _ = self.replace(&mut memory, name, &files.path);
             } else {
-                memory.changed.insert(name.to_owned(), found);
+                memory.changed.insert(name.clone(), found);
             }
         }
     }
@@ -161,19 +153,14 @@ impl ModelRepository {
             Ok((model, replaced)) => {
                 self.count_load("success");
                 memory.refused.remove(name);
-                let replaced = replaced.as_ref().map(|replaced| replaced.revision());
+                let replaced = replaced.as_ref().map(|replaced| &*replaced.revision);
                 let before = replaced.map(|revision| [name, revision]);
                 replace_info(
                     &self.metrics.model_info,
                     before.as_ref().map(<[_; 2]>::as_slice),
-                    &[name, model.revision()],
+                    &[name, &model.revision],
                 );
-                tracing::info!(
-                    model = name,
-                    revision = model.revision(),
-                    replaced,
-                    "loaded"
-                );
+                tracing::info!(model = name, revision = model.revision, replaced, "loaded");
                 Ok(model)
             }
             Err(error) => {
@@ -193,10 +180,10 @@ impl ModelRepository {
             cause,
         };
         let model = (self.loader)(path).map_err(refused)?;
-        if model.name() != name {
+        if model.name != name {
             return Err(RepositoryError::OtherName {
                 name: name.to_owned(),
-                found: model.name().to_owned(),
+                found: model.name.to_owned(),
                 path: path.to_owned(),
             });
         }

@@ -29,13 +29,16 @@ const BORDER_SHARE: f64 = 0.0125;
 /// A camera ready for frames of one size.
 #[derive(Debug)]
 pub(super) struct CameraRig {
-    geometry: CameraGeometry,
-    frame: BBox<FramePixels>,
+    /// The lens, the mount and the areas of the camera.
+    pub(super) geometry: CameraGeometry,
+    /// The box of the whole frame.
+    pub(super) frame: BBox<FramePixels>,
     hidden: Hidden,
     views: Views,
     /// Views of parts of the frame, for those that may show a person.
     details: Vec<(VirtualView, RemapTable)>,
-    left_out: LeftOut,
+    /// The numbers of planned views that the network does not process.
+    pub(super) left_out: LeftOut,
 }
 
 /// The network's views of a frame.
@@ -143,16 +146,6 @@ impl CameraRig {
         self.hidden.masked.is_empty()
     }
 
-    /// Returns the lens, the mount and the areas of the camera.
-    pub(super) fn geometry(&self) -> &CameraGeometry {
-        &self.geometry
-    }
-
-    /// Returns the box of the whole frame.
-    pub(super) fn frame(&self) -> &BBox<FramePixels> {
-        &self.frame
-    }
-
     /// Returns the number of detail views.
     pub(super) fn detail_count(&self) -> usize {
         self.details.len()
@@ -198,11 +191,6 @@ impl CameraRig {
         reach.map_or_else(Vec::new, |reach| reach.boxes_outside())
     }
 
-    /// Returns the numbers of planned views that the network does not process.
-    pub(super) fn left_out(&self) -> LeftOut {
-        self.left_out
-    }
-
     /// Returns the outlines of the views in corner-origin frame pixels.
     pub(super) fn view_outlines(&self) -> Vec<Vec<Pixel>> {
         match &self.views {
@@ -224,7 +212,7 @@ impl CameraRig {
                 RemapTable::bytes(views.map(|(_, table)| table))
             }
             Views::Crops(mosaics) => {
-                RemapTable::bytes(mosaics.crops().iter().map(|(_, table)| table))
+                RemapTable::bytes(mosaics.crops.iter().map(|(_, table)| table))
             }
             Views::Direct(_) => 0,
         };
@@ -264,7 +252,7 @@ impl CameraRig {
                 &self.geometry.mount,
             ),
             Views::Crops(mosaics) => {
-                let crop = &mosaics.crops()[view].0;
+                let crop = &mosaics.crops[view].0;
                 Footprint::from_crop_box(bbox.corners(), crop, &self.geometry.lens)
             }
             Views::Direct(letterbox) => Some(Footprint::from_frame_box(
@@ -280,7 +268,7 @@ impl CameraRig {
 
     fn placed_crops(&self) -> &[(FrameCrop, RemapTable)] {
         match &self.views {
-            Views::Crops(mosaics) => mosaics.crops(),
+            Views::Crops(mosaics) => &mosaics.crops,
             Views::Virtual(_) | Views::Direct(_) => &[],
         }
     }

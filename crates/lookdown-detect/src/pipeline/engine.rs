@@ -106,8 +106,9 @@ pub struct Engine {
     follow_cache: FollowCache,
     /// The turn of all view plans, radians.
     plan_turn: f64,
-    options: EngineOptions,
-    metrics: Arc<DetectMetrics>,
+    /// The options.
+    pub options: EngineOptions,
+    pub(super) metrics: Arc<DetectMetrics>,
 }
 
 impl Engine {
@@ -168,7 +169,7 @@ impl Engine {
             None => found(&with_candidates(&parameters.refinement)),
         };
         timeline.leave(Instant::now());
-        let foot_filter = &observation.camera.rig.geometry().areas.foot_filter;
+        let foot_filter = &observation.camera.rig.geometry.areas.foot_filter;
         let mut placed = Placed::new(persons, foot_filter);
         let scores = scores(&placed.persons);
         placed.retain(parameters.refinement.score_threshold);
@@ -181,7 +182,7 @@ impl Engine {
         let search = observation.search();
         let searches = &self.metrics.frame_searches;
         searches.with_label_values(&[search.name()]).inc();
-        let zones = ZoneCount::for_zones(&observation.camera.rig.geometry().areas.zones, &persons);
+        let zones = ZoneCount::for_zones(&observation.camera.rig.geometry.areas.zones, &persons);
         let calibration = observation.camera.used.clone();
         let camera = parameters.camera.clone();
         let report = DetectionReport {
@@ -193,7 +194,7 @@ impl Engine {
             image_width: observation.frame.width(),
             image_height: observation.frame.height(),
             crop_model: observation.crop_model().map(ModelUsed::from),
-            model: ModelUsed::from(observation.model()),
+            model: ModelUsed::from(&*observation.model),
             profile: parameters.profile,
             refinement: parameters.refinement,
             defaults: parameters.defaults.clone(),
@@ -329,15 +330,6 @@ impl Engine {
         )
     }
 
-    /// Returns the options.
-    pub fn options(&self) -> &EngineOptions {
-        &self.options
-    }
-
-    pub(super) fn metrics(&self) -> &Arc<DetectMetrics> {
-        &self.metrics
-    }
-
     /// Returns the model for requests that name none.
     pub(super) fn default_model(&self) -> Result<Arc<Model>, PipelineError> {
         let name = self.options.default_models.model();
@@ -351,7 +343,7 @@ impl Engine {
         };
         self.models.get(name).ok_or_else(|| {
             let loaded = self.models.all();
-            let loaded: Vec<_> = loaded.iter().map(|model| model.name()).collect();
+            let loaded: Vec<_> = loaded.iter().map(|model| &*model.name).collect();
             PipelineError::UnknownModel {
                 name: name.clone(),
                 loaded: loaded.join(", "),

@@ -174,7 +174,7 @@ impl FollowedFrame {
     /// Returns the places of the crops, best persons first; `None` if the whole frame is searched.
     pub(super) fn targets(&self, rig: &CameraRig) -> Option<Vec<CropTarget>> {
         let (before, moving) = (self.before.as_ref()?, self.moving.as_ref()?);
-        let geometry = rig.geometry();
+        let geometry = &rig.geometry;
         let expected = before.people.expected(moving, seconds(self.at));
         let mut targets: Vec<_> = expected
             .map(|(person, bbox)| {

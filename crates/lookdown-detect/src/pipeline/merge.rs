@@ -45,7 +45,7 @@ impl Mapped {
     /// number of views that hold the whole person.
     /// `crop_vote` is the factor for scores from crops.
     fn weighted(&self, passes: &[Pass], rig: &CameraRig, crop_vote: f64) -> Candidate {
-        let mount = &rig.geometry().mount;
+        let mount = &rig.geometry.mount;
         let height_ratio = self
             .footprint
             .extremities()
@@ -125,12 +125,12 @@ pub(super) fn possible_persons(
         max_detections: 500,
     };
     let (mapped, mut merged) = merged(passes, rig, profile, tuning, &parameters);
-    if !rig.geometry().areas.foot_filter.areas.is_empty() {
+    if !rig.geometry.areas.foot_filter.areas.is_empty() {
         merged.retain(|merged| may_count(merged, &mapped, rig));
     }
-    let geometry = rig.geometry();
+    let geometry = &rig.geometry;
     let targets = merged.iter().filter_map(|merged| {
-        let bbox = merged.bbox.clipped_to(rig.frame())?;
+        let bbox = merged.bbox.clipped_to(&rig.frame)?;
         let center = nalgebra::Point2::from(bbox.center());
         Some(CropTarget {
             bbox: bbox.corners(),
@@ -148,7 +148,7 @@ fn may_count(merged: &MergedDetection, mapped: &[Mapped], rig: &CameraRig) -> bo
         .iter()
         .map(|&member| &mapped[member])
         .collect();
-    let filter = &rig.geometry().areas.foot_filter;
+    let filter = &rig.geometry.areas.foot_filter;
     let person = person(merged.bbox, merged.score, &members, rig);
     person.is_none_or(|person| {
         filter.is_near(person.oriented_box.foot(), person.floor, TARGET_MARGINS)
@@ -188,7 +188,7 @@ fn map(find: &PassDetection<'_>, back_projection: BackProjection) -> Option<Mapp
     let footprint = rig.footprint(find.view, &found.bbox, back_projection)?;
     let is_exact = rig.is_exact();
     let bbox = BBox::new(footprint.bounds()).ok()?;
-    let cut_off = rig.cuts_off(find.view, &found.bbox, model.input());
+    let cut_off = rig.cuts_off(find.view, &found.bbox, &model.input);
     let candidate = Candidate {
         bbox,
         score: found.score,
@@ -212,9 +212,9 @@ fn person(
     members: &[&Mapped],
     rig: &CameraRig,
 ) -> Option<Person> {
-    let geometry = rig.geometry();
+    let geometry = &rig.geometry;
     let bounds = bbox.corners();
-    let bbox = bbox.clipped_to(rig.frame())?;
+    let bbox = bbox.clipped_to(&rig.frame)?;
     let center = nalgebra::Point2::from(bbox.center());
     let up = vertical_in_frame(center, &geometry.lens, &geometry.mount);
     // Upright views determine the proportions, crops the extent.
@@ -248,7 +248,7 @@ pub(super) fn placed(
     views: usize,
     rig: &CameraRig,
 ) -> Person {
-    let geometry = rig.geometry();
+    let geometry = &rig.geometry;
     let foot = oriented_box.foot();
     let floor = floor_position(foot, &geometry.lens, &geometry.mount);
     Person {
@@ -266,7 +266,7 @@ pub(super) fn placed(
 
 /// Returns the posture that the box alone tells, with its probability.
 fn posture(person: &OrientedBox, rig: &CameraRig) -> (Posture, f64) {
-    let geometry = rig.geometry();
+    let geometry = &rig.geometry;
     let camera_m = geometry.mount.height_m();
     let mut belief = PostureBelief::new(camera_m.is_some());
     if let Some(angles) = BoxAngles::new(person, &geometry.lens, &geometry.mount) {

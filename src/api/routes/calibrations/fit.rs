@@ -119,7 +119,7 @@ pub(in crate::api) async fn fit(
         let fault = format!("the form has more than {FRAMES} frames: send fewer");
         return Err(refused(&fault));
     }
-    let limits = state.workers.engine().options().decode_limits;
+    let limits = state.workers.engine().options.decode_limits;
     let ticket = upload.caller.ticket();
     let fitting = async {
         let turn = match state.fits.next().await {

@@ -135,7 +135,7 @@ pub(in crate::api) async fn get(
         }
     };
     Ok(answered.unwrap_or_else(|problem| {
-        let is_without_key = problem.kind() == ProblemKind::KeyRequired;
+        let is_without_key = problem.kind == ProblemKind::KeyRequired;
         let mut response = problem.into_response();
         if is_without_key {
             // Players of streams send the password of their URL after this challenge only.

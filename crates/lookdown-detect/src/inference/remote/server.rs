@@ -89,7 +89,7 @@ impl RemoteServer {
             match self.ready() {
                 Ok(()) => {
                     if self.breaker.close() {
-                        let url = self.connection.address();
+                        let url = &self.connection.address;
                         tracing::info!(%url, "the inference server is available again");
                     }
                 }
@@ -204,21 +204,21 @@ impl RemoteServer {
     fn note_failure(&self, detail: &str) {
         if self.breaker.failed() {
             self.publish_availability();
-            let url = self.connection.address();
+            let url = &self.connection.address;
             tracing::warn!(%url, "the inference server is unavailable: {detail}");
         }
     }
 
     pub(super) fn denied(&self, detail: String) -> InferenceError {
         InferenceError::RemoteDenied {
-            url: self.connection.address().to_string(),
+            url: self.connection.address.to_string(),
             detail,
         }
     }
 
     pub(super) fn unavailable(&self, detail: String) -> InferenceError {
         InferenceError::Remote {
-            url: self.connection.address().to_string(),
+            url: self.connection.address.to_string(),
             detail,
         }
     }

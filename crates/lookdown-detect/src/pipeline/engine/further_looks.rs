@@ -90,11 +90,11 @@ impl Engine {
         targets: &[CropTarget],
     ) -> Option<(CameraRig, Arc<Model>)> {
         let model = self.crop_model(&job.parameters, &observation.model);
-        let side = model.input().width.min(model.input().height);
+        let side = model.input.width.min(model.input.height);
         let max_crops = observation.profile.max_crops();
         let mut crops = place_crops(targets, max_crops, observation.tuning.crop_fill, side);
         if observation.profile.has_nadir_crop() {
-            let geometry = observation.camera.rig.geometry();
+            let geometry = &observation.camera.rig.geometry;
             crops.extend(nadir_crop(&geometry.lens, &geometry.mount, side));
         }
         if observation.profile.mirrors_crops() {
