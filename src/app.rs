@@ -20,7 +20,7 @@ use tokio::sync::watch;
 
 use crate::{
     access::AccessKeys,
-    api::{self, Access, ApiOptions, ApiState, Companions, Readiness, RequestRate},
+    api::{self, Access, ApiOptions, ApiState, Companions, Readiness},
     calibration_store::{Calibrations, FolderStore},
     cameras::Cameras,
     metrics::Metrics,
@@ -140,7 +140,7 @@ pub struct App {
     /// The MQTT publisher, if a broker is configured.
     publisher: Option<Publisher>,
     state: ApiState,
-    settings: Box<Settings>,
+    settings: Arc<Settings>,
 }
 
 impl App {
@@ -213,7 +213,15 @@ impl App {
                 Arc::clone(&views),
             )
         });
-        let options = api_options(&settings, views, access, companions, references, tracer);
+        let settings = Arc::new(settings);
+        let options = ApiOptions {
+            settings: Arc::clone(&settings),
+            views,
+            access,
+            companions,
+            references,
+            tracer,
+        };
         let state = ApiState::new(
             Arc::new(workers),
             models,
@@ -229,7 +237,7 @@ impl App {
             tls,
             publisher: publisher.transpose()?,
             state,
-            settings: Box::new(settings),
+            settings,
         })
     }
 
@@ -330,46 +338,4 @@ fn companions(settings: &CountSettings) -> anyhow::Result<Companions> {
         companions.forward_counts(client, lookdown_count::openapi_document);
     }
     Ok(companions)
-}
-
-/// Returns the options of the API.
-fn api_options(
-    settings: &Settings,
-    views: Arc<Views>,
-    access: Access,
-    companions: Companions,
-    references: Arc<ReferenceCounts>,
-    tracer: Tracer,
-) -> ApiOptions {
-    ApiOptions {
-        max_body_bytes: settings.server.max_body_bytes,
-        max_upload_bytes: settings.limits.max_upload_bytes,
-        max_header_bytes: settings.connections.max_header_bytes,
-        max_headers: settings.connections.max_headers,
-        detect_defaults: settings.detect.clone(),
-        zone_metrics: settings.calibrations.zone_metrics,
-        camera_metrics: settings.results.camera_metrics,
-        images_of: Arc::new(settings.results.images_of.clone()),
-        image_age: settings.results.limits.max_age,
-        conceal_images: settings.results.conceal_images,
-        lens: settings.calibrations.lens,
-        apply_suggested_calibrations: settings.calibrations.apply_suggested,
-        metrics_elsewhere: settings.server.metrics_listen.is_some(),
-        request_timeout: settings.server.request_timeout,
-        min_upload_bytes_per_second: settings.limits.min_upload_bytes_per_second,
-        request_rate: settings
-            .limits
-            .requests_per_second
-            .map(|per_second| RequestRate {
-                per_second,
-                burst: settings.limits.request_burst,
-            }),
-        views,
-        access,
-        cors_origins: settings.access.cors_origins.clone(),
-        hosts: settings.access.hosts.clone(),
-        companions,
-        references,
-        tracer,
-    }
 }

@@ -154,7 +154,7 @@ impl Cameras {
     /// The names of the cameras that send frames.
     pub(super) fn available(&self) -> Vec<String> {
         let known = self.known.values().filter(|camera| camera.is_available);
-        known.map(|camera| camera.name.to_owned()).collect()
+        known.map(|camera| camera.name.clone()).collect()
     }
 
     /// Makes the paused cameras of this process unavailable: their last number is not the present

@@ -70,7 +70,7 @@ fn evaluate_image(
         (persons.iter().map(FoundPerson::from).collect(), took)
     });
     Ok(Seen {
-        model: observation.model.name.to_owned(),
+        model: observation.model.name.clone(),
         views: observation.view_count(),
         observing: observation.timings().worked(),
         variants: refined.collect(),

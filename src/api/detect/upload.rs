@@ -203,7 +203,7 @@ impl ReceivedRequest {
         let client = &context.caller.client;
         // A frame that finds no place in the queue is refused before its body is read.
         state.workers.admits(client)?;
-        let max_bytes = state.options.max_body_bytes;
+        let max_bytes = state.options.settings.server.max_body_bytes;
         let remedy = "send a smaller image or raise server.max_body_bytes";
         let reader = BodyReader {
             budget: budget.for_client(client),

@@ -41,7 +41,7 @@ impl ModelRegistry {
         if models.len() >= MAX_MODELS && !models.contains_key(&model.name) {
             return Err(RegistryFull);
         }
-        Ok(models.insert(model.name.to_owned(), model))
+        Ok(models.insert(model.name.clone(), model))
     }
 }
 

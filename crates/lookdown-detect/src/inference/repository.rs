@@ -183,7 +183,7 @@ impl ModelRepository {
         if model.name != name {
             return Err(RepositoryError::OtherName {
                 name: name.to_owned(),
-                found: model.name.to_owned(),
+                found: model.name.clone(),
                 path: path.to_owned(),
             });
         }

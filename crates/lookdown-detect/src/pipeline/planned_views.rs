@@ -107,7 +107,7 @@ impl Engine {
         let images = views.as_ref().map_or(1, Vec::len);
         Ok(PlannedViews {
             profile,
-            model: model.name.to_owned(),
+            model: model.name.clone(),
             image_width,
             image_height,
             seen_share: coverage.map_or(1.0, |coverage| coverage.seen_share),

@@ -64,7 +64,7 @@ pub(in crate::api) async fn infer(
     let tokens = arrival.parts.extensions.get::<RequestTokens>().cloned();
     let (headers, body) = (arrival.parts.headers, arrival.body.into_bytes());
     let budget = state.uploads.for_client(&context.caller.client);
-    let max_bytes = state.options.max_body_bytes;
+    let max_bytes = state.options.settings.server.max_body_bytes;
     let read = move || {
         let body = decompressed(&headers, body, max_bytes, &budget)?;
         InferRequest::read(&headers, &body, &budget)
