@@ -54,7 +54,7 @@ const COMPARERS: [&str; 4] = [
 const REPEATED: [&str; 1] = ["::check_again("];
 const LASTING: [&str; 2] = [
     "src/api/routes/results/events.rs",
-    "src/api/routes/results/latest.rs",
+    "src/api/routes/results.rs",
 ];
 
 /// Calls that read the clock of the machine. Everything that waits or limits uses the monotonic

@@ -2,11 +2,8 @@
 
 mod counts;
 mod floor;
-mod frame_heat_map;
 mod furniture;
 mod heat_map;
-mod heat_map_image;
-mod removal;
 mod shared;
 mod suggested_area;
 mod time;
@@ -54,7 +51,7 @@ pub(crate) fn router(api: Api) -> Router {
 fn routes() -> OpenApiRouter<Shared> {
     OpenApiRouter::new()
         .routes(routes!(cameras))
-        .routes(routes!(counts::camera_counts, removal::delete))
+        .routes(routes!(counts::camera_counts, counts::delete))
         .routes(routes!(tracks::camera_tracks))
         .routes(routes!(floor::list))
         .routes(routes!(floor::acknowledge))
@@ -62,7 +59,7 @@ fn routes() -> OpenApiRouter<Shared> {
         .routes(routes!(furniture::confirm, furniture::take_back))
         .routes(routes!(heat_map::json_of_camera))
         .routes(routes!(heat_map::png_of_camera))
-        .routes(routes!(frame_heat_map::png))
+        .routes(routes!(heat_map::png_of_frame))
         .routes(routes!(suggested_area::get))
         .routes(routes!(counts::site_counts))
         .routes(routes!(tracks::site_tracks))

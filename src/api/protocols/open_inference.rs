@@ -4,7 +4,6 @@
 //!
 //! The only model, `lookdown`, accepts frames and returns their persons.
 
-mod answer;
 pub(in crate::api) mod describe;
 pub(in crate::api) mod infer;
 mod own_metadata;
