@@ -73,18 +73,7 @@ impl App {
             .collect::<Result<_, _>>()
             .context("the operating system creates no thread to watch files")
     }
-}
 
-/// Reads again what may change while the server runs. Clones share it.
-#[derive(Clone)]
-pub struct Reloader {
-    keys: Option<Arc<AccessKeys>>,
-    tls: Option<Arc<Tls>>,
-    calibrations: Arc<Calibrations>,
-    models: Arc<ModelRepository>,
-}
-
-impl App {
     /// The reloader of the files that the app uses.
     pub fn reloader(&self) -> Reloader {
         Reloader {
@@ -94,6 +83,15 @@ impl App {
             models: Arc::clone(&self.state.models),
         }
     }
+}
+
+/// Reads again what may change while the server runs. Clones share it.
+#[derive(Clone)]
+pub struct Reloader {
+    keys: Option<Arc<AccessKeys>>,
+    tls: Option<Arc<Tls>>,
+    calibrations: Arc<Calibrations>,
+    models: Arc<ModelRepository>,
 }
 
 impl Reloader {

@@ -155,47 +155,7 @@ impl Calibrations {
         // Guards no data that a panic could leave half changed.
         self.changing.lock()
     }
-}
 
-impl CalibrationLookup for Calibrations {
-    fn get(&self, id: &CalibrationId) -> Result<Option<Arc<Calibration>>, UnusableCalibration> {
-        let now = self.now();
-        if let Some(entry) = now.entry_or_sample(id) {
-            return Ok(Some(Arc::clone(&entry.calibration)));
-        }
-        match now.why_unusable(id) {
-            Some((file, problem)) => Err(UnusableCalibration {
-                place: format!("{}/{file}", self.store.place()),
-                problem,
-            }),
-            None => Ok(None),
-        }
-    }
-}
-
-/// The precondition of a change to a calibration.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum WriteCondition {
-    /// No precondition.
-    Always,
-    /// The calibration must not exist.
-    IfAbsent,
-    /// The calibration must exist.
-    IfPresent,
-    /// The calibration must exist at one of these revisions.
-    IfRevision(Vec<String>),
-}
-
-/// A calibration that was written.
-#[derive(Debug, Clone)]
-pub struct Put {
-    /// The calibration that serves now.
-    pub entry: Arc<CalibrationEntry>,
-    /// True when there was none before.
-    pub created: bool,
-}
-
-impl Calibrations {
     /// Reads `content` as the calibration `id`, by the rules of [`Calibrations::put`]; nothing is
     /// stored.
     ///
@@ -293,6 +253,44 @@ impl Calibrations {
         }
         self.scan(&changing).map_err(ChangeError::Unseen)
     }
+}
+
+impl CalibrationLookup for Calibrations {
+    fn get(&self, id: &CalibrationId) -> Result<Option<Arc<Calibration>>, UnusableCalibration> {
+        let now = self.now();
+        if let Some(entry) = now.entry_or_sample(id) {
+            return Ok(Some(Arc::clone(&entry.calibration)));
+        }
+        match now.why_unusable(id) {
+            Some((file, problem)) => Err(UnusableCalibration {
+                place: format!("{}/{file}", self.store.place()),
+                problem,
+            }),
+            None => Ok(None),
+        }
+    }
+}
+
+/// The precondition of a change to a calibration.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum WriteCondition {
+    /// No precondition.
+    Always,
+    /// The calibration must not exist.
+    IfAbsent,
+    /// The calibration must exist.
+    IfPresent,
+    /// The calibration must exist at one of these revisions.
+    IfRevision(Vec<String>),
+}
+
+/// A calibration that was written.
+#[derive(Debug, Clone)]
+pub struct Put {
+    /// The calibration that serves now.
+    pub entry: Arc<CalibrationEntry>,
+    /// True when there was none before.
+    pub created: bool,
 }
 
 impl LoadedFile {

@@ -50,18 +50,7 @@ impl Engine {
         self.inference
             .queue_pass(rig, model, frame, ticket, cached_views)
     }
-}
 
-impl Observation {
-    /// Returns the possible persons in the passes so far, highest score first.
-    fn possible_persons(&self) -> Vec<CropTarget> {
-        self.timeline.enter(Stage::Refine, Instant::now());
-        let (passes, rig) = (&self.passes, &self.camera.rig);
-        merge::possible_persons(passes, rig, self.profile, &self.tuning)
-    }
-}
-
-impl Engine {
     /// Queues upright crops of the frame around the targets and at the nadir.
     fn crop_pass(
         &self,
@@ -137,5 +126,14 @@ impl Engine {
         let camera = job.parameters.motion_camera();
         let cached = camera.and_then(|camera| self.motion_cache.detail_views(camera, &rig, &model));
         Some(self.queue_later(job, observation, rig, model, cached))
+    }
+}
+
+impl Observation {
+    /// Returns the possible persons in the passes so far, highest score first.
+    fn possible_persons(&self) -> Vec<CropTarget> {
+        self.timeline.enter(Stage::Refine, Instant::now());
+        let (passes, rig) = (&self.passes, &self.camera.rig);
+        merge::possible_persons(passes, rig, self.profile, &self.tuning)
     }
 }
