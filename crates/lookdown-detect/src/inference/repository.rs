@@ -15,7 +15,7 @@ use parking_lot::{Mutex, MutexGuard};
 
 use super::{
     error::InferenceError,
-    manifest::{FILE_NAME, ModelManifest, is_name},
+    manifest::{FILE_NAME, is_name},
     model::{Model, ModelFiles},
     registry::{ModelRegistry, RegistryFull},
     remote::RemoteServer,
@@ -262,11 +262,6 @@ pub fn model_names(folder: &Path) -> Vec<String> {
         elsewhere: None,
     };
     folder.names()
-}
-
-/// Returns true if a model's ONNX file exists. Weights are fetched, manifests are not.
-pub fn is_fetched(model: &Path) -> bool {
-    ModelManifest::locate(model).is_ok_and(|manifest| manifest.onnx.is_file())
 }
 
 /// A model that was not loaded. Every message is one sentence that includes the remedy.
