@@ -53,14 +53,9 @@ impl RotatedBox {
     /// Creates the oriented box of a detection, in a frame of `[width, height]` pixels. Returns
     /// `None` as [`RotatedBox::new`] does.
     pub fn from_oriented_box(oriented_box: &OrientedBox, frame: [u32; 2]) -> Option<Self> {
-        let OrientedBox {
-            center,
-            width,
-            height,
-            angle,
-            ..
-        } = *oriented_box;
-        Self::new([center.x, center.y, width, height], angle, frame)
+        let (center, angle) = (oriented_box.center, oriented_box.angle);
+        let sides = [oriented_box.width, oriented_box.height];
+        Self::new([center.x, center.y, sides[0], sides[1]], angle, frame)
     }
 
     /// The center, `[x, y]`, corner-origin frame pixels.

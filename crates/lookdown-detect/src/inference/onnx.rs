@@ -114,12 +114,7 @@ impl OnnxDetector {
             offset,
         };
         // The revision covers the settings of the manifest in addition to the weights.
-        let ModelManifest {
-            input: from,
-            output,
-            ..
-        } = &manifest;
-        let used = format!("{sha256} {from:?} {output:?}");
+        let used = format!("{sha256} {:?} {:?}", manifest.input, manifest.output);
         let description = ModelDescription {
             revision: revision_of(used.as_bytes()),
             bytes: bytes.len(),

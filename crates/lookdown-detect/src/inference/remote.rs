@@ -213,19 +213,14 @@ fn fetch<T: for<'de> Deserialize<'de>>(
 
 /// Checks that messages can repeat the name and the shape of a tensor.
 fn check_tensor(tensor: &TensorMetadata) -> Result<(), String> {
-    let TensorMetadata {
-        name,
-        datatype,
-        shape,
-    } = tensor;
-    let axes = shape.len();
+    let axes = tensor.shape.len();
     if axes > MAX_ENTRIES {
-        let name = Quoted(name);
+        let name = Quoted(&tensor.name);
         return Err(format!(
             "its tensor {name} has {axes} axes: at most {MAX_ENTRIES} are supported"
         ));
     }
-    if let Some(text) = [name, datatype]
+    if let Some(text) = [&tensor.name, &tensor.datatype]
         .into_iter()
         .find(|it| it.len() > MAX_NAME_BYTES)
     {

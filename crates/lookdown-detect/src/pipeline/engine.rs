@@ -312,13 +312,8 @@ impl Engine {
         observation: &Observation,
         refinement: &RefinementParameters,
     ) -> Vec<Person> {
-        let Observation {
-            passes,
-            profile,
-            tuning,
-            ..
-        } = observation;
-        merge::persons(passes, *profile, tuning, refinement)
+        let Observation { passes, tuning, .. } = observation;
+        merge::persons(passes, observation.profile, tuning, refinement)
     }
 
     /// Returns the camera's views in the motion cache, if the request enables motion detection.

@@ -96,11 +96,8 @@ pub(super) async fn infer(
     let mut headers = Vec::new();
     for (index, frame) in frames.into_iter().enumerate() {
         let ticket = context.caller.ticket_at(parameters.priority)?;
-        let ArrivalTimes {
-            received_at,
-            arrived,
-        } = times;
-        let job = DetectJob::sent(frame, parameters.clone(), ticket, received_at, arrived);
+        let parameters = parameters.clone();
+        let job = DetectJob::sent(frame, parameters, ticket, times.received_at, times.arrived);
         let tokens = tokens.as_ref().filter(|_| index > 0);
         let done = detect(state, context, job, tokens).await;
         let answered = done.map_err(|problem| {
