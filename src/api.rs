@@ -22,7 +22,11 @@ use axum::{
     routing::get,
 };
 use lookdown_detect::open_inference::HEAD_LENGTH;
-use lookdown_http::{csrf, header_limits, host, page_headers};
+use lookdown_http::{
+    csrf,
+    header_limits::{self, HeaderLimits},
+    host, page_headers,
+};
 use tower::{ServiceBuilder, util::option_layer};
 use tower_http::catch_panic::CatchPanicLayer;
 use utoipa::openapi::OpenApi;
@@ -33,7 +37,8 @@ use self::{
     detect::report::{PERSON_COUNT, SERVER_TIMING},
     http::{
         context::ContextSource,
-        cors, drain_body,
+        cors,
+        drain_body::{self, BodyLimits},
         envelope::{self, Envelope},
         rate_limit::{self, RateLimiter},
     },
@@ -127,7 +132,7 @@ fn metrics() -> OpenApiRouter<ApiState> {
 
 /// The router of the whole service.
 pub fn router(state: ApiState) -> Router {
-    let limiter = state.options.request_rate.map(RateLimiter::new);
+    let limiter = state.options.request_rate().map(RateLimiter::new);
     limited_router(state, limiter)
 }
 
@@ -137,7 +142,7 @@ pub fn in_process_router(state: ApiState) -> Router {
 }
 
 fn limited_router(state: ApiState, limiter: Option<RateLimiter>) -> Router {
-    let options = &state.options;
+    let (options, settings) = (&state.options, &state.options.settings);
     let origins = options.allowed_origins();
     let csrf = origins.as_ref().map(csrf::layer);
     let hosts = origins.map(|origins| from_fn_with_state(origins, csrf::require_host));
@@ -158,7 +163,7 @@ fn limited_router(state: ApiState, limiter: Option<RateLimiter>) -> Router {
     let router = clients
         .merge(deepstack::with_failures(deepstack))
         .merge(description)
-        .merge(operation(state.options.metrics_elsewhere));
+        .merge(operation(settings.server.metrics_listen.is_some()));
     with_common_layers(router.merge(pages()), state)
 }
 
@@ -191,20 +196,28 @@ fn with_common_layers(router: Router<ApiState>, state: ApiState) -> Router {
         contexts: ContextSource {
             tracer: options.tracer.clone(),
             access: options.access.clone(),
-            request_timeout: options.request_timeout,
+            request_timeout: options.settings.server.request_timeout,
         },
     };
-    let (body_limits, header_limits) = (options.body_limits(), options.header_limits());
+    let settings = &options.settings;
+    let body_limits = BodyLimits {
+        max_body_bytes: settings.server.max_body_bytes,
+        min_upload_bytes_per_second: settings.limits.min_upload_bytes_per_second,
+    };
+    let header_limits = HeaderLimits {
+        max_headers: settings.connections.max_headers,
+        max_header_bytes: settings.connections.max_header_bytes,
+    };
     let head_length = HeaderName::from_static(HEAD_LENGTH);
     let sent = [LAST_EVENT_ID, head_length.clone()];
     let read = [SERVER_TIMING, PERSON_COUNT, head_length];
-    let has_other_origins = !options.cors_origins.is_empty();
+    let has_other_origins = !settings.access.cors_origins.is_empty();
     let for_other_origins =
         has_other_origins.then(|| map_response(page_headers::for_other_origins));
     let layers = ServiceBuilder::new()
         .layer(from_fn_with_state(envelope, envelope::wrap))
         .layer(option_layer(cors::layer(
-            &options.cors_origins,
+            &settings.access.cors_origins,
             &sent,
             &read,
         )))

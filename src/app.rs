@@ -1,6 +1,5 @@
 //! The composition root: settings → engine → workers → service.
 
-mod api_options;
 mod models;
 mod pollers;
 mod serving;
@@ -9,20 +8,19 @@ use std::{sync::Arc, time::Duration};
 
 use anyhow::Context;
 use jiff::Timestamp;
+use lookdown_common::{InProcess, OwnCameras, ServerClient, ServerOptions};
+use lookdown_count::{PersonsByCamera, read_persons};
 use lookdown_detect::{
     inference::ModelRepository,
     parameters::DetectParameters,
     pipeline::{BatchOptions, DefaultModels, Engine, EngineOptions, WorkerPool},
 };
 use lookdown_imaging::decode::DecodeLimits;
-
-use lookdown_common::{InProcess, OwnCameras, ServerClient, ServerOptions};
-use lookdown_count::{PersonsByCamera, read_persons};
 use tokio::sync::watch;
 
 use crate::{
     access::AccessKeys,
-    api::{self, Access, ApiState, Companions, Readiness},
+    api::{self, Access, ApiOptions, ApiState, Companions, Readiness},
     calibration_store::{Calibrations, FolderStore},
     cameras::Cameras,
     metrics::Metrics,
@@ -37,12 +35,9 @@ use crate::{
     views::Views,
 };
 
+pub(crate) use models::onnx_options;
 pub use pollers::Reloader;
 pub use serving::Sockets;
-
-pub(crate) use models::onnx_options;
-
-use api_options::api_options;
 
 /// Longest time that the start waits for the calibrations. The rest is read while the server
 /// listens, and the server is ready after that.
@@ -94,7 +89,7 @@ fn assemble_with(
         rig_cache_bytes: settings.calibrations.cache_bytes,
     };
     let known = Arc::clone(&calibrations);
-    let registry = Arc::clone(models.registry());
+    let registry = Arc::clone(&models.registry);
     let engine = Engine::new(registry, Some(known), options, Arc::clone(&metrics.detect))
         .context("the operating system gives no threads")?;
     Ok(Assembly {
@@ -126,7 +121,7 @@ pub fn engine_for(settings: &Settings, requests: &[DetectParameters]) -> anyhow:
     let Assembly { engine, models, .. } = assembly;
     for request in requests {
         for name in engine.default_models().needed_by(request) {
-            if models.registry().get(name).is_none() {
+            if models.registry.get(name).is_none() {
                 models.load(name)?;
             }
         }
@@ -145,7 +140,7 @@ pub struct App {
     /// The MQTT publisher, if a broker is configured.
     publisher: Option<Publisher>,
     state: ApiState,
-    settings: Box<Settings>,
+    settings: Arc<Settings>,
 }
 
 impl App {
@@ -218,7 +213,15 @@ impl App {
                 Arc::clone(&views),
             )
         });
-        let options = api_options(&settings, views, access, companions, references, tracer);
+        let settings = Arc::new(settings);
+        let options = ApiOptions {
+            settings: Arc::clone(&settings),
+            views,
+            access,
+            companions,
+            references,
+            tracer,
+        };
         let state = ApiState::new(
             Arc::new(workers),
             models,
@@ -234,7 +237,7 @@ impl App {
             tls,
             publisher: publisher.transpose()?,
             state,
-            settings: Box::new(settings),
+            settings,
         })
     }
 

@@ -50,7 +50,7 @@ pub struct Cameras {
     /// The permits of tests.
     tests: Semaphore,
     /// The names of all cameras.
-    own: OwnCameras,
+    pub(crate) own: OwnCameras,
     metrics: Arc<Metrics>,
 }
 
@@ -67,11 +67,6 @@ impl Cameras {
             own,
             metrics,
         }
-    }
-
-    /// Returns the names of all cameras.
-    pub(crate) fn own(&self) -> &OwnCameras {
-        &self.own
     }
 
     /// Returns the viewers of the cameras.

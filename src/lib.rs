@@ -15,7 +15,6 @@ pub mod cameras;
 pub mod cli;
 pub mod metrics;
 pub mod mqtt;
-pub mod poller;
 pub mod probe;
 pub mod reference_counts;
 pub mod results;

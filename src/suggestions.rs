@@ -158,8 +158,8 @@ fn make_room(
     let places = cameras.iter().map(|(camera, observed)| Place {
         camera: camera.clone(),
         claim: own.claim(camera.as_str(), false),
-        last: observed.seen_at(),
-        is_silent: observed.seen_at().is_none_or(is_silent),
+        last: observed.seen_at,
+        is_silent: observed.seen_at.is_none_or(is_silent),
     });
     let claim = own.claim(newcomer.as_str(), false);
     let displaced = makes_room(claim, places);

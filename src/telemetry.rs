@@ -1,6 +1,5 @@
 //! Logs and traces. Metrics are in `metrics`.
 
-mod collector;
 mod logs;
 mod request_trace;
 mod tracer;

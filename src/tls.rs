@@ -3,24 +3,29 @@
 
 mod client;
 mod files;
-mod handshake;
 mod identity;
 
-use std::{num::NonZeroU64, sync::Arc};
+use std::{io, num::NonZeroU64, sync::Arc};
 
 use jiff::Timestamp;
+use lookdown_common::LogOnce;
 use lookdown_http::server::Handshake;
 use parking_lot::{Mutex, RwLock};
-use tokio::{net::TcpStream, time::timeout};
-use tokio_rustls::server::TlsStream;
+use rustls::ServerConfig;
+use tokio::{
+    io::{AsyncReadExt, AsyncWriteExt},
+    net::TcpStream,
+    time::timeout,
+};
+use tokio_rustls::{TlsAcceptor, server::TlsStream};
+
+use crate::metrics::Metrics;
+
+use files::TlsFiles;
+use identity::Identity;
 
 pub use client::ClientTls;
 pub use files::TlsOptions;
-
-use self::{files::TlsFiles, handshake::shake_hands, identity::Identity};
-use lookdown_common::LogOnce;
-
-use crate::metrics::Metrics;
 
 /// The current certificate and private key.
 pub struct Tls {
@@ -108,9 +113,6 @@ fn show(identity: &Identity, options: &TlsOptions, metrics: &Metrics) {
     }
 }
 
-#[cfg(test)]
-mod tests;
-
 impl Handshake for Tls {
     type Stream = TlsStream<TcpStream>;
 
@@ -135,3 +137,36 @@ impl Handshake for Tls {
         encrypted
     }
 }
+
+/// The first byte of a TLS record that holds a handshake (RFC 8446, section 5.1).
+const HANDSHAKE_RECORD: u8 = 22;
+/// The response to a plain HTTP request.
+const ANSWER_TO_PLAIN_HTTP: &[u8] = b"HTTP/1.1 400 Bad Request\r\n\
+    Content-Type: text/plain; charset=utf-8\r\nContent-Length: 63\r\nConnection: close\r\n\r\n\
+    This server speaks TLS: ask with https:// instead of http://.\r\n";
+/// Most bytes of a plain request that are discarded after the response.
+const MAX_IGNORED_BYTES: u64 = 1 << 20;
+
+/// Performs the handshake. A client that sends no TLS gets an HTTP response that says so.
+async fn shake_hands(
+    mut connection: TcpStream,
+    config: Arc<ServerConfig>,
+) -> io::Result<TlsStream<TcpStream>> {
+    let mut first = [0];
+    let read = connection.peek(&mut first).await?;
+    if read == 0 {
+        return Err(io::ErrorKind::UnexpectedEof.into());
+    }
+    if first != [HANDSHAKE_RECORD] {
+        connection.write_all(ANSWER_TO_PLAIN_HTTP).await?;
+        connection.shutdown().await?;
+        // A close with unread bytes would reset the connection and lose the response.
+        let mut rest = connection.take(MAX_IGNORED_BYTES);
+        tokio::io::copy(&mut rest, &mut tokio::io::sink()).await?;
+        return Err(io::Error::other("its first byte is not TLS"));
+    }
+    TlsAcceptor::from(config).accept(connection).await
+}
+
+#[cfg(test)]
+mod tests;

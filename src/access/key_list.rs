@@ -1,18 +1,32 @@
 //! The keys of a file or of the environment. No error repeats the input: it may be a key in the
 //! wrong position.
+//!
+//! API keys, and their digests.
+//!
+//! A key is 256 random bits and cannot be guessed. A plain SHA-256 therefore keeps it safe in a
+//! stolen file, and its check takes a microsecond (docs/adr/0004-api-keys.md).
 
-use std::{collections::BTreeMap, fmt, str::FromStr};
+use std::{
+    collections::BTreeMap,
+    fmt,
+    path::{Path, PathBuf},
+    str::FromStr,
+    sync::Arc,
+};
 
 use anyhow::{Context, anyhow, bail, ensure};
-use lookdown_common::plain_name::is_plain;
-use lookdown_detect::fairness::PriorityLevel;
-use serde::Deserialize;
-use subtle::{Choice, ConditionallySelectable};
-
-use super::{
-    digest::KeyDigest,
-    scope::{Scope, Scopes},
+use lookdown_common::{
+    LogOnce,
+    files::{self, MAX_SETTINGS_BYTES},
+    plain_name::is_plain,
 };
+use lookdown_detect::fairness::PriorityLevel;
+use parking_lot::{Mutex, RwLock};
+use serde::Deserialize;
+use sha2::{Digest, Sha256};
+use subtle::{Choice, ConditionallySelectable, ConstantTimeEq};
+
+use super::scope::{Scope, Scopes};
 
 /// Most keys: every request is compared with all of them.
 const MAX_KEYS: usize = 1000;
@@ -216,6 +230,131 @@ fn wrong_priority(position: usize) -> String {
         PriorityLevel::LOWEST,
         PriorityLevel::DEFAULT
     )
+}
+
+/// The prefix of keys, by which secret scanners recognize them.
+const PREFIX: &str = "lookdown_";
+const BYTES: usize = 32;
+
+/// Returns a new random key: `lookdown_` and 64 hexadecimal digits.
+///
+/// # Errors
+/// If the operating system returns no random numbers.
+pub fn new_key() -> Result<String, getrandom::Error> {
+    let mut bytes = [0; BYTES];
+    getrandom::fill(&mut bytes)?;
+    Ok(format!("{PREFIX}{}", hex::encode(bytes)))
+}
+
+/// The SHA-256 of a key. Its `Debug` output shows nothing of it.
+#[derive(Clone)]
+pub struct KeyDigest([u8; BYTES]);
+
+impl KeyDigest {
+    /// Computes the digest of a key as it was sent.
+    pub fn new(key: &[u8]) -> Self {
+        Self(Sha256::digest(key).into())
+    }
+
+    /// Parses a digest of 64 hexadecimal digits.
+    pub fn parse(text: &str) -> Option<Self> {
+        let mut bytes = [0; BYTES];
+        hex::decode_to_slice(text, &mut bytes).ok()?;
+        Some(Self(bytes))
+    }
+
+    /// Returns the digest as 64 hexadecimal digits.
+    pub fn hexadecimal(&self) -> String {
+        hex::encode(self.0)
+    }
+
+    /// Compares in constant time.
+    pub(super) fn equals(&self, other: &Self) -> Choice {
+        self.0.ct_eq(&other.0)
+    }
+}
+
+impl PartialEq for KeyDigest {
+    fn eq(&self, other: &Self) -> bool {
+        self.equals(other).into()
+    }
+}
+
+impl fmt::Debug for KeyDigest {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("KeyDigest(…)")
+    }
+}
+
+/// The current keys.
+#[derive(Debug)]
+pub struct AccessKeys {
+    /// The keys that do not depend on the file.
+    lasting: KeyList,
+    file: Option<PathBuf>,
+    known: RwLock<Arc<KeyList>>,
+    /// The last logged problem of the file. Locked while the file is read.
+    problem_log: Mutex<LogOnce>,
+}
+
+impl AccessKeys {
+    /// Creates the keys of `lasting` and of `file`, if one is given.
+    ///
+    /// # Errors
+    /// If the file cannot be used.
+    pub fn open(lasting: KeyList, file: Option<&Path>) -> anyhow::Result<Self> {
+        let known = match file {
+            Some(file) => read(file, &lasting)?,
+            None => lasting.clone(),
+        };
+        Ok(Self {
+            lasting,
+            file: file.map(Path::to_owned),
+            known: RwLock::new(Arc::new(known)),
+            problem_log: Mutex::default(),
+        })
+    }
+
+    /// Reads the file again. If it cannot be used, the keys stay unchanged, and the reason is
+    /// logged once.
+    pub fn refresh(&self) {
+        let Some(file) = &self.file else { return };
+        let mut problem_log = self.problem_log.lock();
+        match read(file, &self.lasting) {
+            Ok(list) => {
+                problem_log.clear();
+                if *self.known() != list {
+                    tracing::info!(keys = list.len(), "the keys have changed");
+                    *self.known.write() = Arc::new(list);
+                }
+            }
+            Err(error) => {
+                let problem = error.to_string();
+                if problem_log.should_log(&problem) {
+                    tracing::error!("{problem}; the previous keys stay in use");
+                }
+            }
+        }
+    }
+
+    /// Returns the holder of this key, or `None` if the key is unknown.
+    pub fn holder_of(&self, key: &[u8]) -> Option<Holder> {
+        self.known().holder_of(key).cloned()
+    }
+
+    /// The keys that are known now.
+    pub fn known(&self) -> Arc<KeyList> {
+        Arc::clone(&self.known.read())
+    }
+}
+
+fn read(path: &Path, lasting: &KeyList) -> anyhow::Result<KeyList> {
+    let (key, file) = ("access.keys_file", path.display());
+    let text = files::read_text(path, MAX_SETTINGS_BYTES).map_err(|cause| {
+        anyhow!("{key}: {file} cannot be read ({cause}): check its path and its permissions")
+    })?;
+    let list = KeyList::from_toml(&text).and_then(|list| lasting.clone().with(&list));
+    list.map_err(|problem| anyhow!("{key}: {file} cannot be used: {problem}"))
 }
 
 #[cfg(test)]

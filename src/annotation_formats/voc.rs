@@ -22,7 +22,7 @@ pub(super) const FORMAT: FormatSpec = FormatSpec {
 /// The list of the images, as datumaro needs it.
 fn others(images: &[AnnotatedImage]) -> Vec<AnnotationFile> {
     let names = images.iter().map(|image| stem(&image.file_name));
-    let names: String = names.map(|name| format!("{name}\n")).collect();
+    let names: String = names.flat_map(|name| [name, "\n"]).collect();
     vec![file("ImageSets/Main/default.txt", names)]
 }
 

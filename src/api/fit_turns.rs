@@ -76,7 +76,7 @@ mod tests {
         else {
             panic!("other turns");
         };
-        assert_eq!(refused.kind(), ProblemKind::Overloaded);
+        assert_eq!(refused.kind, ProblemKind::Overloaded);
         drop(running);
         let second = waiting[1].as_mut().poll(&mut context);
         assert!(matches!(second, Poll::Ready(Ok(_))));

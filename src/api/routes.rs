@@ -30,7 +30,7 @@ pub(super) fn client_routes() -> OpenApiRouter<ApiState> {
             calibrations::views::get_views,
             calibrations::views::try_views
         ))
-        .routes(routes!(calibrations::fit::fit))
+        .routes(routes!(calibrations::fit))
         .routes(routes!(cameras::list))
         .routes(routes!(
             cameras::get,
@@ -56,10 +56,10 @@ pub(super) fn client_routes() -> OpenApiRouter<ApiState> {
             cameras::reference_counts::delete
         ))
         .routes(routes!(results::list))
-        .routes(routes!(results::delete::delete))
-        .routes(routes!(results::latest::get_latest))
-        .routes(routes!(results::latest::get_latest_image))
-        .routes(routes!(results::history::get_history))
+        .routes(routes!(results::delete))
+        .routes(routes!(results::get_latest))
+        .routes(routes!(results::get_latest_image))
+        .routes(routes!(results::get_history))
         .routes(routes!(results::events::camera_events))
         .routes(routes!(results::events::all_events))
 }

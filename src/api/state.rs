@@ -1,7 +1,6 @@
 //! The shared state of the handlers.
 
 use std::{
-    num::NonZeroU64,
     ops::Deref,
     sync::Arc,
     time::{Duration, Instant},
@@ -10,12 +9,9 @@ use std::{
 use lookdown_detect::{
     fairness::SharedBudget,
     inference::ModelRepository,
-    parameters::DetectDefaults,
     pipeline::{PipelineError, WorkerPool},
 };
-use lookdown_http::{csrf::AllowedOrigins, header_limits::HeaderLimits};
-use lookdown_imaging::{annotate::Concealment, decode::DecodeLimits};
-use lookdown_lens::self_calibration::IdealLens;
+use lookdown_http::csrf::AllowedOrigins;
 
 use super::{
     companions::Companions,
@@ -23,7 +19,6 @@ use super::{
     http::{
         access::Access,
         context::RequestContext,
-        drain_body::BodyLimits,
         problem::{Problem, ProblemKind},
         rate_limit::RequestRate,
         request_body::{BodyReader, UploadBudget},
@@ -34,7 +29,8 @@ use crate::{
     calibration_store::Calibrations,
     metrics::Metrics,
     reference_counts::ReferenceCounts,
-    results::{Headline, ImagesOf, ResultStore, StoredReport, Unreachable},
+    results::{Headline, ResultStore, StoredReport, Unreachable},
+    settings::Settings,
     suggestions::Suggestions,
     telemetry::Tracer,
     views::Views,
@@ -43,50 +39,15 @@ use crate::{
 /// Divisor of `max_upload_bytes` for the memory of bodies whose key has not been checked.
 const UNAUTHENTICATED_SHARE: usize = 8;
 
-/// The options of the API: access rules and limits.
+/// The options of the API: the settings, and what was made of them.
 #[derive(Clone)]
-#[expect(clippy::struct_excessive_bools, reason = "independent settings")]
 pub struct ApiOptions {
-    /// Largest request body, bytes.
-    pub max_body_bytes: usize,
-    /// Largest sum of all request bodies, and of the tensors unpacked from them, in memory, bytes.
-    pub max_upload_bytes: usize,
-    /// Largest head of a request, bytes.
-    pub max_header_bytes: usize,
-    /// Largest number of headers of a request.
-    pub max_headers: usize,
-    /// The defaults of detection parameters.
-    pub detect_defaults: DetectDefaults,
-    /// `true` if the number of persons in each zone is a metric.
-    pub zone_metrics: bool,
-    /// `true` if the number of persons of each camera is a metric.
-    pub camera_metrics: bool,
-    /// The cameras whose latest image is stored.
-    pub images_of: Arc<ImagesOf>,
-    /// Longest time that these images are stored.
-    pub image_age: Duration,
-    /// The concealment of persons in these images.
-    pub conceal_images: Option<Concealment>,
-    /// The lens of cameras without a calibration, if it is known.
-    pub lens: Option<IdealLens>,
-    /// `true` if calibrations that are found for cameras without one are stored.
-    pub apply_suggested_calibrations: bool,
-    /// `true` if the metrics have a port of their own.
-    pub metrics_elsewhere: bool,
-    /// Longest duration of a request, from its first byte to its response.
-    pub request_timeout: Duration,
-    /// Least upload rate of a request body; `None` for no limit.
-    pub min_upload_bytes_per_second: Option<NonZeroU64>,
-    /// Rate limit of each client; `None` for no limit.
-    pub request_rate: Option<RequestRate>,
+    /// The settings.
+    pub settings: Arc<Settings>,
     /// The straight views of cameras.
     pub views: Arc<Views>,
     /// The access rules.
     pub access: Access,
-    /// Origins of web pages that may call the server from a browser.
-    pub cors_origins: Vec<String>,
-    /// Further names of a server without keys.
-    pub hosts: Vec<String>,
     /// The cameras and counts of this process, and the counts of another host.
     pub companions: Companions,
     /// The reference counts of cameras.
@@ -96,62 +57,18 @@ pub struct ApiOptions {
 }
 
 impl ApiOptions {
-    /// The limits of request bodies.
-    pub(super) fn body_limits(&self) -> BodyLimits {
-        BodyLimits {
-            max_body_bytes: self.max_body_bytes,
-            min_upload_bytes_per_second: self.min_upload_bytes_per_second,
-        }
-    }
-
-    /// The limits of request heads.
-    pub(super) fn header_limits(&self) -> HeaderLimits {
-        HeaderLimits {
-            max_headers: self.max_headers,
-            max_header_bytes: self.max_header_bytes,
-        }
-    }
-
     /// The origins that may make changes; `None` if there are keys.
     pub(super) fn allowed_origins(&self) -> Option<AllowedOrigins> {
-        self.access.allowed_origins(&self.cors_origins, &self.hosts)
+        self.access.allowed_origins(&self.settings.access)
     }
 
-    /// Returns the time without progress of the workers after which the server is not ready. Each
-    /// request ends within half of it.
-    pub fn stall_limit(&self) -> Duration {
-        self.request_timeout * 2
-    }
-
-    /// Options for tests: small bodies, and no access control.
-    pub fn for_testing() -> Self {
-        Self {
-            max_body_bytes: 1 << 20,
-            max_upload_bytes: 1 << 24,
-            max_header_bytes: 4096,
-            max_headers: 32,
-            detect_defaults: DetectDefaults::default(),
-            zone_metrics: false,
-            camera_metrics: false,
-            images_of: Arc::default(),
-            image_age: Duration::from_hours(24),
-            conceal_images: None,
-            lens: None,
-            apply_suggested_calibrations: false,
-            metrics_elsewhere: false,
-            request_timeout: Duration::from_secs(20),
-            min_upload_bytes_per_second: None,
-            request_rate: None,
-            views: Arc::new(Views::new("state".into(), DecodeLimits::default(), None)),
-            access: Access::Open {
-                own_machine_only: true,
-            },
-            cors_origins: Vec::new(),
-            hosts: Vec::new(),
-            companions: Companions::default(),
-            references: Arc::default(),
-            tracer: Tracer::default(),
-        }
+    /// The rate limit of each client; `None` for no limit.
+    pub(super) fn request_rate(&self) -> Option<RequestRate> {
+        let limits = &self.settings.limits;
+        limits.requests_per_second.map(|per_second| RequestRate {
+            per_second,
+            burst: limits.request_burst,
+        })
     }
 }
 
@@ -199,9 +116,9 @@ impl ApiState {
         }
         let suggestions = Suggestions::new(
             Arc::clone(&calibrations),
-            workers.engine().options().decode_limits,
-            options.lens,
-            options.apply_suggested_calibrations,
+            workers.engine().options.decode_limits,
+            options.settings.calibrations.lens,
+            options.settings.calibrations.apply_suggested,
             options.companions.own_cameras(),
         );
         Self(Arc::new(Shared {
@@ -212,16 +129,16 @@ impl ApiState {
             metrics,
             readiness,
             uploads: UploadBudget::new(
-                options.max_upload_bytes,
-                options.max_body_bytes,
+                options.settings.limits.max_upload_bytes,
+                options.settings.server.max_body_bytes,
                 "send fewer at a time, or retry",
             ),
             unauthenticated_uploads: UploadBudget::new(
-                options.max_upload_bytes / UNAUTHENTICATED_SHARE,
+                options.settings.limits.max_upload_bytes / UNAUTHENTICATED_SHARE,
                 1,
                 "send the key in a header, X-API-Key: KEY, or retry",
             ),
-            responses: SharedBudget::new(options.max_upload_bytes),
+            responses: SharedBudget::new(options.settings.limits.max_upload_bytes),
             references: Arc::clone(&options.references),
             suggestions,
             fits: FitTurns::default(),
@@ -231,7 +148,7 @@ impl ApiState {
 
     /// Returns true if the latest image of the camera is kept.
     pub(super) fn keeps_image(&self, camera: &str) -> bool {
-        let of_settings = self.options.images_of.include(camera);
+        let of_settings = self.options.settings.results.images_of.include(camera);
         let cameras = self.options.companions.cameras();
         of_settings || cameras.is_some_and(|cameras| cameras.keeps_image(camera))
     }
@@ -245,7 +162,7 @@ impl ApiState {
 
     /// Returns the problem while the server is not ready.
     pub(super) fn require_ready(&self) -> Result<(), Problem> {
-        let limit = self.options.stall_limit();
+        let limit = self.stall_limit();
         if let Some(stall) = self.workers.stall(Instant::now(), limit) {
             let seconds = stall.since.as_secs();
             let detail = format!(
@@ -254,18 +171,19 @@ impl ApiState {
             );
             return Err(Problem::new(ProblemKind::Stalled, detail));
         }
-        let remote = self.models.remote();
+        let remote = &self.models.remote;
         match self.readiness.phase() {
-            Phase::Ready if remote.is_none_or(|remote| remote.is_available()) => Ok(()),
+            Phase::Ready if remote.as_ref().is_none_or(|remote| remote.is_available()) => Ok(()),
             Phase::Ready => Err(PipelineError::InferenceUnavailable.into()),
             Phase::WarmingUp => Err(Problem::warming_up()),
             Phase::Stopping => Err(Problem::shutting_down()),
         }
     }
 
-    /// Returns the time without progress of the workers after which the server is not ready.
+    /// Returns the time without progress of the workers after which the server is not ready. Each
+    /// request ends within half of it.
     pub fn stall_limit(&self) -> Duration {
-        self.options.stall_limit()
+        self.options.settings.server.request_timeout * 2
     }
 
     /// Returns a reader of the body of a request, up to `max_bytes`; `remedy` is the advice for
@@ -280,7 +198,7 @@ impl ApiState {
             max_bytes,
             remedy,
             budget: self.uploads.for_client(&context.caller.client),
-            least_bytes_per_second: self.options.min_upload_bytes_per_second,
+            least_bytes_per_second: self.options.settings.limits.min_upload_bytes_per_second,
             deadline: context.deadline,
         }
     }

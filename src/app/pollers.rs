@@ -2,13 +2,22 @@
 //!
 //! The reload that SIGHUP requests: the files that the pollers check, at once.
 
-use std::{num::NonZeroU64, sync::Arc, time::Instant};
+use std::{
+    io,
+    num::NonZeroU64,
+    sync::{
+        Arc,
+        mpsc::{RecvTimeoutError, SyncSender, sync_channel},
+    },
+    thread,
+    time::{Duration, Instant},
+};
 
 use anyhow::Context;
 use lookdown_detect::inference::ModelRepository;
 
 use super::App;
-use crate::{access::AccessKeys, calibration_store::Calibrations, poller::Poller, tls::Tls};
+use crate::{access::AccessKeys, calibration_store::Calibrations, tls::Tls};
 
 /// Interval of the checks of the inference server, seconds.
 const REMOTE_EVERY: NonZeroU64 = NonZeroU64::MIN;
@@ -47,7 +56,7 @@ impl App {
         });
         let results = Arc::clone(&self.state.results);
         let expiry = Poller::start("result-expiry", EXPIRY_EVERY, move || results.expire());
-        let remote = self.state.models.remote().cloned();
+        let remote = self.state.models.remote.clone();
         let remote_poller = remote.map(|remote| {
             Poller::start("remote-watcher", REMOTE_EVERY, move || {
                 remote.check_health();
@@ -64,18 +73,7 @@ impl App {
             .collect::<Result<_, _>>()
             .context("the operating system creates no thread to watch files")
     }
-}
 
-/// Reads again what may change while the server runs. Clones share it.
-#[derive(Clone)]
-pub struct Reloader {
-    keys: Option<Arc<AccessKeys>>,
-    tls: Option<Arc<Tls>>,
-    calibrations: Arc<Calibrations>,
-    models: Arc<ModelRepository>,
-}
-
-impl App {
     /// The reloader of the files that the app uses.
     pub fn reloader(&self) -> Reloader {
         Reloader {
@@ -85,6 +83,15 @@ impl App {
             models: Arc::clone(&self.state.models),
         }
     }
+}
+
+/// Reads again what may change while the server runs. Clones share it.
+#[derive(Clone)]
+pub struct Reloader {
+    keys: Option<Arc<AccessKeys>>,
+    tls: Option<Arc<Tls>>,
+    calibrations: Arc<Calibrations>,
+    models: Arc<ModelRepository>,
 }
 
 impl Reloader {
@@ -105,5 +112,54 @@ impl Reloader {
             "SIGHUP: the files of keys, certificates, calibrations and models were checked for \
              changes"
         );
+    }
+}
+
+/// A named thread that runs a task. Dropping it ends the thread after the current run, and does not
+/// wait for that: a run may take as long as a store or a server does not answer.
+pub(super) struct Poller {
+    /// Dropping it ends the thread.
+    _alive: SyncSender<()>,
+}
+
+impl Poller {
+    /// Starts the thread, which runs `task` at this interval.
+    ///
+    /// # Errors
+    /// If the operating system creates no thread.
+    fn start(
+        name: &str,
+        seconds: NonZeroU64,
+        task: impl Fn() + Send + 'static,
+    ) -> io::Result<Self> {
+        let (alive, ended) = sync_channel::<()>(0);
+        let pause = Duration::from_secs(seconds.get());
+        thread::Builder::new()
+            .name(name.to_owned())
+            .spawn(move || {
+                while ended.recv_timeout(pause) == Err(RecvTimeoutError::Timeout) {
+                    task();
+                }
+            })?;
+        Ok(Self { _alive: alive })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dropping_a_poller_does_not_wait_for_a_stuck_run() {
+        let (done, stuck) = sync_channel::<()>(0);
+        let (start, started) = sync_channel(0);
+        let poller = Poller::start("stuck", NonZeroU64::MIN, move || {
+            // Both ends are there until the end of the test.
+            let _ = start.send(());
+            let _ = stuck.recv();
+        });
+        started.recv().unwrap();
+        drop(poller.unwrap());
+        drop(done);
     }
 }

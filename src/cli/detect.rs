@@ -1,10 +1,10 @@
 //! `lookdown detect`
 
 mod image_files;
-mod labels;
 pub(super) mod stream;
 
 use std::{
+    collections::HashMap,
     fs,
     io::{self, Write},
     path::{Path, PathBuf},
@@ -23,26 +23,24 @@ use lookdown_calibration::{Calibration, CalibrationId};
 use lookdown_common::files;
 use lookdown_detect::{
     parameters::DetectParameters,
-    pipeline::{DetectJob, DetectedFrame, Engine, JobImage},
+    pipeline::{DetectJob, DetectedFrame, DetectionReport, Engine, JobImage},
 };
 use strum::VariantArray;
 
-use self::{
-    image_files::{ImageFile, image_files},
-    labels::Labels,
-    stream::{Stream, StreamReader, interval},
-};
 use super::{
     SettingsFile, annotate,
+    output::{UNWRITABLE, with_causes},
     parameters::{AnnotationFlags, ParameterFlags},
     progress::Progress,
 };
-use crate::cli::output::{UNWRITABLE, with_causes};
 use crate::{
-    annotation_formats::{AnnotationFormat, BoxKind},
+    annotation_formats::{AnnotatedImage, AnnotationFormat, BoxKind},
     api::to_report,
     app::engine_for,
 };
+
+use image_files::{ImageFile, image_files};
+use stream::{Stream, StreamReader, interval};
 
 /// Arguments of `lookdown detect`.
 #[derive(Debug, Args)]
@@ -283,4 +281,67 @@ fn detect(
 fn print(detected: &DetectedFrame) -> anyhow::Result<()> {
     let report = serde_json::to_string(&to_report(&detected.report))?;
     writeln!(io::stdout(), "{report}").context(UNWRITABLE)
+}
+
+/// The annotations of one run.
+struct Labels {
+    format: AnnotationFormat,
+    boxes: BoxKind,
+    folder: PathBuf,
+    images: Vec<AnnotatedImage>,
+}
+
+impl Labels {
+    /// No annotations yet. Looking takes long, so that what would fail at the end fails now.
+    ///
+    /// # Errors
+    /// Returns an error if two images would share a name or a file, or `folder` cannot be made.
+    fn start(
+        format: AnnotationFormat,
+        boxes: BoxKind,
+        folder: &Path,
+        image_files: &[ImageFile],
+    ) -> anyhow::Result<Self> {
+        let mut taken: HashMap<String, &Path> = HashMap::new();
+        for image_file in image_files {
+            let own_file = format.own_file(&image_file.name);
+            let place = own_file.unwrap_or_else(|| image_file.name.clone());
+            if let Some(other) = taken.insert(place, &image_file.path) {
+                bail!(
+                    "--format {format}: {} and {} would share their annotations: rename one, or \
+                     name the folder above both",
+                    other.display(),
+                    image_file.path.display()
+                );
+            }
+        }
+        fs::create_dir_all(folder).with_context(|| unwritable(folder))?;
+        Ok(Self {
+            format,
+            boxes,
+            folder: folder.to_owned(),
+            images: Vec::with_capacity(image_files.len()),
+        })
+    }
+
+    /// Takes in what was found in an image.
+    fn add(&mut self, image_file: &ImageFile, report: &DetectionReport) {
+        let image = AnnotatedImage::new(report, image_file.name.clone());
+        self.images.push(image);
+    }
+
+    /// Writes the files.
+    fn write(&self) -> anyhow::Result<()> {
+        for file in self.format.files(&self.images, self.boxes) {
+            let path = self.folder.join(&file.path);
+            let folder = path.parent().unwrap_or(&self.folder);
+            fs::create_dir_all(folder).with_context(|| unwritable(folder))?;
+            fs::write(&path, file.content).with_context(|| unwritable(&path))?;
+        }
+        Ok(())
+    }
+}
+
+fn unwritable(path: &Path) -> String {
+    format!("--out: {} cannot be written", path.display())
 }

@@ -2,7 +2,6 @@
 
 mod check;
 mod list;
-mod manifest;
 
 use std::process::ExitCode;
 

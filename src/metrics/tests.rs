@@ -51,7 +51,7 @@ fn at_most_a_thousand_zones_are_shown_until_they_are_removed() {
             names.iter().map(|name| (name.as_str(), 1)),
         );
     }
-    assert_eq!(shown().len(), camera_gauges::MAX_ROWS);
+    assert_eq!(shown().len(), MAX_ROWS);
 }
 
 #[test]

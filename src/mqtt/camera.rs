@@ -28,7 +28,7 @@ pub(super) struct Delays {
 /// A camera with a report.
 #[derive(Debug)]
 pub(super) struct Camera {
-    name: String,
+    pub(super) name: String,
     /// The headline number.
     number: NumberWithBar,
     /// The number of its latest frame.
@@ -39,8 +39,8 @@ pub(super) struct Camera {
     views: StoredViews,
     attributes: Attributes,
     /// The time at which it becomes unavailable.
-    expires_at: Option<Instant>,
-    is_available: bool,
+    pub(super) expires_at: Option<Instant>,
+    pub(super) is_available: bool,
 }
 
 #[derive(Debug)]
@@ -205,19 +205,6 @@ impl Camera {
         let zones = self.zones.iter().filter_map(|zone| zone.occupancy.off_at());
         let others = expiry.into_iter().chain(self.occupancy.off_at());
         zones.chain(others).min()
-    }
-
-    /// The time at which it becomes, or became, unavailable.
-    pub(super) fn expires_at(&self) -> Option<Instant> {
-        self.expires_at
-    }
-
-    pub(super) fn name(&self) -> &str {
-        &self.name
-    }
-
-    pub(super) fn is_available(&self) -> bool {
-        self.is_available
     }
 
     /// Sets the views whose images are published. Returns the messages: none without a change.

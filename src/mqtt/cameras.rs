@@ -119,9 +119,9 @@ impl Cameras {
     fn displaced(&mut self, claim: Claim) -> Option<Camera> {
         let places = self.known.iter().map(|(key, camera)| Place {
             camera: key.clone(),
-            claim: self.own.claim(camera.name(), false),
-            last: camera.expires_at(),
-            is_silent: !camera.is_available(),
+            claim: self.own.claim(&camera.name, false),
+            last: camera.expires_at,
+            is_silent: !camera.is_available,
         });
         let key = makes_room(claim, places)?;
         self.known.remove(&key)
@@ -143,9 +143,9 @@ impl Cameras {
     pub(super) fn update_views(&mut self, views: &Views) -> Vec<Message> {
         let (topics, discovery) = (&self.topics, &self.discovery);
         let known = self.known.values_mut();
-        let shown = known.filter(|camera| discovery.images.include(camera.name()));
+        let shown = known.filter(|camera| discovery.images.include(&camera.name));
         let messages = shown.flat_map(|camera| {
-            let views = views.list(camera.name());
+            let views = views.list(&camera.name);
             camera.set_views(views, topics, discovery)
         });
         messages.collect()
@@ -153,8 +153,8 @@ impl Cameras {
 
     /// The names of the cameras that send frames.
     pub(super) fn available(&self) -> Vec<String> {
-        let known = self.known.values().filter(|camera| camera.is_available());
-        known.map(|camera| camera.name().to_owned()).collect()
+        let known = self.known.values().filter(|camera| camera.is_available);
+        known.map(|camera| camera.name.clone()).collect()
     }
 
     /// Makes the paused cameras of this process unavailable: their last number is not the present
@@ -162,7 +162,7 @@ impl Cameras {
     pub(super) fn pause(&mut self, now: Instant) -> Vec<Message> {
         let (topics, own) = (&self.topics, &self.own);
         let known = self.known.values_mut();
-        let paused = known.filter(|camera| camera.is_available() && own.is_paused(camera.name()));
+        let paused = known.filter(|camera| camera.is_available && own.is_paused(&camera.name));
         paused.flat_map(|camera| camera.end(now, topics)).collect()
     }
 
@@ -176,7 +176,7 @@ impl Cameras {
         let (topics, delays) = (&self.topics, &self.delays);
         let camera = self.known.get_mut(&level(camera));
         camera
-            .filter(|camera| camera.is_available())
+            .filter(|camera| camera.is_available)
             .and_then(|camera| {
                 let is_changed = camera.set_number(number, now, delays);
                 is_changed.then(|| [camera.state(topics), vec![camera.attributes(topics)]].concat())
@@ -230,7 +230,7 @@ impl Cameras {
             (CameraTopic::Persons { camera }, None) => self.retained.keep(camera),
             // Another server does not have it.
             (CameraTopic::Availability { .. }, Some(camera))
-                if camera.is_available() && payload == OFFLINE.as_bytes() =>
+                if camera.is_available && payload == OFFLINE.as_bytes() =>
             {
                 return Some(camera.availability(&self.topics));
             }

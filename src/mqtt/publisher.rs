@@ -162,7 +162,7 @@ impl Publication {
         mut queue: Queue,
         mut images: mpsc::Receiver<CameraImage>,
     ) {
-        let own = self.switched.as_ref().map(|cameras| cameras.own().clone());
+        let own = self.switched.as_ref().map(|cameras| cameras.own.clone());
         let own = own.unwrap_or_default();
         let mut cameras = Cameras::new(
             self.topics.clone(),

@@ -1,16 +1,22 @@
 //! Reports in the memory of this process.
+//!
+//! Reports in memory, and their eviction when a limit is exceeded.
+//!
+//! The latest image of each camera that has one.
 
-mod kept;
-
-use std::{num::NonZeroUsize, sync::Arc};
+use std::{
+    collections::{BTreeMap, HashMap, VecDeque},
+    num::NonZeroUsize,
+    ops::Bound::{Excluded, Unbounded},
+    sync::Arc,
+};
 
 use async_trait::async_trait;
-use jiff::Timestamp;
+use jiff::{SignedDuration, Timestamp};
 use lookdown_common::OwnCameras;
 use lookdown_detect::fairness::Client;
 use parking_lot::{Mutex, MutexGuard};
 
-use self::kept::BoundedReports;
 use super::{
     Cameras, ListenError, Listeners, Listening, NewReport, ReportId, ResultLimits, ResultStore,
     ResultUse, StoreHealth, StoredImage, StoredReport, Unreachable,
@@ -137,3 +143,257 @@ impl ResultStore for MemoryResults {
 
     async fn flush(&self) {}
 }
+
+/// Reports within the limits. Every report is in `cameras`, and in exactly one of `latest` and
+/// `earlier`.
+#[derive(Debug)]
+struct BoundedReports {
+    limits: ResultLimits,
+    /// Cameras that others do not displace.
+    own: OwnCameras,
+    /// The reports of each camera, oldest first, at least one.
+    cameras: HashMap<String, VecDeque<Arc<StoredReport>>>,
+    /// The latest report of every camera.
+    latest: BTreeMap<ReportId, Arc<StoredReport>>,
+    /// All other reports.
+    earlier: BTreeMap<ReportId, Arc<StoredReport>>,
+    images: Images,
+    bytes: usize,
+    newest: ReportId,
+    /// The number of cameras that were removed.
+    removed_cameras: u64,
+}
+
+impl BoundedReports {
+    fn new(limits: ResultLimits) -> Self {
+        Self {
+            images: Images::new(limits.max_images),
+            limits,
+            own: OwnCameras::default(),
+            cameras: HashMap::new(),
+            latest: BTreeMap::new(),
+            earlier: BTreeMap::new(),
+            bytes: 0,
+            newest: ReportId::default(),
+            removed_cameras: 0,
+        }
+    }
+
+    /// Keeps a report, and evicts reports until all limits hold.
+    fn add(
+        &mut self,
+        report: NewReport,
+        image: Option<StoredFrame>,
+        now: Timestamp,
+    ) -> Arc<StoredReport> {
+        let id = ReportId::next(self.newest, now);
+        let stored = Arc::new(StoredReport { id, report });
+        self.newest = id;
+        self.bytes += stored.report.bytes();
+        let camera = &stored.report.camera;
+        self.images.replace(camera, id, image, &self.own);
+        let reports = self.cameras.entry(camera.clone()).or_default();
+        if let Some(before) = reports.back() {
+            self.latest.remove(&before.id);
+            self.earlier.insert(before.id, Arc::clone(before));
+        }
+        reports.push_back(Arc::clone(&stored));
+        self.latest.insert(id, Arc::clone(&stored));
+        if reports.len() > self.limits.history_per_camera.get() {
+            self.forget_oldest_of(camera);
+        }
+        self.keep_limits();
+        stored
+    }
+
+    /// Removes the reports that are too old.
+    fn expire(&mut self, now: Timestamp) {
+        let Ok(max_age) = SignedDuration::try_from(self.limits.max_age) else {
+            return;
+        };
+        let Ok(oldest) = now.checked_sub(max_age).map(ReportId::at) else {
+            return;
+        };
+        while let Some(camera) = self.oldest_before(oldest) {
+            self.forget_oldest_of(&camera);
+        }
+    }
+
+    /// The camera of the oldest report, if that was stored before `id`.
+    fn oldest_before(&self, id: ReportId) -> Option<String> {
+        let earlier = self.earlier.first_key_value();
+        let oldest = earlier.into_iter().chain(self.latest.first_key_value());
+        let (oldest, report) = oldest.min_by_key(|(id, _)| **id)?;
+        (*oldest < id).then(|| report.report.camera.clone())
+    }
+
+    /// Deletes all reports of a camera. Returns false if it had none.
+    fn delete(&mut self, camera: &str) -> bool {
+        let is_known = self.cameras.contains_key(camera);
+        while self.forget_oldest_of(camera) {}
+        is_known
+    }
+
+    fn delete_image(&mut self, camera: &str) {
+        self.images.forget(camera);
+    }
+
+    /// The names of the cameras.
+    fn cameras(&self) -> Vec<String> {
+        self.cameras.keys().cloned().collect()
+    }
+
+    /// The number of cameras that were removed since the start.
+    fn removed_cameras(&self) -> u64 {
+        self.removed_cameras
+    }
+
+    fn keep_limits(&mut self) {
+        while self.cameras.len() > self.limits.max_cameras.get()
+            && let Some(silent) = self.oldest_of_others()
+        {
+            let camera = silent.report.camera.clone();
+            while self.forget_oldest_of(&camera) {}
+        }
+        while (self.count() > self.limits.max_reports.get() || self.bytes > self.limits.max_bytes)
+            && let Some(oldest) = self
+                .earlier
+                .values()
+                .next()
+                .or_else(|| self.oldest_of_others())
+        {
+            let camera = oldest.report.camera.clone();
+            self.forget_oldest_of(&camera);
+        }
+    }
+
+    /// Returns the oldest latest report of a camera that is not of this process, if there is one.
+    fn oldest_of_others(&self) -> Option<&Arc<StoredReport>> {
+        let mut latest = self.latest.values();
+        let other = latest.find(|stored| !self.own.contains(&stored.report.camera));
+        other.or_else(|| self.latest.values().next())
+    }
+
+    /// Removes the oldest report of the camera. Returns false if there was none.
+    fn forget_oldest_of(&mut self, camera: &str) -> bool {
+        let Some(reports) = self.cameras.get_mut(camera) else {
+            return false;
+        };
+        if let Some(oldest) = reports.pop_front() {
+            self.bytes -= oldest.report.bytes();
+            self.latest.remove(&oldest.id);
+            self.earlier.remove(&oldest.id);
+        }
+        if reports.is_empty() {
+            self.cameras.remove(camera);
+            self.images.forget(camera);
+            self.removed_cameras += 1;
+        }
+        true
+    }
+
+    fn count(&self) -> usize {
+        self.latest.len() + self.earlier.len()
+    }
+
+    fn latest(&self, camera: &str) -> Option<Arc<StoredReport>> {
+        self.cameras.get(camera)?.back().cloned()
+    }
+
+    fn latest_of_all(&self) -> Vec<Arc<StoredReport>> {
+        self.latest.values().cloned().collect()
+    }
+
+    fn since(&self, cameras: &Cameras, after: ReportId, most: usize) -> Vec<Arc<StoredReport>> {
+        match cameras {
+            Cameras::One(camera) => {
+                let Some(reports) = self.cameras.get(camera) else {
+                    return Vec::new();
+                };
+                let first = reports.partition_point(|report| report.id <= after);
+                reports.range(first..).take(most).cloned().collect()
+            }
+            Cameras::All => {
+                let range = (Excluded(after), Unbounded);
+                let [latest, earlier] =
+                    [&self.latest, &self.earlier].map(|reports| reports.range(range).take(most));
+                let mut found: Vec<_> = latest
+                    .chain(earlier)
+                    .map(|(_, found)| found.clone())
+                    .collect();
+                found.sort_unstable_by_key(|report| report.id);
+                found.truncate(most);
+                found
+            }
+        }
+    }
+
+    fn image(&self, camera: &str) -> Option<Arc<StoredImage>> {
+        self.images.for_camera(camera)
+    }
+
+    fn usage(&self) -> ResultUse {
+        ResultUse {
+            cameras: self.cameras.len(),
+            reports: self.count(),
+            bytes: self.bytes,
+            images: self.images.count(),
+        }
+    }
+}
+
+/// The images, at most `most`: the camera that was silent for longest is evicted first, and those
+/// of this process last.
+#[derive(Debug)]
+struct Images {
+    most: NonZeroUsize,
+    of_cameras: HashMap<String, Arc<StoredImage>>,
+}
+
+impl Images {
+    fn new(most: NonZeroUsize) -> Self {
+        Self {
+            most,
+            of_cameras: HashMap::new(),
+        }
+    }
+
+    /// Replaces the camera's image by that of the report with this ID, or removes it if that report
+    /// has none.
+    fn replace(
+        &mut self,
+        camera: &str,
+        id: ReportId,
+        frame: Option<StoredFrame>,
+        own: &OwnCameras,
+    ) {
+        let Some(frame) = frame else {
+            return self.forget(camera);
+        };
+        let stored = Arc::new(StoredImage { id, frame });
+        self.of_cameras.insert(camera.to_owned(), stored);
+        while self.of_cameras.len() > self.most.get() {
+            let images = self.of_cameras.iter();
+            let oldest = images.min_by_key(|(camera, stored)| (own.contains(camera), stored.id));
+            if let Some(camera) = oldest.map(|(camera, _)| camera.clone()) {
+                self.of_cameras.remove(&camera);
+            }
+        }
+    }
+
+    fn forget(&mut self, camera: &str) {
+        self.of_cameras.remove(camera);
+    }
+
+    fn for_camera(&self, camera: &str) -> Option<Arc<StoredImage>> {
+        self.of_cameras.get(camera).cloned()
+    }
+
+    /// The number of images.
+    fn count(&self) -> usize {
+        self.of_cameras.len()
+    }
+}
+
+#[cfg(test)]
+mod tests;

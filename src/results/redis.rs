@@ -4,40 +4,43 @@
 //! reports, one that subscribes to the cameras that have listeners here. Redis assigns the IDs, so
 //! they are the same on every server. While Redis is unreachable, reports wait in a bounded outbox,
 //! and detection does not wait for them.
+//!
+//! Sends reports from the outbox to Redis, one after the other. Each report is stored atomically
+//! and exactly once: after a lost answer, Redis recognizes the report by its number.
 
 mod address;
 mod message;
 mod outbox;
 mod pushes;
 mod reading;
-mod sender;
 mod session;
 mod shared;
-#[cfg(test)]
-mod tests;
 
 use std::{io, num::NonZeroUsize, sync::Arc, time::Duration};
 
 use async_trait::async_trait;
+use jiff::Timestamp;
+use lookdown_common::text::one_line;
 use lookdown_detect::fairness::Client;
-use redis::RedisResult;
+use lookdown_http::request_id::new_id;
+use redis::{RedisResult, Script, aio::MultiplexedConnection};
 use tokio::{task::JoinSet, time::timeout};
 
-use self::{
-    address::{Connector, TIMEOUT},
-    outbox::Outbox,
-    reading::Reader,
-    shared::{Followed, Keys, Link, Shared},
-};
-pub use self::{
-    address::{RedisAddress, RedisAddressError},
-    shared::RedisOptions,
-};
 use super::{
     Cameras, ListenError, Listeners, Listening, NewReport, ReportId, ResultLimits, ResultStore,
     ResultUse, StoreHealth, StoredImage, StoredReport, Unreachable,
 };
 use crate::{annotated_image::StoredFrame, metrics::Metrics};
+
+use address::{Connector, TIMEOUT};
+use outbox::{Outbox, PendingReport};
+use reading::Reader;
+use shared::{Followed, Keys, Link, Shared, is_refusal};
+
+pub use {
+    address::{RedisAddress, RedisAddressError},
+    shared::RedisOptions,
+};
 
 /// Longest time that the shutdown waits for reports that Redis has not stored yet.
 const LAST_WAIT: Duration = Duration::from_secs(2);
@@ -72,7 +75,7 @@ impl RedisResults {
         });
         let mut tasks = JoinSet::new();
         tasks.spawn(session::keep(Arc::clone(&shared)));
-        tasks.spawn(sender::run(Arc::clone(&shared)));
+        tasks.spawn(send(Arc::clone(&shared)));
         Ok(Self {
             shared,
             _tasks: tasks,
@@ -196,3 +199,104 @@ impl ResultStore for RedisResults {
         }
     }
 }
+
+/// The script that stores a report in Redis.
+const RECORD: &str = concat!(
+    include_str!("redis/forget.lua"),
+    include_str!("redis/record.lua")
+);
+
+/// Sends reports for as long as the server runs. The first of consecutive refusals is logged.
+async fn send(shared: Arc<Shared>) {
+    let sender = Sender {
+        script: Script::new(RECORD),
+        id: new_id().into_bytes(),
+        shared: &shared,
+    };
+    let mut last_was_refused = false;
+    let mut number = 0;
+    loop {
+        let pending = shared.outbox.first().await;
+        // Increases also beyond the numbers of servers that have ended, so that theirs are
+        // forgotten first.
+        number = now_micros().max(number + 1);
+        let refusal = sender.send(&pending, number).await.err();
+        if let Some(refusal) = &refusal
+            && !last_was_refused
+        {
+            let address = &shared.options.address;
+            let refusal = one_line(refusal);
+            tracing::warn!("Redis at {address} refuses reports: {refusal}");
+        }
+        last_was_refused = refusal.is_some();
+        if !last_was_refused {
+            shared.stored.inc();
+        }
+        shared.outbox.done(last_was_refused);
+    }
+}
+
+struct Sender<'a> {
+    script: Script,
+    /// Identifies this server.
+    id: [u8; 16],
+    shared: &'a Shared,
+}
+
+impl Sender<'_> {
+    /// Sends a report until Redis has answered. Fails only with a refusal.
+    async fn send(&self, pending: &PendingReport, number: u64) -> RedisResult<()> {
+        loop {
+            let line = self.shared.link.next_line().await;
+            let outcome = self.record(line.connection.clone(), pending, number).await;
+            match outcome {
+                Err(error) if !is_refusal(&error) => {
+                    // Waits for the next connection.
+                    let _ = self.shared.link.outcome(&line, Err::<(), _>(error));
+                }
+                outcome => return outcome,
+            }
+        }
+    }
+
+    async fn record(
+        &self,
+        mut connection: MultiplexedConnection,
+        PendingReport { report, image }: &PendingReport,
+        number: u64,
+    ) -> RedisResult<()> {
+        let (keys, limits) = (&self.shared.keys, &self.shared.limits);
+        let mut call = self.script.prepare_invoke();
+        call.key(&keys.index()[..]).key(keys.senders());
+        call.arg(keys.prefix_of_cameras());
+        call.arg(keys.prefix_of_images()).arg(&report.camera);
+        call.arg(keys.channel(&Cameras::One(report.camera.clone())));
+        call.arg(keys.channel(&Cameras::All));
+        call.arg(&self.id[..]).arg(number);
+        call.arg(report.received_at.to_string());
+        call.arg(report.persons).arg(&report.json[..]);
+        // An empty image means that there is none.
+        let parts = image.as_ref().map(|it| [&it.jpeg[..], &it.sketch[..]]);
+        let [frame, sketch] = parts.unwrap_or_default();
+        call.arg(frame).arg(sketch);
+        call.arg(report.bytes());
+        for limit in [
+            limits.max_cameras.get(),
+            limits.history_per_camera.get(),
+            limits.max_reports.get(),
+            limits.max_bytes,
+            limits.max_images.get(),
+        ] {
+            call.arg(limit);
+        }
+        call.arg(limits.max_age.as_secs());
+        call.invoke_async(&mut connection).await
+    }
+}
+
+fn now_micros() -> u64 {
+    u64::try_from(Timestamp::now().as_microsecond()).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests;

@@ -96,7 +96,7 @@ impl Worker {
         let observed = cameras.get_mut(camera);
         // Meanwhile, frames of another camera may have this name, or a calibration was stored.
         let is_same = |observed: &&mut Observed| {
-            observed.frame_size() == size && *observed.subject() == Subject::Lens
+            observed.frame_size() == size && observed.subject == Subject::Lens
         };
         if let Some(observed) = observed.filter(is_same) {
             if let Ok(fit) = &fit {
@@ -191,7 +191,7 @@ impl Shared {
     pub(super) fn suggestion(&self, camera: &CalibrationId) -> Option<Suggestion> {
         let cameras = self.cameras.lock();
         let observed = cameras.get(camera)?;
-        let (size, subject) = (observed.size(), observed.subject().clone());
+        let (size, subject) = (observed.size(), observed.subject.clone());
         let (fit, height) = (observed.fit.clone(), observed.height);
         let frames = observed.frame_count();
         drop(cameras);
@@ -230,7 +230,7 @@ impl Shared {
     pub(super) fn known_camera(&self, camera: &CalibrationId) -> Option<Arc<Calibration>> {
         let cameras = self.cameras.lock();
         let observed = cameras.get(camera)?;
-        match observed.subject() {
+        match &observed.subject {
             Subject::Height(id) => {
                 let entry = self.calibrations.entry(id)?;
                 Some(Arc::clone(&entry.calibration))
@@ -276,9 +276,9 @@ pub(super) enum Subject {
 /// The frames and people of one camera, and the findings.
 #[derive(Debug, Default)]
 pub(super) struct Observed {
-    subject: Subject,
+    pub(super) subject: Subject,
     size: (u32, u32),
-    seen_at: Option<Instant>,
+    pub(super) seen_at: Option<Instant>,
     frames: VecDeque<RoomFrame>,
     /// The number of frames that were taken.
     taken: usize,
@@ -307,10 +307,6 @@ impl Observed {
         (self.subject, self.size, self.seen_at) = (subject, size, Some(now));
     }
 
-    pub(super) fn seen_at(&self) -> Option<Instant> {
-        self.seen_at
-    }
-
     /// Width and height of the frames.
     pub(super) fn frame_size(&self) -> (u32, u32) {
         self.size
@@ -320,10 +316,6 @@ impl Observed {
     pub(super) fn size(&self) -> NativeImage {
         let (width, height) = self.size;
         NativeImage { width, height }
-    }
-
-    pub(super) fn subject(&self) -> &Subject {
-        &self.subject
     }
 
     /// Returns true if the edges of a frame of this time are needed.

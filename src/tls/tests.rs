@@ -1,9 +1,5 @@
 //! Handshakes over real sockets, and files that change.
 
-mod certificates;
-mod client;
-mod log;
-
 use std::{fs, os::unix::fs::symlink, time::Duration};
 
 use rustls::{
@@ -16,12 +12,15 @@ use tokio::{
     net::TcpStream,
 };
 
-use self::{
-    certificates::{Authority, Files, Pair, let_read},
-    client::{BOTH, Client, echo, exchange, shown},
-    log::logged_by,
-};
 use super::*;
+
+use certificates::{Authority, Files, Pair, let_read};
+use client::{BOTH, Client, echo, exchange, shown};
+use log::logged_by;
+
+mod certificates;
+mod client;
+mod log;
 
 fn open(files: &Files) -> Arc<Tls> {
     Arc::new(Tls::open(files.options.clone(), Arc::default()).unwrap())
@@ -352,4 +351,15 @@ fn only_certificates_with_problems_cause_warnings() {
     let expired = Files::new(&authority.issue_until(2001));
     let expired = logged_by(|| drop(open(&expired)));
     assert!(expired.contains("has expired at 2001-01-01"), "{expired}");
+}
+
+#[test]
+fn the_response_to_plain_http_states_its_length() {
+    let answer = std::str::from_utf8(ANSWER_TO_PLAIN_HTTP).unwrap();
+    let (head, body) = answer.split_once("\r\n\r\n").unwrap();
+    assert!(
+        head.contains(&format!("Content-Length: {}\r\n", body.len())),
+        "{}",
+        body.len()
+    );
 }

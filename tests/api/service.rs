@@ -21,7 +21,7 @@ use lookdown::{
     calibration_store::{Calibrations, FolderStore},
     metrics::Metrics,
     results::{ImagesOf, MemoryResults, ResultLimits, ResultStore},
-    settings::explain,
+    settings::{Settings, explain, load},
     telemetry::Tracer,
     views::Views,
 };
@@ -122,6 +122,30 @@ impl Default for Bounds {
     }
 }
 
+impl Bounds {
+    fn settings(&self) -> Settings {
+        let mut settings = load(None, []).unwrap();
+        settings.server.max_body_bytes = self.max_body_bytes;
+        settings.server.request_timeout = self.request_timeout;
+        settings.connections.max_header_bytes = 4096;
+        settings.connections.max_headers = 32;
+        settings.limits.max_upload_bytes = self.max_upload_bytes;
+        settings.limits.min_upload_bytes_per_second = self.min_upload_bytes_per_second;
+        settings.limits.requests_per_second = self.request_rate.map(|rate| rate.per_second);
+        if let Some(rate) = self.request_rate {
+            settings.limits.request_burst = rate.burst;
+        }
+        settings.access.cors_origins.clone_from(&self.cors_origins);
+        settings.access.hosts.clone_from(&self.hosts);
+        settings.calibrations.zone_metrics = self.zone_metrics;
+        settings.detect = self.detect_defaults.clone();
+        settings.results.camera_metrics = self.camera_metrics;
+        settings.results.images_of = self.images_of.clone();
+        settings.results.conceal_images = self.conceal_images;
+        settings
+    }
+}
+
 /// A response, read to its end if it has one.
 pub(crate) struct Answer {
     pub(crate) status: StatusCode,
@@ -194,7 +218,7 @@ pub(crate) fn assembly(gate: &Arc<Gate>) -> (Assembly, TempDir) {
     let options = EngineOptions::for_testing("eager");
     let store = Box::new(FolderStore::new(folder.path()));
     let calibrations = Arc::new(Calibrations::open(store, true, Arc::clone(&metrics)).unwrap());
-    let registry = Arc::clone(models.registry());
+    let registry = Arc::clone(&models.registry);
     let known = Arc::clone(&calibrations);
     let engine = Engine::new(registry, Some(known), options, Arc::clone(&metrics.detect)).unwrap();
     let models = Arc::new(models);
@@ -247,29 +271,16 @@ impl Service {
             Arc::clone(&metrics),
             readiness.clone(),
             ApiOptions {
-                max_body_bytes: bounds.max_body_bytes,
-                max_upload_bytes: bounds.max_upload_bytes,
-                max_header_bytes: 4096,
-                max_headers: 32,
-                detect_defaults: bounds.detect_defaults.clone(),
-                zone_metrics: bounds.zone_metrics,
-                camera_metrics: bounds.camera_metrics,
-                images_of: Arc::new(bounds.images_of.clone()),
-                conceal_images: bounds.conceal_images,
-                request_timeout: bounds.request_timeout,
-                min_upload_bytes_per_second: bounds.min_upload_bytes_per_second,
-                request_rate: bounds.request_rate,
-                access: bounds.access.clone(),
-                cors_origins: bounds.cors_origins.clone(),
-                hosts: bounds.hosts.clone(),
-                companions: bounds.companions.clone(),
-                tracer: bounds.tracer.clone(),
                 views: Arc::new(Views::new(
                     folder.path().join("state"),
                     DecodeLimits::default(),
                     bounds.conceal_images,
                 )),
-                ..ApiOptions::for_testing()
+                access: bounds.access.clone(),
+                companions: bounds.companions.clone(),
+                references: Arc::default(),
+                tracer: bounds.tracer.clone(),
+                settings: Arc::new(bounds.settings()),
             },
         );
         Self {

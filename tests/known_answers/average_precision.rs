@@ -120,8 +120,8 @@ fn curves_and_average_precisions_match_known_answers() {
     ] {
         let known = &fixture.results[name];
         let curve = PrecisionRecallCurve::from_images(&images, rule, min_iou).unwrap();
-        assert_eq!(curve.points().len(), known.order.len());
-        for (rank, point) in curve.points().iter().enumerate() {
+        assert_eq!(curve.points.len(), known.order.len());
+        for (rank, point) in curve.points.iter().enumerate() {
             let score = fixture.detections[known.order[rank]].score;
             assert_close(point.score, score, name);
             assert_close(point.recall, known.recall[rank], name);

@@ -5,7 +5,7 @@
 use std::{env, fs, path::Path};
 
 use lookdown::api::problem_table;
-use lookdown_calibration::warning::warning_table;
+use lookdown_calibration::warning::WarningCode;
 
 /// A generated part of a file.
 struct Section {
@@ -29,6 +29,17 @@ const SECTIONS: [Section; 2] = [
 ];
 
 const END: &str = "<!-- /generated -->";
+
+/// Returns the table of all codes of warnings.
+fn warning_table() -> String {
+    let rows = WarningCode::ALL
+        .iter()
+        .map(|code| format!("| `{}` | {} |\n", code.name(), code.description()));
+    format!(
+        "| code | meaning |\n|---|---|\n{}",
+        rows.collect::<String>()
+    )
+}
 
 /// Returns the text with other content between the markers of `name`.
 fn with_section(text: &str, name: &str, content: &str) -> String {

@@ -45,7 +45,7 @@ const STARTERS: [&str; 2] = [
 const COMPARISONS: [&str; 2] = [".identify(", ".holder_of("];
 /// The files that may make them.
 const COMPARERS: [&str; 4] = [
-    "src/access/keys.rs",
+    "src/access/key_list.rs",
     "src/api/http/access.rs",
     "src/api/http/context.rs",
     "src/api/require_scope.rs",
@@ -54,7 +54,7 @@ const COMPARERS: [&str; 4] = [
 const REPEATED: [&str; 1] = ["::check_again("];
 const LASTING: [&str; 2] = [
     "src/api/routes/results/events.rs",
-    "src/api/routes/results/latest.rs",
+    "src/api/routes/results.rs",
 ];
 
 /// Calls that read the clock of the machine. Everything that waits or limits uses the monotonic
@@ -76,12 +76,12 @@ const CLOCK_READERS: [&str; 21] = [
     "src/api/routes/cameras.rs",
     "src/api/routes/cameras/reference_counts.rs",
     "src/api/routes/results.rs",
-    "src/api/detect/upload/received_request.rs",
+    "src/api/detect/upload.rs",
     "src/app.rs",
-    "src/calibration_store/store/folder.rs",
+    "src/calibration_store/store.rs",
     "src/mqtt/publisher.rs",
     "src/results/memory.rs",
-    "src/results/redis/sender.rs",
+    "src/results/redis.rs",
     "src/telemetry/request_trace.rs",
     // The validity of certificates.
     "src/tls.rs",
@@ -106,7 +106,7 @@ const CLIENT_MAKERS: [&str; 5] = [
     // Asks this machine's own server, whose certificate is for other names; ends after 3 s.
     "src/probe.rs",
     // Uses the proxies of the system; ends after 5 s.
-    "src/telemetry/collector.rs",
+    "src/telemetry/tracer.rs",
 ];
 
 /// The source files of all crates without those of tests.

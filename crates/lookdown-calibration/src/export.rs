@@ -1,15 +1,24 @@
 //! Writing calibrations: the native format, and those of other programs where they have the lens.
+//!
+//! COLMAP's `cameras.txt` with one camera. It has no skew; its pixel coordinates begin at the
+//! corner of the first pixel.
 
-mod colmap;
 mod decimal;
 mod equivalents;
-mod kalibr;
 mod opencv;
-mod ros;
 
+use lookdown_lens::geometry::{
+    Pixel,
+    lens::LensModel,
+    pixels::{PixelConvention, cross_half_pixel},
+};
 use strum::{EnumString, IntoStaticStr, VariantArray};
 
-use super::native::{NativeCalibration, NativeMount};
+use crate::native::{NativeCalibration, NativeMount};
+
+use decimal::join;
+use equivalents::{eucm, kannala_brandt, mei, rectilinear};
+use opencv::camera_matrix;
 
 /// A format that is written.
 #[derive(
@@ -57,9 +66,9 @@ impl Target {
         let content = match self {
             Self::Native => Some(native(calibration)),
             Self::OpenCv => opencv::write(calibration),
-            Self::Kalibr => kalibr::write(calibration),
-            Self::Ros => ros::write(calibration),
-            Self::Colmap => colmap::write(calibration),
+            Self::Kalibr => write_kalibr(calibration),
+            Self::Ros => write_ros(calibration),
+            Self::Colmap => write_colmap(calibration),
         };
         let content = content.ok_or(NotExpressible {
             target: self.name(),
@@ -130,4 +139,99 @@ fn native(calibration: &NativeCalibration) -> String {
     let mut content = serde_json::to_string_pretty(calibration).unwrap_or_default();
     content.push('\n');
     content
+}
+
+fn write_colmap(calibration: &NativeCalibration) -> Option<String> {
+    let lens = &calibration.lens;
+    let (model, [fx, fy, cx, cy], rest) = match lens {
+        LensModel::Fov(fov) => ("FOV", fov.pinhole(), vec![fov.omega]),
+        _ => {
+            if let Some((pinhole, k, skew)) = kannala_brandt(lens) {
+                (skew == 0.0).then_some(("OPENCV_FISHEYE", pinhole, k.to_vec()))?
+            } else if let Some((pinhole, alpha, beta)) = eucm(lens) {
+                ("EUCM", pinhole, vec![alpha, beta])
+            } else {
+                ("PINHOLE", rectilinear(lens)?, Vec::new())
+            }
+        }
+    };
+    let center = cross_half_pixel(Pixel::new(cx, cy), PixelConvention::CornerOrigin);
+    let mut parameters = vec![fx, fy, center.x, center.y];
+    parameters.extend(rest);
+    Some(format!(
+        "# Camera list with one line of data per camera:\n#   CAMERA_ID, MODEL, WIDTH, HEIGHT, \
+         PARAMS[]\n# Number of cameras: 1\n1 {model} {} {} {}\n",
+        calibration.image.width,
+        calibration.image.height,
+        join(&parameters, " "),
+    ))
+}
+
+fn write_kalibr(calibration: &NativeCalibration) -> Option<String> {
+    let lens = &calibration.lens;
+    let (model, intrinsics, distortion, coefficients) =
+        if let Some((pinhole, k, skew)) = kannala_brandt(lens) {
+            without(skew)?;
+            ("pinhole", pinhole.to_vec(), "equidistant", k.to_vec())
+        } else if let LensModel::Mei(_) = lens {
+            let ([fx, fy, cx, cy], xi, bent, skew) = mei(lens)?;
+            without(skew)?;
+            ("omni", vec![xi, fx, fy, cx, cy], "radtan", bent.to_vec())
+        } else if let LensModel::DoubleSphere(sphere) = lens {
+            let [fx, fy, cx, cy] = sphere.pinhole();
+            let parameters = vec![sphere.xi, sphere.alpha, fx, fy, cx, cy];
+            ("ds", parameters, "none", Vec::new())
+        } else if let LensModel::Fov(fov) = lens {
+            let pinhole = fov.pinhole().to_vec();
+            ("pinhole", pinhole, "fov", vec![fov.omega])
+        } else if let Some(([fx, fy, cx, cy], alpha, beta)) = eucm(lens) {
+            let parameters = vec![alpha, beta, fx, fy, cx, cy];
+            ("eucm", parameters, "none", Vec::new())
+        } else {
+            ("pinhole", rectilinear(lens)?.to_vec(), "none", Vec::new())
+        };
+    Some(format!(
+        "cam0:\n  cam_overlaps: []\n  camera_model: {model}\n  distortion_coeffs: [{}]\n  \
+         distortion_model: {distortion}\n  intrinsics: [{}]\n  resolution: [{}, {}]\n  rostopic: \
+         /{}/image_raw\n",
+        join(&coefficients, ", "),
+        join(&intrinsics, ", "),
+        calibration.image.width,
+        calibration.image.height,
+        calibration.id,
+    ))
+}
+
+fn without(skew: f64) -> Option<()> {
+    (skew == 0.0).then_some(())
+}
+
+fn write_ros(calibration: &NativeCalibration) -> Option<String> {
+    let lens = &calibration.lens;
+    let (model, pinhole, skew, coefficients) =
+        if let Some((pinhole, k, skew)) = kannala_brandt(lens) {
+            ("equidistant", pinhole, skew, k.to_vec())
+        } else {
+            ("plumb_bob", rectilinear(lens)?, 0.0, vec![0.0; 5])
+        };
+    let matrix = camera_matrix(pinhole, skew);
+    // Each row of the projection ends with a translation, here none.
+    let projection: Vec<f64> = matrix
+        .chunks(3)
+        .flat_map(|row| [row, &[0.0]].concat())
+        .collect();
+    Some(format!(
+        "image_width: {}\nimage_height: {}\ncamera_name: {}\ncamera_matrix:\n  rows: 3\n  cols: 3\n  \
+         data: [{}]\ndistortion_model: {model}\ndistortion_coefficients:\n  rows: 1\n  cols: {}\n  \
+         data: [{}]\nrectification_matrix:\n  rows: 3\n  cols: 3\n  data: [{}]\n\
+         projection_matrix:\n  rows: 3\n  cols: 4\n  data: [{}]\n",
+        calibration.image.width,
+        calibration.image.height,
+        calibration.id,
+        join(&matrix, ", "),
+        coefficients.len(),
+        join(&coefficients, ", "),
+        join(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0], ", "),
+        join(&projection, ", "),
+    ))
 }

@@ -34,7 +34,6 @@ mod ocam;
 mod opencv;
 mod opencv_xml;
 mod opensfm;
-mod py_ocamcalib;
 mod recognize;
 mod rig;
 mod ros;
@@ -192,7 +191,7 @@ fn read_tree(format: Format, fields: &Fields<'_>) -> Result<Vec<FileCamera>, For
         Format::Kalibr => kalibr::read(fields),
         Format::OpenCv => opencv::read(fields),
         Format::Ros => alone(ros::read(fields)),
-        Format::PyOCamCalib => alone(py_ocamcalib::read(fields)),
+        Format::PyOCamCalib => alone(ocam::read_python(fields)),
         Format::Camodocal => alone(camodocal::read(fields)),
         Format::Basalt => basalt::read(fields)?,
         Format::WoodScape => alone(woodscape::read(fields)),

@@ -80,14 +80,3 @@ impl fmt::Display for Warning {
         write!(formatter, "{} ({})", self.message, self.code.name())
     }
 }
-
-/// Returns the table of all codes as Markdown.
-pub fn warning_table() -> String {
-    let rows = WarningCode::ALL
-        .iter()
-        .map(|code| format!("| `{}` | {} |\n", code.name(), code.description()));
-    format!(
-        "| code | meaning |\n|---|---|\n{}",
-        rows.collect::<String>()
-    )
-}

@@ -236,7 +236,7 @@ impl World {
             return;
         }
         self.is_connected = true;
-        let last = self.counter.last_event();
+        let last = self.counter.last_event;
         let kept = self.server.kept.clone();
         let missed: Vec<_> = if last > 0 && last <= self.server.last_id {
             kept.into_iter().filter(|(id, _)| *id > last).collect()
@@ -277,7 +277,7 @@ impl World {
     }
 
     fn crossings(&self) -> u64 {
-        let crossings = self.counter.stored_totals().crossings.iter();
+        let crossings = self.counter.stored_totals.crossings.iter();
         let of_hall = crossings.filter(|(of, _)| of.camera == CAMERAS[1]);
         of_hall.map(|(_, count)| count).sum()
     }

@@ -54,16 +54,17 @@ pub(crate) struct Counter {
     totals: Totals,
     /// The totals of the last transaction. Only these are shown, so that no count that was shown is
     /// lost with the process.
-    stored_totals: Totals,
+    pub(crate) stored_totals: Totals,
     /// True if a crossing or an entry is not stored yet.
-    is_urgent: bool,
+    pub(crate) is_urgent: bool,
     /// ID of the last report that was accepted or refused.
-    last_event: u64,
+    pub(crate) last_event: u64,
     /// Number of times that the IDs of the server went back.
-    position_resets: u64,
+    pub(crate) position_resets: u64,
     /// Number of cameras that made room for others.
-    displaced_cameras: u64,
-    drops: Drops,
+    pub(crate) displaced_cameras: u64,
+    /// The reports that were not counted.
+    pub(crate) drops: Drops,
     room_log: LogPause,
     position_log: LogPause,
     tracks_log: LogPause,
@@ -126,21 +127,6 @@ impl Counter {
         self.scenes.insert(scene.owner.clone(), scene);
     }
 
-    /// Returns the ID of the last report that was accepted.
-    pub(crate) fn last_event(&self) -> u64 {
-        self.last_event
-    }
-
-    /// Returns the totals that are stored.
-    pub(crate) fn stored_totals(&self) -> &Totals {
-        &self.stored_totals
-    }
-
-    /// Returns true if a crossing or an entry waits for a transaction.
-    pub(crate) fn is_urgent(&self) -> bool {
-        self.is_urgent
-    }
-
     /// Shows the totals of a batch that is stored.
     pub(crate) fn stored(&mut self, batch: &Batch) {
         self.stored_totals.clone_from(&batch.totals);
@@ -159,7 +145,7 @@ impl Counter {
     pub(crate) fn last_reports(&self) -> BTreeMap<String, i64> {
         let cameras = self.scenes().flat_map(|scene| &scene.cameras);
         cameras
-            .filter_map(|camera| Some((camera.name.clone(), camera.presence().last_ms?)))
+            .filter_map(|camera| Some((camera.name.clone(), camera.presence.last_ms?)))
             .collect()
     }
 
@@ -193,21 +179,6 @@ impl Counter {
     pub(crate) fn definition(&self, camera: &str) -> Option<Arc<CameraDefinition>> {
         let (_, camera) = self.scene_of(camera)?.camera(camera)?;
         Some(Arc::clone(&camera.definition))
-    }
-
-    /// Returns the number of times that the IDs of the server went back.
-    pub(crate) fn position_resets(&self) -> u64 {
-        self.position_resets
-    }
-
-    /// Returns the number of cameras that made room for others.
-    pub(crate) fn displaced_cameras(&self) -> u64 {
-        self.displaced_cameras
-    }
-
-    /// Returns the reports that were not counted.
-    pub(crate) fn drops(&self) -> &Drops {
-        &self.drops
     }
 
     /// Counts a report unless it was counted before.

@@ -49,7 +49,8 @@ pub(crate) struct PersonDown {
 /// The people on the floor of a camera.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Floor {
-    persons: Vec<PersonDown>,
+    /// Everyone who is down, longest first.
+    pub(crate) persons: Vec<PersonDown>,
     last_id: u64,
 }
 
@@ -57,11 +58,6 @@ impl Floor {
     /// Returns the people with an alert, longest first.
     pub(crate) fn alerts(&self) -> impl Iterator<Item = &PersonDown> {
         self.persons.iter().filter(|person| person.is_alert)
-    }
-
-    /// Returns everyone who is down, longest first.
-    pub(crate) fn persons(&self) -> &[PersonDown] {
-        &self.persons
     }
 
     /// Acknowledges an alert. Returns false for an unknown one.
@@ -92,11 +88,11 @@ impl Floor {
                 self.last_id += 1;
                 let mut person = PersonDown {
                     id: self.last_id,
-                    track: track.id(),
+                    track: track.id,
                     posture: Posture::Unknown,
                     since_ms: at_ms,
                     seen_ms: at_ms,
-                    center_px: track.center_px(),
+                    center_px: track.center_px,
                     length_px: 0.0,
                     zone: None,
                     up_since_ms: None,
@@ -117,13 +113,13 @@ impl Floor {
     /// Returns the known person of a track: the same track, or one that began where someone was
     /// lost.
     fn index_of(&self, track: &Track, tracks: &[&Track]) -> Option<usize> {
-        let same = |person: &PersonDown| person.track == track.id();
+        let same = |person: &PersonDown| person.track == track.id;
         let is_lost = |person: &PersonDown| {
-            let is_seen = tracks.iter().any(|track| track.id() == person.track);
-            let [x, y] = track.center_px();
+            let is_seen = tracks.iter().any(|track| track.id == person.track);
+            let [x, y] = track.center_px;
             let [own_x, own_y] = person.center_px;
             let is_near = (x - own_x).hypot(y - own_y) <= person.length_px / 2.0;
-            let began_ms = milliseconds(track.first_seen_s());
+            let began_ms = milliseconds(track.first_seen_s);
             !is_seen && is_near && began_ms > person.since_ms
         };
         let mut persons = self.persons.iter();
@@ -141,7 +137,7 @@ impl PersonDown {
         is_up: bool,
         definition: &CameraDefinition,
     ) {
-        self.track = track.id();
+        self.track = track.id;
         self.seen_ms = at_ms;
         if is_up {
             self.up_since_ms.get_or_insert(at_ms);
@@ -150,8 +146,8 @@ impl PersonDown {
         if is_down {
             self.up_since_ms = None;
             self.posture = track.posture().0;
-            self.center_px = track.center_px();
-            self.length_px = track.length_px();
+            self.center_px = track.center_px;
+            self.length_px = track.length_px;
             self.zone = zone_of(track, definition, false);
         }
     }
@@ -173,7 +169,7 @@ impl PersonDown {
 /// then also one nearby.
 fn zone_of(track: &Track, definition: &CameraDefinition, is_expected: bool) -> Option<String> {
     let camera = definition.geometry.as_ref()?;
-    let [x, y] = track.center_px();
+    let [x, y] = track.center_px;
     let center = Pixel::new(x, y);
     let floor = floor_position(center, &camera.lens, &camera.mount);
     let near_px = NEAR_FRAME * f64::from(definition.key.width);

@@ -1,14 +1,9 @@
 //! The HTTP API of the companion.
 
 mod counts;
-mod document;
 mod floor;
-mod frame_heat_map;
 mod furniture;
 mod heat_map;
-mod heat_map_image;
-mod operation;
-mod removal;
 mod shared;
 mod suggested_area;
 mod time;
@@ -19,21 +14,30 @@ use std::{collections::BTreeMap, sync::Arc};
 use axum::{
     Json, Router,
     extract::State,
-    http::{HeaderValue, header::CACHE_CONTROL},
+    http::{
+        HeaderValue,
+        header::{CACHE_CONTROL, CONTENT_TYPE},
+    },
     middleware,
-    response::Response,
+    response::{IntoResponse, Response},
 };
 use jiff::Timestamp;
+use lookdown_http::{
+    openapi::{Keys, complete},
+    problem::ProblemBody,
+};
 use parking_lot::Mutex;
 use serde::Serialize;
-use utoipa::{ToSchema, openapi::OpenApi};
+use utoipa::{OpenApi as _, ToSchema, openapi::OpenApi};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use crate::{counter::Counter, metrics::Metrics, now::time_of, sums::Owner};
-pub(crate) use counts::{MAX_VALUES, table};
-pub(crate) use operation::probes;
-pub(crate) use shared::Api;
+
+use counts::ZoneCounts;
 use shared::{Shared, now_ms};
+
+pub(crate) use counts::{MAX_VALUES, table};
+pub(crate) use shared::Api;
 
 /// Returns the routes, without protection: a listener adds it.
 pub(crate) fn router(api: Api) -> Router {
@@ -47,7 +51,7 @@ pub(crate) fn router(api: Api) -> Router {
 fn routes() -> OpenApiRouter<Shared> {
     OpenApiRouter::new()
         .routes(routes!(cameras))
-        .routes(routes!(counts::camera_counts, removal::delete))
+        .routes(routes!(counts::camera_counts, counts::delete))
         .routes(routes!(tracks::camera_tracks))
         .routes(routes!(floor::list))
         .routes(routes!(floor::acknowledge))
@@ -55,7 +59,7 @@ fn routes() -> OpenApiRouter<Shared> {
         .routes(routes!(furniture::confirm, furniture::take_back))
         .routes(routes!(heat_map::json_of_camera))
         .routes(routes!(heat_map::png_of_camera))
-        .routes(routes!(frame_heat_map::png))
+        .routes(routes!(heat_map::png_of_frame))
         .routes(routes!(suggested_area::get))
         .routes(routes!(counts::site_counts))
         .routes(routes!(tracks::site_tracks))
@@ -63,17 +67,23 @@ fn routes() -> OpenApiRouter<Shared> {
         .routes(routes!(heat_map::png_of_site))
 }
 
-/// Returns the routes of the listener itself for clients with access.
+/// Returns the routes of the listener itself for clients with access: the metrics and the OpenAPI
+/// document.
 pub(crate) fn operation_router(counter: &Arc<Mutex<Counter>>, metrics: &Arc<Metrics>) -> Router {
-    operation::router(counter, metrics, openapi_document)
+    let shown = Shown {
+        counter: Arc::clone(counter),
+        metrics: Arc::clone(metrics),
+    };
+    let (routes, _) = protected().with_state(shown).split_for_parts();
+    routes
 }
 
 /// Returns the OpenAPI document of the counts.
 pub fn openapi_document() -> OpenApi {
-    document::merged([
+    merged_documents([
         routes().into_openapi(),
-        operation::protected().into_openapi(),
-        operation::unprotected().into_openapi(),
+        protected().into_openapi(),
+        unprotected().into_openapi(),
     ])
 }
 
@@ -119,7 +129,7 @@ struct Dropping {
 impl CountedCamera {
     /// Returns the row of a camera without a counted report.
     fn new(name: &str, counter: &Counter) -> Self {
-        let drops = counter.drops().for_camera(name);
+        let drops = counter.drops.for_camera(name);
         let since_ms = drops.and_then(|drops| drops.since_ms);
         let dropping = drops.zip(since_ms).map(|(drops, since_ms)| Dropping {
             since: time_of(since_ms),
@@ -164,9 +174,93 @@ async fn cameras(State(api): State<Shared>) -> Json<Vec<CountedCamera>> {
         };
         rows.insert(camera.name, row);
     }
-    for (name, _) in counter.drops().iter() {
+    for (name, _) in counter.drops.iter() {
         let entry = rows.entry(name.to_owned());
         entry.or_insert_with(|| CountedCamera::new(name, &counter));
     }
     Json(rows.into_values().collect())
+}
+
+#[derive(utoipa::OpenApi)]
+#[openapi(
+    info(
+        title = "Counts of Lookdown",
+        description = "Counts people over time: lines, zones, tracks and heat maps. `lookdown count` has \
+                       these routes on an address of its own, `lookdown run` and a server with \
+                       `counts.url` on the address of the server, for keys with the scope `read`. Every \
+                       failure is a problem document (RFC 9457).",
+        contact(name = "The Lookdown authors")
+    ),
+    servers((url = "/", description = "This server")),
+    tags(
+        (name = "counts", description = "Cameras."),
+        (name = "sites", description = "Cameras that share a floor."),
+        (name = "operation", description = "Health checks, metrics and documentation of the address of `lookdown count`."),
+    ),
+    components(schemas(ProblemBody, ZoneCounts)),
+    modifiers(&Keys)
+)]
+struct Common;
+
+/// Returns the document of these routes.
+fn merged_documents(routes: impl IntoIterator<Item = OpenApi>) -> OpenApi {
+    let mut document = Common::openapi();
+    for part in routes {
+        document.merge(part);
+    }
+    complete(&mut document);
+    document
+}
+
+/// Everything that the routes show.
+#[derive(Clone)]
+struct Shown {
+    counter: Arc<Mutex<Counter>>,
+    metrics: Arc<Metrics>,
+}
+
+/// Returns the route of the health check.
+pub(crate) fn probes() -> Router {
+    let (routes, _) = unprotected().split_for_parts();
+    routes
+}
+
+fn protected() -> OpenApiRouter<Shown> {
+    OpenApiRouter::new()
+        .routes(routes!(metrics))
+        .routes(routes!(document))
+}
+
+fn unprotected() -> OpenApiRouter {
+    OpenApiRouter::new().routes(routes!(livez))
+}
+
+/// Get the metrics
+#[utoipa::path(
+    get, path = "/metrics", tag = "operation", operation_id = "get_metrics",
+    security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
+    responses((status = OK, description = "The text format of Prometheus.", body = String, content_type = "text/plain"))
+)]
+async fn metrics(State(shown): State<Shown>) -> Response {
+    let text = shown.metrics.text(&shown.counter.lock(), now_ms());
+    ([(CONTENT_TYPE, "text/plain; version=0.0.4")], text).into_response()
+}
+
+/// Get the OpenAPI document
+#[utoipa::path(
+    get, path = "/openapi.json", tag = "operation", operation_id = "get_openapi",
+    security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
+    responses((status = OK, description = "OpenAPI 3.1.", body = Object))
+)]
+async fn document() -> Json<OpenApi> {
+    Json(openapi_document())
+}
+
+/// Get the liveness
+#[utoipa::path(
+    get, path = "/livez", tag = "operation", operation_id = "get_liveness",
+    responses((status = OK, description = "`ok`.", body = String, content_type = "text/plain"))
+)]
+async fn livez() -> &'static str {
+    "ok\n"
 }

@@ -62,8 +62,8 @@ impl Metrics {
     pub(crate) fn text(&self, counter: &Counter, now_ms: i64) -> Vec<u8> {
         let snapshot = counter.snapshot(now_ms);
         for (metric, count) in [
-            (&self.position_resets, counter.position_resets()),
-            (&self.displaced_cameras, counter.displaced_cameras()),
+            (&self.position_resets, counter.position_resets),
+            (&self.displaced_cameras, counter.displaced_cameras),
         ] {
             metric.reset();
             metric.inc_by(count);

@@ -99,7 +99,7 @@ impl Recording {
 
     /// Returns the time of the last report of the camera that is counted.
     pub fn counted_until(&self) -> Option<Timestamp> {
-        let micros = i64::try_from(self.counter.last_event()).ok();
+        let micros = i64::try_from(self.counter.last_event).ok();
         let micros = micros.filter(|micros| *micros > 0)?;
         Timestamp::from_microsecond(micros).ok()
     }
@@ -172,8 +172,8 @@ impl Recording {
         let at_s = seconds(at.as_millisecond());
         let tracks = self.counter.scene_of(&self.camera).into_iter();
         let tracks = tracks.flat_map(Scene::tracks);
-        let seen = tracks.filter(|track| track.seen_s().total_cmp(&at_s).is_eq());
-        seen.map(|track| track.last_person().person).collect()
+        let seen = tracks.filter(|track| track.seen_s.total_cmp(&at_s).is_eq());
+        seen.map(|track| track.last_person.person).collect()
     }
 
     /// Returns the crossings of the lines of the camera since the store was created.

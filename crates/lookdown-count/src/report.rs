@@ -3,7 +3,7 @@
 use jiff::Timestamp;
 use lookdown_calibration::CalibrationId;
 use lookdown_common::{
-    report::{Report, ReportCalibration, ReportImage, ReportOrientedBox, ReportPerson},
+    report::{Report, ReportCalibration, ReportImage, ReportPerson},
     text::is_camera_name,
 };
 use lookdown_lens::geometry::{BoxAngles, OrientedBox, Pixel};
@@ -146,16 +146,13 @@ fn observation(
     definition: &CameraDefinition,
 ) -> Option<Observation> {
     let bearing = person.bearing?;
-    let ReportOrientedBox {
-        cx,
-        cy,
-        width,
-        height,
-        angle_deg,
-    } = person.oriented_box;
-    let center = Pixel::new(cx, cy);
+    let reported = &person.oriented_box;
+    let (center, angle) = (
+        Pixel::new(reported.cx, reported.cy),
+        reported.angle_deg.to_radians(),
+    );
     // The angle does not tell the head from the foot.
-    let oriented = OrientedBox::turned(center, width, height, angle_deg.to_radians())
+    let oriented = OrientedBox::turned(center, reported.width, reported.height, angle)
         .with_head_toward(&definition.up_at(center));
     let foot = oriented.foot();
     let camera = definition.geometry.as_ref();
@@ -164,8 +161,8 @@ fn observation(
         floor_m: person.floor.map(|floor| [floor.x_m, floor.y_m]),
         azimuth_deg: bearing.azimuth_deg,
         off_axis_deg: bearing.off_axis_deg,
-        center_px: [cx, cy],
-        size_px: [width, height],
+        center_px: [reported.cx, reported.cy],
+        size_px: [reported.width, reported.height],
         angles,
         foot_px: [foot.x, foot.y],
         score: person.score,

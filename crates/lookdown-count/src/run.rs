@@ -169,8 +169,8 @@ pub async fn count(
         next_expiry: Instant::now(),
         stop: stop_receiver,
     };
-    if follower.counter.lock().last_event() > 0 {
-        let last_ms = follower.counter.lock().last_event() / 1000;
+    if follower.counter.lock().last_event > 0 {
+        let last_ms = follower.counter.lock().last_event / 1000;
         let last = time_of(i64::try_from(last_ms).unwrap_or(i64::MAX));
         tracing::info!("continuing after the report of {last}");
     }

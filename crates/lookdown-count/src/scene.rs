@@ -174,7 +174,7 @@ impl Scene {
         }
         if let Some(after_ms) = time.floor_alert_after_ms {
             let shown = |track: &&&Track| {
-                track.last_person().camera == camera && track.seen_s() >= seconds(time.at_ms)
+                track.last_person.camera == camera && track.seen_s >= seconds(time.at_ms)
             };
             let shown: Vec<&Track> = tracks.iter().filter(shown).copied().collect();
             let SceneCamera {
@@ -191,7 +191,7 @@ impl Scene {
         let own = if is_site {
             let own = tracks
                 .iter()
-                .filter(|track| track.last_person().camera == camera);
+                .filter(|track| track.last_person.camera == camera);
             own.count() as u64
         } else {
             tracked

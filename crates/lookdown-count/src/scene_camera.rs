@@ -5,6 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
+use jiff::{Timestamp, tz::TimeZone};
 use lookdown_common::text::one_line;
 use lookdown_tracking::{
     Track,
@@ -17,7 +18,6 @@ use crate::{
     definition::CameraDefinition,
     definition_key::DefinitionKey,
     floor::Floor,
-    frame_rate::FrameRate,
     now::{LogPause, Now, milliseconds},
     presence::Presence,
     report::ReportKey,
@@ -47,7 +47,7 @@ pub(crate) struct SceneCamera {
     /// The last report of this camera, counted or not.
     pub(crate) last_report: Option<ReportKey>,
     /// Arrival of the last counted report at this process.
-    arrived: Option<Instant>,
+    pub(crate) arrived: Option<Instant>,
     /// Arrival of the first of the late reports since the last one in order.
     pub(crate) late_since: Option<Instant>,
     clock_log: LogPause,
@@ -119,8 +119,8 @@ impl SceneCamera {
         CameraState {
             name: self.name.clone(),
             key: self.definition.key.clone(),
-            lines: self.lines.state().clone(),
-            zones: self.zones.state().clone(),
+            lines: self.lines.state.clone(),
+            zones: self.zones.state.clone(),
             presence: self.presence,
             zone_persons: self.zone_persons.clone(),
             last_report: self.last_report,
@@ -140,11 +140,6 @@ impl SceneCamera {
             clock_log: self.clock_log,
             ..Self::new(&self.name, definition)
         };
-    }
-
-    /// Returns the arrival of the last counted report at this process.
-    pub(crate) fn arrived(&self) -> Option<Instant> {
-        self.arrived
     }
 
     /// Returns true if a refused report shows that a clock was set back: no report of this camera
@@ -173,10 +168,6 @@ impl SceneCamera {
         }
     }
 
-    pub(crate) fn presence(&self) -> &Presence {
-        &self.presence
-    }
-
     /// Returns the rate of the frames, if the camera has lines, which need a certain one.
     pub(crate) fn rate(&self) -> Option<FrameRate> {
         (!self.definition.lines.is_empty()).then_some(self.rate)
@@ -193,12 +184,12 @@ impl SceneCamera {
 
     /// Returns each zone with its persons now.
     pub(crate) fn occupancy(&self) -> impl Iterator<Item = (&str, usize)> {
-        let names = self.zones.zones().iter().map(|zone| zone.name.as_str());
+        let names = self.zones.zones.iter().map(|zone| zone.name.as_str());
         names.zip(self.zones.occupancy())
     }
 
     fn zone_of(&self, index: usize) -> ZoneOf {
-        let zone = self.zones.zones().get(index);
+        let zone = self.zones.zones.get(index);
         ZoneOf {
             camera: self.name.clone(),
             zone: zone.map(|zone| zone.name.clone()).unwrap_or_default(),
@@ -214,7 +205,7 @@ impl SceneCamera {
     ) -> Vec<NamedCrossing> {
         let mut named = Vec::new();
         for crossing in self.lines.update(tracks.iter().copied()) {
-            let line = &self.lines.lines()[crossing.line];
+            let line = &self.lines.lines[crossing.line];
             let direction = match crossing.direction {
                 Direction::In => 0,
                 Direction::Out => 1,
@@ -281,4 +272,92 @@ fn zone_counter(definition: &CameraDefinition, state: ZoneState) -> ZoneCounter 
         tracing::warn!("the zones of {:?} are not counted: {error}", definition.key);
         ZoneCounter::default()
     })
+}
+
+/// Frames per second that lines need: fewer lose crossings and identities
+/// (docs/lab/count-accuracy.md, "Rates").
+const NEEDED_RATE: f64 = 2.5;
+/// The rate is too low from the longer mean interval on, until the shorter one: a camera with just
+/// [`NEEDED_RATE`], whose interval is 400 ms, is not marked, milliseconds.
+const TOO_LONG_MS: f64 = 450.0;
+const ENOUGH_MS: f64 = 420.0;
+/// Time over which intervals are averaged: a slow second alone is not marked, milliseconds.
+const AVERAGED_MS: f64 = 10_000.0;
+
+/// The mean interval between the frames of a camera, by the times of its reports.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct FrameRate {
+    interval_ms: f64,
+    /// Time since which the rate is too low, milliseconds since the Unix epoch.
+    pub(crate) too_low_since_ms: Option<i64>,
+}
+
+impl FrameRate {
+    /// Adds the time between two reports. Returns true if it had too few frames.
+    pub(crate) fn add(&mut self, time: TimeSpan) -> bool {
+        let interval_ms = (time.to_ms - time.from_ms) as f64;
+        let weight = 1.0 - (-interval_ms / AVERAGED_MS).exp();
+        self.interval_ms += weight * (interval_ms - self.interval_ms);
+        let most_ms = match self.too_low_since_ms {
+            None => TOO_LONG_MS,
+            Some(_) => ENOUGH_MS,
+        };
+        let since_ms = self.too_low_since_ms.unwrap_or(time.from_ms);
+        self.too_low_since_ms = (self.interval_ms > most_ms).then_some(since_ms);
+        self.too_low_since_ms.is_some()
+    }
+
+    /// Returns the sentence about a rate that is too low, with the remedy.
+    pub(crate) fn warning(&self) -> Option<String> {
+        let since = Timestamp::from_millisecond(self.too_low_since_ms?).ok()?;
+        let since = since
+            .to_zoned(TimeZone::system())
+            .strftime("%H:%M")
+            .to_string();
+        let rate = 1000.0 / self.interval_ms;
+        Some(format!(
+            "counts may be too low since {since}: {rate:.1} frames/s become reports, and lines need \
+             {NEEDED_RATE}: choose a higher Rate (`every`) for the camera, or automatic"
+        ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lasting_low_rate_is_marked_from_its_beginning() {
+        let mut rate = FrameRate::default();
+        let mut at_ms = 0;
+        let mut send = |seconds: i64, interval_ms: i64| {
+            let ends_ms = at_ms + 1000 * seconds;
+            let mut marked_ms = 0;
+            while at_ms < ends_ms {
+                let (from_ms, to_ms) = (at_ms, at_ms + interval_ms);
+                let is_slow = rate.add(TimeSpan { from_ms, to_ms });
+                marked_ms += if is_slow { interval_ms } else { 0 };
+                at_ms = to_ms;
+            }
+            (marked_ms, rate)
+        };
+        for (seconds, interval_ms, marked_s) in [
+            (60, 200, 0..=0),
+            (1, 1000, 0..=0),
+            (60, 400, 0..=0),
+            (60, 500, 45..=58),
+            (60, 400, 10..=20),
+            (60, 200, 0..=5),
+        ] {
+            let (marked_ms, _) = send(seconds, interval_ms);
+            let case = format!("{interval_ms}: {marked_ms}");
+            assert!(marked_s.contains(&(marked_ms / 1000)), "{case}");
+        }
+        let (_, rate) = send(30, 1000);
+        let warning = rate.warning().unwrap();
+        assert!(
+            warning.contains("1.0 frames/s") && warning.contains("`every`"),
+            "{warning}"
+        );
+    }
 }

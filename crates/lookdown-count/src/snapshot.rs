@@ -110,7 +110,7 @@ impl Counter {
     /// Returns the reason why a camera is not counted now, or why its counts may be too low.
     pub(crate) fn warning(&self, camera: &str) -> Option<String> {
         let rate = || self.scene_of(camera)?.camera(camera)?.1.rate()?.warning();
-        self.drops().reason(camera).or_else(rate)
+        self.drops.reason(camera).or_else(rate)
     }
 
     /// Returns the current counts.
@@ -130,7 +130,7 @@ impl Counter {
                 });
             }
             for camera in &scene.cameras {
-                let presence = camera.presence();
+                let presence = camera.presence;
                 let Some(last_report_ms) = presence.last_ms else {
                     continue;
                 };
@@ -148,7 +148,7 @@ impl Counter {
                             line: line.name.clone(),
                             direction: direction.clone(),
                         };
-                        let crossings = self.stored_totals().crossings.get(&of);
+                        let crossings = self.stored_totals.crossings.get(&of);
                         LineSnapshot {
                             crossings: crossings.copied().unwrap_or_default(),
                             line: of.line,
@@ -162,7 +162,7 @@ impl Counter {
                         zone: zone.to_owned(),
                     };
                     let total = self
-                        .stored_totals()
+                        .stored_totals
                         .zones
                         .get(&of)
                         .copied()

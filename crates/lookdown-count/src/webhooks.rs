@@ -1,22 +1,32 @@
 //! Webhooks: signed messages on conditions (Standard Webhooks 1.0).
 
-mod conditions;
 mod delivery;
 mod signature;
 
-use std::{path::PathBuf, time::Duration};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::PathBuf,
+    time::Duration,
+};
 
 use base64::{Engine as _, engine::general_purpose::STANDARD};
 use lookdown_common::{ConfigError, optional_duration, read_secret};
 use reqwest::Url;
 use secrecy::ExposeSecret;
 use serde::{Deserialize, Serialize};
-use serde_json::json;
+use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
-pub(crate) use conditions::Conditions;
-pub(crate) use delivery::Deliveries;
+use crate::{
+    message::{HeldCondition, Message},
+    now::{Now, time_of},
+    scene::Scene,
+    scene_camera::NamedCrossing,
+};
+
 use signature::SigningKey;
+
+pub(crate) use delivery::Deliveries;
 
 /// Time without a report after which a camera is silent.
 const SILENT_AFTER: Duration = Duration::from_mins(1);
@@ -152,5 +162,196 @@ impl WebhookEntry {
             condition,
             with_image: self.image,
         })
+    }
+}
+
+/// The messages of a camera that becomes silent, and that sends reports again.
+const SILENCE: [&str; 2] = ["camera.silent", "camera.back"];
+
+/// The conditions and whether they hold.
+pub(crate) struct Conditions {
+    webhooks: Vec<Webhook>,
+    /// Webhook and camera of each condition that holds.
+    holding: BTreeSet<(usize, String)>,
+    /// True if the stored state is another one.
+    is_changed: bool,
+    /// Last report of each camera, milliseconds since the Unix epoch, but no later than its
+    /// arrival: a camera whose report is of the future may be silent all the same.
+    reports: BTreeMap<String, i64>,
+    /// Time of the start, milliseconds since the Unix epoch. No camera is silent for longer:
+    /// reports of the time before may still arrive.
+    started_ms: i64,
+}
+
+impl Conditions {
+    /// Continues with the stored conditions that hold and the last report of each camera.
+    /// Conditions of webhooks that are gone are left out.
+    pub(crate) fn resumed(
+        webhooks: Vec<Webhook>,
+        held: &[HeldCondition],
+        reports: BTreeMap<String, i64>,
+        started_ms: i64,
+    ) -> Self {
+        let mut holding = BTreeSet::new();
+        for (index, webhook) in webhooks.iter().enumerate() {
+            let digest = webhook.digest();
+            let own = held.iter().filter(|held| held.webhook == digest);
+            holding.extend(own.map(|held| (index, held.camera.clone())));
+        }
+        Self {
+            is_changed: holding.len() != held.len(),
+            webhooks,
+            holding,
+            reports: reports
+                .into_iter()
+                .map(|(camera, at_ms)| (camera, at_ms.min(started_ms)))
+                .collect(),
+            started_ms,
+        }
+    }
+
+    /// Takes the conditions that hold, if they are to be stored again.
+    pub(crate) fn take_changed(&mut self) -> Option<BTreeSet<HeldCondition>> {
+        if !std::mem::take(&mut self.is_changed) {
+            return None;
+        }
+        let held = self.holding.iter().filter_map(|(index, camera)| {
+            Some(HeldCondition {
+                webhook: self.webhooks.get(*index)?.digest(),
+                camera: camera.clone(),
+            })
+        });
+        Some(held.collect())
+    }
+
+    /// Returns the messages of a counted report of the time `at_ms`, which arrived now.
+    pub(crate) fn for_report(
+        &mut self,
+        event: u64,
+        camera: &str,
+        at_ms: i64,
+        now: Now,
+        crossings: &[NamedCrossing],
+        scene: &Scene,
+    ) -> Vec<Message> {
+        let mut messages = Vec::new();
+        for (index, webhook) in self.webhooks.iter().enumerate() {
+            let is_of = |name: &str| {
+                webhook
+                    .camera
+                    .as_deref()
+                    .is_none_or(|camera| camera == name)
+            };
+            let (holds, names, data) = match &webhook.condition {
+                Condition::Crossing { line, direction } => {
+                    let fits = |crossing: &&NamedCrossing| {
+                        let of = &crossing.of;
+                        is_of(&of.camera)
+                            && line.as_ref().is_none_or(|line| *line == of.line)
+                            && direction.as_ref().is_none_or(|name| *name == of.direction)
+                    };
+                    for (number, crossing) in crossings.iter().filter(fits).enumerate() {
+                        let of = &crossing.of;
+                        let data = json!({
+                            "camera": of.camera, "line": of.line, "direction": of.direction,
+                        });
+                        let id = format!("msg_{event}_{index}_{number}");
+                        messages.push(message(id, webhook, "crossing", crossing.at_ms, &data));
+                    }
+                    continue;
+                }
+                _ if !is_of(camera) => continue,
+                Condition::Occupancy { zone, at_least } => {
+                    let persons = scene.camera(camera).and_then(|(_, of)| match zone {
+                        Some(zone) => {
+                            let mut zones = of.occupancy().filter(|(name, _)| name == zone);
+                            zones.next().map(|(_, persons)| persons as u64)
+                        }
+                        None => Some(of.presence.persons),
+                    });
+                    let Some(persons) = persons else {
+                        continue;
+                    };
+                    let data = json!({
+                        "camera": camera, "zone": zone, "persons": persons, "at_least": at_least,
+                    });
+                    let names = ["occupancy.reached", "occupancy.ended"];
+                    (persons >= *at_least, names, data)
+                }
+                Condition::Silent { .. } => (false, SILENCE, json!({ "camera": camera })),
+                Condition::FloorAlert => {
+                    let Some((_, of)) = scene.camera(camera) else {
+                        continue;
+                    };
+                    let alerts = of.floor.alerts().map(|person| {
+                        json!({
+                            "posture": person.posture.name(), "since": time_of(person.since_ms),
+                            "zone": person.zone,
+                        })
+                    });
+                    let alerts: Vec<_> = alerts.collect();
+                    let names = ["floor_alert.began", "floor_alert.ended"];
+                    let holds = !alerts.is_empty();
+                    (holds, names, json!({ "camera": camera, "persons": alerts }))
+                }
+            };
+            let changed = change(&mut self.holding, (index, camera), holds, names);
+            self.is_changed |= changed.is_some();
+            let id = format!("msg_{event}_{index}");
+            messages.extend(changed.map(|name| message(id, webhook, name, at_ms, &data)));
+        }
+        self.reports
+            .insert(camera.to_owned(), at_ms.min(now.unix_ms));
+        messages
+    }
+
+    /// Returns the messages of the time: cameras that became silent.
+    pub(crate) fn for_time(&mut self, now_ms: i64) -> Vec<Message> {
+        let mut messages = Vec::new();
+        for (index, webhook) in self.webhooks.iter().enumerate() {
+            let Condition::Silent { after } = webhook.condition else {
+                continue;
+            };
+            for (camera, last_ms) in &self.reports {
+                let is_of = webhook.camera.as_ref().is_none_or(|name| name == camera);
+                let since_ms = self.started_ms.max(*last_ms);
+                let silence = u128::from(now_ms.saturating_sub(since_ms).max(0).unsigned_abs());
+                if !is_of || silence < after.as_millis() {
+                    continue;
+                }
+                let data = json!({ "camera": camera, "last_report": time_of(*last_ms) });
+                let id = format!("msg_{last_ms}_{index}_silent");
+                let changed = change(&mut self.holding, (index, camera), true, SILENCE);
+                self.is_changed |= changed.is_some();
+                messages.extend(changed.map(|name| message(id, webhook, name, now_ms, &data)));
+            }
+        }
+        messages
+    }
+}
+
+/// Records that a condition holds or not. Returns the name of the change: the first when it begins
+/// to hold, the second when it ends.
+fn change(
+    holding: &mut BTreeSet<(usize, String)>,
+    (index, camera): (usize, &str),
+    holds: bool,
+    [begun, ended]: [&'static str; 2],
+) -> Option<&'static str> {
+    let key = (index, camera.to_owned());
+    if holds {
+        holding.insert(key).then_some(begun)
+    } else {
+        holding.remove(&key).then_some(ended)
+    }
+}
+
+fn message(id: String, webhook: &Webhook, kind: &str, at_ms: i64, data: &Value) -> Message {
+    let body = json!({ "type": kind, "timestamp": time_of(at_ms), "data": data });
+    Message {
+        id,
+        webhook: webhook.digest(),
+        body: body.to_string(),
+        created_s: at_ms.div_euclid(1000),
     }
 }

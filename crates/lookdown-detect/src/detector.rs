@@ -98,7 +98,7 @@ impl Detector {
             onnx_loader(options.onnx_runtime.clone(), onnx, engine_options.sessions),
             Arc::clone(&metrics),
         );
-        let registry = Arc::clone(models.registry());
+        let registry = Arc::clone(&models.registry);
         let engine = Engine::new(registry, None, engine_options, metrics)?;
         Ok(Self {
             engine,
@@ -129,7 +129,7 @@ impl Detector {
     fn load_models(&self, parameters: &DetectParameters) -> Result<(), RepositoryError> {
         let _only_loader = self.loading.lock();
         for name in self.engine.default_models().needed_by(parameters) {
-            if self.models.registry().get(name).is_none() {
+            if self.models.registry.get(name).is_none() {
                 self.models.load(name)?;
             }
         }

@@ -31,6 +31,5 @@ pub use onnx::{OnnxDetector, OnnxOptions, onnx_loader};
 pub use registry::{ModelRegistry, RegistryFull};
 pub use remote::{BearerToken, InvalidToken, RemoteDetector, RemoteOptions, RemoteServer};
 pub use repository::{
-    ModelFolder, ModelLoader, ModelRepository, RepositoryError, RepositoryOptions, is_fetched,
-    model_names,
+    ModelFolder, ModelLoader, ModelRepository, RepositoryError, RepositoryOptions, model_names,
 };

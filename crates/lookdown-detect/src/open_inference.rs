@@ -5,17 +5,15 @@
 mod binary_data;
 pub mod bounded_json;
 mod datatype;
-mod json_data;
 pub mod message;
 pub mod metadata;
 pub mod parameters;
 mod tensor_data;
-mod tensor_values;
 
 pub use self::{
     datatype::Datatype,
+    message::TensorValues,
     tensor_data::{TensorData, element_count},
-    tensor_values::TensorValues,
 };
 
 /// The header with the length of the JSON, when bytes follow it.

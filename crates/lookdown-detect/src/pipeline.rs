@@ -18,7 +18,6 @@ mod network;
 mod outline;
 mod pass;
 mod planned_views;
-mod plausibility;
 mod report;
 mod rig_cache;
 mod service_rate;
@@ -27,7 +26,6 @@ mod test_support;
 mod ticket;
 mod timeline;
 mod turns;
-mod visible_views;
 mod worker_pool;
 
 pub use calibration_lookup::{CalibrationLookup, UnusableCalibration};

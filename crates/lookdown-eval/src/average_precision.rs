@@ -30,7 +30,7 @@ impl PrecisionRecallCurve {
     pub fn envelope(&self) -> Vec<(f64, f64)> {
         let mut greatest: f64 = 0.0;
         let mut envelope: Vec<(f64, f64)> = self
-            .points()
+            .points
             .iter()
             .rev()
             .map(|point| {

@@ -2,6 +2,8 @@
 //!
 //! Average precision considers every score. A user reads the persons above one threshold.
 
+use lookdown_lens::saturating::to_usize;
+
 use super::{EvaluatedImage, MatchingRule, Outcome, Region, precision_recall::count};
 
 /// The score threshold of a detection that sets none.
@@ -130,12 +132,7 @@ impl Counts {
         let mut bins = [Bin::default(); BINS];
         let detections = self.images.iter().flat_map(|image| &image.detections);
         for &(score, is_right) in detections.filter(|(score, _)| *score >= CALIBRATION_FLOOR) {
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "a score is 0 to 1"
-            )]
-            let index = (score * count(BINS)) as usize;
+            let index = to_usize(score * count(BINS));
             bins[index.min(BINS - 1)].add(score, is_right);
         }
         let all: f64 = bins.iter().map(|bin| bin.detections).sum();

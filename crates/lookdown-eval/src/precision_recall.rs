@@ -8,7 +8,8 @@ use super::{EvaluatedImage, MatchingRule, Outcome, Region};
 /// equal score are ordered by image, then by position.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PrecisionRecallCurve {
-    points: Vec<OperatingPoint>,
+    /// The points, by descending score.
+    pub points: Vec<OperatingPoint>,
 }
 
 /// The result of a score threshold.
@@ -73,11 +74,6 @@ impl PrecisionRecallCurve {
             })
             .collect();
         Self { points }
-    }
-
-    /// The points, by descending score.
-    pub fn points(&self) -> &[OperatingPoint] {
-        &self.points
     }
 
     /// The recall of all detections, 0 to 1.

@@ -8,8 +8,6 @@
 use lookdown_detect::detection::{BBox, BBoxError, FramePixels};
 use lookdown_lens::geometry::OrientedBox;
 
-use super::{Region, region::share};
-
 /// A rectangle rotated about its center, represented by the pixels that it covers in a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RotatedBox {
@@ -55,14 +53,9 @@ impl RotatedBox {
     /// Creates the oriented box of a detection, in a frame of `[width, height]` pixels. Returns
     /// `None` as [`RotatedBox::new`] does.
     pub fn from_oriented_box(oriented_box: &OrientedBox, frame: [u32; 2]) -> Option<Self> {
-        let OrientedBox {
-            center,
-            width,
-            height,
-            angle,
-            ..
-        } = *oriented_box;
-        Self::new([center.x, center.y, width, height], angle, frame)
+        let (center, angle) = (oriented_box.center, oriented_box.angle);
+        let sides = [oriented_box.width, oriented_box.height];
+        Self::new([center.x, center.y, sides[0], sides[1]], angle, frame)
     }
 
     /// The center, `[x, y]`, corner-origin frame pixels.
@@ -184,6 +177,31 @@ fn rows(first: f64, end: f64) -> impl Iterator<Item = f64> {
 
 fn length([first, end]: [f64; 2]) -> f64 {
     (end - first).max(0.0)
+}
+
+/// A part of the plane that can be compared with another.
+pub trait Region {
+    /// Intersection over union, 0 to 1. It is 0 if neither has any area.
+    fn iou(&self, other: &Self) -> f64;
+
+    /// The fraction of this region that lies in `other`, 0 to 1. It is 0 if this region has no
+    /// area.
+    fn share_in(&self, other: &Self) -> f64;
+}
+
+/// `part` divided by `whole`, or 0 if `whole` is 0.
+fn share(part: f64, whole: f64) -> f64 {
+    if whole > 0.0 { part / whole } else { 0.0 }
+}
+
+impl<S> Region for BBox<S> {
+    fn iou(&self, other: &Self) -> f64 {
+        BBox::iou(self, other)
+    }
+
+    fn share_in(&self, other: &Self) -> f64 {
+        share(self.intersection_area(other), self.area())
+    }
 }
 
 #[cfg(test)]

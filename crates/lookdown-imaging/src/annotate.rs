@@ -9,7 +9,6 @@ mod conceal;
 mod effort;
 mod encode;
 mod label;
-mod lens_sketch;
 mod mark;
 mod room_sketch;
 mod style;
@@ -25,9 +24,8 @@ pub use conceal::{Concealment, conceal};
 pub use effort::Cancelled;
 use effort::Effort;
 pub use encode::{EncodeError, encode_jpeg, encode_png};
-pub use lens_sketch::sketch_lens;
 pub use mark::{Head, Mark, OrientedMark};
-pub use room_sketch::{ROOM_LEGEND, sketch_room};
+pub use room_sketch::{ROOM_LEGEND, sketch_lens, sketch_room};
 use style::{INK, is_drawable, line_width, text_height};
 
 /// Shapes and texts to draw into a frame.

@@ -5,20 +5,20 @@
 
 mod container;
 mod error;
-mod jpeg_head;
 
-use std::io::Cursor;
+use std::{borrow::Cow, io::Cursor};
 
-use image::codecs::{jpeg::JpegDecoder, png::PngDecoder, webp::WebPDecoder};
-use image::error::{LimitError, LimitErrorKind};
-use image::metadata::Orientation;
-use image::{ColorType, DynamicImage, ImageDecoder, ImageError, ImageFormat, Limits, RgbImage};
-
+use image::{
+    ColorType, DynamicImage, ImageDecoder, ImageError, ImageFormat, Limits, RgbImage,
+    codecs::{jpeg::JpegDecoder, png::PngDecoder, webp::WebPDecoder},
+    error::{LimitError, LimitErrorKind},
+    metadata::Orientation,
+};
 use lookdown_common::{JPEG_END, jpeg_length};
 
-use super::{buffer_pool, frame::Frame};
+use crate::{buffer_pool, frame::Frame};
+
 pub use error::{DecodeError, ExceededLimit};
-use jpeg_head::JpegHead;
 
 /// Memory of the PNG decoder that does not depend on the size of the image.
 const PNG_OVERHEAD_BYTES: u64 = 1 << 20;
@@ -272,4 +272,67 @@ fn rgb_over_black(image: DynamicImage) -> RgbImage {
         let [red, green, blue, alpha] = rgba.get_pixel(x, y).0;
         image::Rgb([red, green, blue].map(|value| over_black(value, alpha)))
     })
+}
+
+/// The application segment of JPEG files in AVI: its decoders use the tables of annex K.3 where a
+/// file has none.
+const OF_AVI: [u8; 18] = *b"\xFF\xE0\x00\x10AVI1\0\0\0\0\0\0\0\0\0\0";
+
+/// The facts of the head that decide about decoding.
+#[derive(Debug, Default)]
+struct JpegHead {
+    /// The marker of the frame and the bits of a sample.
+    frame: Option<(u8, u8)>,
+    has_huffman_tables: bool,
+}
+
+impl JpegHead {
+    /// Reads the head. It ends at the first bytes that are not a segment.
+    fn new(bytes: &[u8]) -> Self {
+        let mut head = Self::default();
+        let mut rest = bytes.get(2..).unwrap_or_default();
+        while let [0xFF, marker, high, low, payload @ ..] = rest {
+            let length = match marker {
+                // A fill byte, and markers without a payload.
+                0xFF => 1,
+                0x01 | 0xD0..=0xD8 => 2,
+                _ => 2 + usize::from(u16::from_be_bytes([*high, *low])),
+            };
+            match marker {
+                0xC4 => head.has_huffman_tables = true,
+                0xC0..=0xC3 | 0xC5..=0xC7 | 0xC9..=0xCB | 0xCD..=0xCF | 0xF7 => {
+                    head.frame = payload.first().map(|bits| (*marker, *bits));
+                }
+                0xDA => break,
+                _ => {}
+            }
+            rest = rest.get(length..).unwrap_or_default();
+        }
+        head
+    }
+
+    /// Returns the kind of the JPEG, if no decoder here reads it.
+    fn unsupported_kind(&self) -> Option<String> {
+        let (marker, bits) = self.frame?;
+        let kind = match marker {
+            0xC3 | 0xF7 => "a lossless",
+            0xC5..=0xC7 => "a hierarchical",
+            0xC9..=0xCF => "an arithmetic coded",
+            _ if bits != 8 => return Some(format!("a JPEG with {bits} bits per sample")),
+            _ => return None,
+        };
+        Some(format!("{kind} JPEG"))
+    }
+
+    /// Returns the file with the standard Huffman tables, if it has none: USB cameras leave them
+    /// out.
+    fn with_huffman_tables<'a>(&self, bytes: &'a [u8]) -> Cow<'a, [u8]> {
+        let is_baseline = matches!(self.frame, Some((0xC0 | 0xC1, _)));
+        match bytes.split_at_checked(2) {
+            Some((start, rest)) if is_baseline && !self.has_huffman_tables => {
+                [start, &OF_AVI, rest].concat().into()
+            }
+            _ => bytes.into(),
+        }
+    }
 }

@@ -5,15 +5,14 @@
 //! 3. Chains are split at corners into pieces that a parabola describes (`pieces`). The image of a
 //!    straight edge in a fisheye frame is such a piece.
 
-mod chains;
 mod gradient;
-mod pieces;
 mod plane;
 mod surround;
 
-use lookdown_lens::self_calibration::EdgeCurve;
+use lookdown_lens::{saturating::to_usize, self_calibration::EdgeCurve};
 
-use super::{frame::Frame, lens_circle::LensCircle};
+use crate::{frame::Frame, lens_circle::LensCircle};
+
 use gradient::Gradient;
 use plane::Plane;
 
@@ -51,11 +50,240 @@ fn curves_of_raster(frame: &Frame, circle: &LensCircle, divisor: u32) -> Vec<Edg
             && !surround.contains(point)
     };
     let mut curves = Vec::new();
-    for chain in chains::linked(&gradient, &is_used) {
-        for piece in pieces::smooth(&chain) {
-            let points = pieces::supports(piece).into_iter().map(in_frame).collect();
+    for chain in linked_chains(&gradient, &is_used) {
+        for piece in smooth_pieces(&chain) {
+            let points = supports(piece).into_iter().map(in_frame).collect();
             curves.push(EdgeCurve { points, scale });
         }
     }
     curves
+}
+
+/// Chains with fewer pixels are noise.
+const MIN_PIXELS: usize = 14;
+/// Least cosine between the gradients of neighbors.
+const MIN_COSINE: f32 = 0.88;
+/// The eight neighbors, clockwise from the right.
+const NEIGHBORS: [[i32; 2]; 8] = [
+    [1, 0],
+    [1, 1],
+    [0, 1],
+    [-1, 1],
+    [-1, 0],
+    [-1, -1],
+    [0, -1],
+    [1, -1],
+];
+
+/// Returns chains of points in pixel centers of the gradient.
+fn linked_chains(gradient: &Gradient, is_used: &dyn Fn([f64; 2]) -> bool) -> Vec<Vec<[f64; 2]>> {
+    let width = gradient.width;
+    let mut free = maxima(gradient, is_used);
+    let mut seeds: Vec<usize> = (0..free.len()).filter(|at| free[*at]).collect();
+    seeds.sort_by(|a, b| gradient.size[*b].total_cmp(&gradient.size[*a]));
+    let mut chains = Vec::new();
+    for seed in seeds {
+        if !std::mem::replace(&mut free[seed], false) {
+            continue;
+        }
+        let mut pixels: Vec<usize> = walk(gradient, &mut free, seed, 1.0);
+        pixels.reverse();
+        pixels.push(seed);
+        pixels.extend(walk(gradient, &mut free, seed, -1.0));
+        if pixels.len() >= MIN_PIXELS {
+            chains.push(
+                pixels
+                    .into_iter()
+                    .map(|at| position(gradient, at, width))
+                    .collect(),
+            );
+        }
+    }
+    chains
+}
+
+/// Pixels whose gradient is a maximum along its dominant axis.
+fn maxima(gradient: &Gradient, is_used: &dyn Fn([f64; 2]) -> bool) -> Vec<bool> {
+    let width = gradient.width;
+    let mut maxima = vec![false; gradient.size.len()];
+    for y in 5..gradient.height.saturating_sub(5) {
+        for x in 5..width - 5 {
+            let at = y * width + x;
+            let size = gradient.size[at];
+            if size < gradient.threshold {
+                continue;
+            }
+            let step = dominant_step(gradient, at);
+            if size > gradient.size[at - step] && size >= gradient.size[at + step] {
+                let point = [x as f64, y as f64];
+                maxima[at] = is_used(point);
+            }
+        }
+    }
+    maxima
+}
+
+/// Distance between the neighbors along the axis in which the gradient is larger.
+fn dominant_step(gradient: &Gradient, at: usize) -> usize {
+    if gradient.along_x[at].abs() >= gradient.along_y[at].abs() {
+        1
+    } else {
+        gradient.width
+    }
+}
+
+/// Follows an edge from a pixel in one of its two senses.
+fn walk(gradient: &Gradient, free: &mut [bool], seed: usize, sense: f32) -> Vec<usize> {
+    let mut pixels = Vec::new();
+    let mut at = seed;
+    while let Some(next) = next_pixel(gradient, free, at, sense) {
+        free[next] = false;
+        pixels.push(next);
+        at = next;
+    }
+    pixels
+}
+
+fn next_pixel(gradient: &Gradient, free: &[bool], at: usize, sense: f32) -> Option<usize> {
+    let (gx, gy) = (gradient.along_x[at], gradient.along_y[at]);
+    let (tx, ty) = (-gy * sense, gx * sense);
+    let turns = ty.atan2(tx) / std::f32::consts::FRAC_PI_4;
+    #[expect(clippy::cast_possible_truncation, reason = "between -4 and 4")]
+    let octant = turns.round() as i32;
+    let candidate = |far: i32, side: i32| {
+        let index = usize::try_from((octant + side).rem_euclid(8)).ok()?;
+        let [x, y] = NEIGHBORS[index];
+        let offset = far * (y * i32::try_from(gradient.width).ok()? + x);
+        let next = at.checked_add_signed(offset as isize)?;
+        let (nx, ny) = (gradient.along_x[next], gradient.along_y[next]);
+        let cosine = (gx * nx + gy * ny) / (gradient.size[at] * gradient.size[next]).max(1e-6);
+        (*free.get(next)? && cosine > MIN_COSINE).then_some(next)
+    };
+    for far in [1, 2] {
+        let found = [0, -1, 1]
+            .into_iter()
+            .filter_map(|side| candidate(far, side));
+        let strongest = found.max_by(|a, b| gradient.size[*a].total_cmp(&gradient.size[*b]));
+        if strongest.is_some() {
+            return strongest;
+        }
+    }
+    None
+}
+
+/// The position of the maximum across the edge: the vertex of a parabola through three pixels.
+fn position(gradient: &Gradient, at: usize, width: usize) -> [f64; 2] {
+    let step = dominant_step(gradient, at);
+    let [before, here, after] = [at - step, at, at + step].map(|at| f64::from(gradient.size[at]));
+    let bend = before - 2.0 * here + after;
+    let shift = if bend < -1e-6 {
+        (0.5 * (before - after) / bend).clamp(-0.5, 0.5)
+    } else {
+        0.0
+    };
+    let (x, y) = ((at % width) as f64, (at / width) as f64);
+    if step == 1 {
+        [x + shift, y]
+    } else {
+        [x, y + shift]
+    }
+}
+
+/// Largest distance of a point from the parabola through its piece, pixels.
+const TOLERANCE: f64 = 1.0;
+/// Shorter pieces say little about a direction, pixels.
+const MIN_LENGTH: f64 = 14.0;
+/// Points left out at both ends, where a corner bends the edge.
+const ENDS: usize = 2;
+/// Distance of the supports, in pixels.
+const SUPPORT_DISTANCE: f64 = 8.0;
+/// Most supports of a piece.
+const MAX_SUPPORTS: f64 = 24.0;
+
+/// Splits a chain at its corners.
+fn smooth_pieces(chain: &[[f64; 2]]) -> Vec<&[[f64; 2]]> {
+    let mut open = vec![chain];
+    let mut pieces = Vec::new();
+    while let Some(piece) = open.pop() {
+        let (Some(first), Some(last)) = (piece.first(), piece.last()) else {
+            continue;
+        };
+        let length = (last[0] - first[0]).hypot(last[1] - first[1]);
+        if piece.len() < 2 * ENDS + 6 {
+            continue;
+        }
+        if length >= 0.5 * count(piece.len()) && is_parabola(piece, *first, *last, length) {
+            if length >= MIN_LENGTH {
+                pieces.push(&piece[ENDS..piece.len() - ENDS]);
+            }
+            continue;
+        }
+        let corner = farthest(piece, *first, *last).clamp(3, piece.len() - 4);
+        open.push(&piece[..=corner]);
+        open.push(&piece[corner..]);
+    }
+    pieces
+}
+
+fn count(length: usize) -> f64 {
+    length as f64
+}
+
+/// Index of the point farthest from the chord.
+fn farthest(piece: &[[f64; 2]], first: [f64; 2], last: [f64; 2]) -> usize {
+    let [x, y] = [last[0] - first[0], last[1] - first[1]];
+    let far = |point: &[f64; 2]| {
+        let [px, py] = [point[0] - first[0], point[1] - first[1]];
+        if x.hypot(y) < 3.0 {
+            px.hypot(py)
+        } else {
+            (px * y - py * x).abs()
+        }
+    };
+    let indexed = piece.iter().enumerate();
+    indexed
+        .max_by(|a, b| far(a.1).total_cmp(&far(b.1)))
+        .map_or(0, |(index, _)| index)
+}
+
+/// Returns true if a parabola over the chord describes the piece.
+fn is_parabola(piece: &[[f64; 2]], first: [f64; 2], last: [f64; 2], length: f64) -> bool {
+    let [x, y] = [(last[0] - first[0]) / length, (last[1] - first[1]) / length];
+    let local = |point: &[f64; 2]| {
+        let [px, py] = [point[0] - first[0], point[1] - first[1]];
+        // Along the chord from -1 to 1, and across it in pixels.
+        [2.0 * (px * x + py * y) / length - 1.0, py * x - px * y]
+    };
+    let mut normal = nalgebra::Matrix3::<f64>::zeros();
+    let mut right = nalgebra::Vector3::<f64>::zeros();
+    for point in piece {
+        let [along, across] = local(point);
+        let row = nalgebra::Vector3::new(1.0, along, along * along);
+        normal += row * row.transpose();
+        right += row * across;
+    }
+    let Some(cholesky) = normal.cholesky() else {
+        return false;
+    };
+    let coefficients = cholesky.solve(&right);
+    let inner = &piece[ENDS..piece.len() - ENDS];
+    inner.iter().all(|point| {
+        let [along, across] = local(point);
+        let fitted = coefficients[0] + along * (coefficients[1] + along * coefficients[2]);
+        (across - fitted).abs() <= TOLERANCE
+    })
+}
+
+/// Averages groups of points to supports, whose noise is smaller.
+fn supports(piece: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let wanted = (count(piece.len()) / SUPPORT_DISTANCE).clamp(3.0, MAX_SUPPORTS);
+    let wanted = to_usize(wanted.round());
+    let mean = |index: usize| {
+        let group = &piece[index * piece.len() / wanted..(index + 1) * piece.len() / wanted];
+        let share = 1.0 / count(group.len()).max(1.0);
+        group.iter().fold([0.0, 0.0], |sum, point| {
+            [sum[0] + share * point[0], sum[1] + share * point[1]]
+        })
+    };
+    (0..wanted).map(mean).collect()
 }

@@ -5,22 +5,33 @@
 //!    through those points ignores captions and unlit parts of the room (`outline`, `consensus`).
 //! 3. Along rays near that circle the rim is located to a fraction of a pixel, and a robust
 //!    least-squares circle is fitted to it (`rim`, `least_squares`).
+//!
+//! The circle on which most outline points agree.
+//!
+//! Random sample consensus (Fischler and Bolles, 1981) over circles through three points, with a
+//! fixed seed: the same frame gives the same circle.
+//!
+//! The circle that fits rim points best, robust against a minority of outliers.
+//!
+//! Iteratively reweighted Gauss–Newton on the geometric distance, with Tukey's biweight (Holland
+//! and Welsch, 1977), which gives distant points no weight.
 
 mod agreement;
 mod circle;
-mod consensus;
-mod least_squares;
-mod outline;
 mod rim;
 mod surround;
 
 use std::f64::consts::TAU;
 
-use super::frame::Frame;
+use nalgebra::{Matrix3, Vector3};
+
+use crate::frame::Frame;
+
+use rim::RimPoint;
+use surround::{Surround, brightness, margin};
+
 pub use agreement::{AgreedCircle, agreed_circle};
 pub use circle::LensCircle;
-use rim::RimPoint;
-use surround::Surround;
 
 /// Frames with a shorter side below this show too little of a rim to measure.
 const MIN_SIDE: u32 = 32;
@@ -56,12 +67,12 @@ pub fn find_lens_circle(frame: &Frame) -> Option<LensCircle> {
 
 fn find_at_contrast(frame: &Frame, min_contrast: f64) -> Option<LensCircle> {
     let surround = Surround::new(frame, min_contrast)?;
-    let mut circle = consensus::circle(&outline::points(frame, &surround))?;
+    let mut circle = consensus_circle(&outline_points(frame, &surround))?;
     let mut edge = Vec::new();
     for reach in REACHES {
         edge = rim::points(frame, &surround, &circle, reach);
         let points: Vec<_> = edge.iter().map(|point| point.at).collect();
-        circle = least_squares::circle(&points, &circle)?;
+        circle = fitted_circle(&points, &circle)?;
     }
     let is_large = circle.radius >= MIN_RADIUS_IN_SHORT_SIDES * f64::from(short_side(frame));
     (is_large && is_shown(&edge, frame, &circle)).then_some(circle)
@@ -132,4 +143,193 @@ pub fn assumed_circle(width: u32, height: u32) -> LensCircle {
         cy: (f64::from(height) - 1.0) / 2.0,
         radius: f64::from(width.min(height)) / 2.0,
     }
+}
+
+/// Enough to draw three true points a few times when two thirds are false.
+const TRIALS: usize = 400;
+/// Fewer agreeing points can occur by chance.
+const MIN_AGREEING: usize = 24;
+
+/// Returns the circle with the most points on it, minus the points outside of it. A dark room moves
+/// outline points inward, whereas only captions lie outside.
+fn consensus_circle(points: &[[f64; 2]]) -> Option<LensCircle> {
+    let mut state = 0x9E37_79B9_7F4A_7C15_u64;
+    let mut best = None;
+    let mut best_score = i64::try_from(MIN_AGREEING).ok()?;
+    for _ in 0..TRIALS {
+        let triple = [(); 3].map(|()| draw(&mut state, points));
+        let [Some(a), Some(b), Some(c)] = triple else {
+            return None;
+        };
+        let Some(candidate) = through(a, b, c) else {
+            continue;
+        };
+        let score = score(&candidate, points);
+        if score > best_score {
+            best_score = score;
+            best = Some(candidate);
+        }
+    }
+    best
+}
+
+fn score(circle: &LensCircle, points: &[[f64; 2]]) -> i64 {
+    let tolerance = circle.tolerance();
+    // Compares squares, which avoids a square root for each trial and point.
+    let [nearest, farthest] =
+        [-tolerance, tolerance].map(|off| (circle.radius + off).max(0.0).powi(2));
+    points
+        .iter()
+        .map(|[x, y]| {
+            let squared = (x - circle.cx).powi(2) + (y - circle.cy).powi(2);
+            i64::from(squared >= nearest) - 2 * i64::from(squared > farthest)
+        })
+        .sum()
+}
+
+/// Draws a pseudo-random point (xorshift64, Marsaglia 2003).
+fn draw(state: &mut u64, points: &[[f64; 2]]) -> Option<[f64; 2]> {
+    *state ^= *state << 13;
+    *state ^= *state >> 7;
+    *state ^= *state << 17;
+    let index = usize::try_from(*state >> 33)
+        .ok()?
+        .checked_rem(points.len())?;
+    points.get(index).copied()
+}
+
+/// The circle through three points, or `None` when they are nearly collinear.
+///
+/// Its center has the same distance from all three points, which gives two linear equations, solved
+/// by Cramer's rule.
+fn through(first: [f64; 2], second: [f64; 2], third: [f64; 2]) -> Option<LensCircle> {
+    let [u, v] = [second[0] - first[0], second[1] - first[1]];
+    let [s, t] = [third[0] - first[0], third[1] - first[1]];
+    let (near, far) = (u * u + v * v, s * s + t * t);
+    let twice_area = u * t - v * s;
+    // On a large circle, a short arc is almost a line: the area is small compared with the sides.
+    if twice_area.abs() < 0.01 * near.max(far) {
+        return None;
+    }
+    let across = (t * near - v * far) / (2.0 * twice_area);
+    let down = (u * far - s * near) / (2.0 * twice_area);
+    Some(LensCircle {
+        cx: first[0] + across,
+        cy: first[1] + down,
+        radius: across.hypot(down),
+    })
+}
+
+const ITERATIONS: usize = 12;
+/// Tukey's constant: 95 % efficiency on normally distributed errors.
+const CUTOFF_IN_SIGMAS: f64 = 4.685;
+/// The standard deviation of a normal distribution in median absolute deviations.
+const SIGMA_IN_MEDIAN_DEVIATIONS: f64 = 1.4826;
+/// A smaller spread, in pixels, is numerical noise and would exclude good points.
+const MIN_SIGMA: f64 = 0.25;
+/// A circle has three unknowns. Fewer points leave no redundancy to detect outliers.
+const MIN_POINTS: usize = 12;
+
+/// Fits a circle to points, starting from `start`. Returns `None` when there are too few points or
+/// they do not determine a circle.
+fn fitted_circle(points: &[[f64; 2]], start: &LensCircle) -> Option<LensCircle> {
+    if points.len() < MIN_POINTS {
+        return None;
+    }
+    let mut circle = *start;
+    for _ in 0..ITERATIONS {
+        let cutoff = CUTOFF_IN_SIGMAS * spread(points, &circle);
+        let mut normal = Matrix3::zeros();
+        let mut right_side = Vector3::zeros();
+        for point in points {
+            let distance = circle.distance(*point);
+            let weight = (1.0 - (distance / cutoff).powi(2)).max(0.0).powi(2);
+            let from_center = distance + circle.radius;
+            let gradient = Vector3::new(
+                (point[0] - circle.cx) / from_center,
+                (point[1] - circle.cy) / from_center,
+                1.0,
+            );
+            normal += weight * gradient * gradient.transpose();
+            right_side += weight * distance * gradient;
+        }
+        let step = normal.cholesky()?.solve(&right_side);
+        circle.cx += step.x;
+        circle.cy += step.y;
+        circle.radius += step.z;
+        if !(step.norm().is_finite() && circle.radius > 1.0) {
+            return None;
+        }
+    }
+    Some(circle)
+}
+
+/// Robust standard deviation of the points around the circle, in pixels.
+fn spread(points: &[[f64; 2]], circle: &LensCircle) -> f64 {
+    let mut deviations: Vec<f64> = points
+        .iter()
+        .map(|point| circle.distance(*point).abs())
+        .collect();
+    let middle = deviations.len() / 2;
+    let (_, median, _) = deviations.select_nth_unstable_by(middle, f64::total_cmp);
+    (*median * SIGMA_IN_MEDIAN_DEVIATIONS).max(MIN_SIGMA)
+}
+
+/// Scan lines across each axis of the frame. Rows and columns together cover the outline of a
+/// circle almost evenly.
+const LINES: u32 = 160;
+
+/// One point per scan line and side, in pixel centers, precise to about a pixel. Lines that start
+/// inside the lens image, because the circle is cut off there, give no point.
+fn outline_points(frame: &Frame, surround: &Surround) -> Vec<[f64; 2]> {
+    let (width, height) = (frame.width(), frame.height());
+    let mut points = Vec::new();
+    for line in 0..LINES {
+        let y = middle_of_slice(line, height);
+        let row = |x: u32| is_lit(frame, surround, x, y);
+        let (left, right) = (
+            entry(width, frame, row),
+            entry(width, frame, |x| row(width - 1 - x)),
+        );
+        points.extend(left.map(|x| [x, f64::from(y)]));
+        points.extend(right.map(|x| [f64::from(width - 1) - x, f64::from(y)]));
+
+        let x = middle_of_slice(line, width);
+        let column = |y: u32| is_lit(frame, surround, x, y);
+        let (top, bottom) = (
+            entry(height, frame, column),
+            entry(height, frame, |y| column(height - 1 - y)),
+        );
+        points.extend(top.map(|y| [f64::from(x), y]));
+        points.extend(bottom.map(|y| [f64::from(x), f64::from(height - 1) - y]));
+    }
+    points
+}
+
+/// The pixel in the center of one of [`LINES`] equal slices of a side.
+fn middle_of_slice(line: u32, side: u32) -> u32 {
+    let middle = u64::from(2 * line + 1) * u64::from(side) / u64::from(2 * LINES);
+    u32::try_from(middle).unwrap_or(side - 1)
+}
+
+fn is_lit(frame: &Frame, surround: &Surround, x: u32, y: u32) -> bool {
+    f64::from(brightness(frame.pixel(x, y))) > surround.threshold
+}
+
+/// The number of pixels before a scan stays lit for several pixels. Specks, and most strokes of a
+/// caption, are shorter.
+fn entry(length: u32, frame: &Frame, is_lit: impl Fn(u32) -> bool) -> Option<f64> {
+    let run_length = (frame.width().min(frame.height()) / 150).max(3);
+    let start = margin(frame);
+    if (start..start + run_length).any(&is_lit) {
+        return None;
+    }
+    let mut run = 0;
+    for at in start..length {
+        run = if is_lit(at) { run + 1 } else { 0 };
+        if run == run_length {
+            return Some(f64::from(at + 1 - run_length) - 0.5);
+        }
+    }
+    None
 }

@@ -1,6 +1,7 @@
 //! The whole frame as one network input: scaled to fit, with the rest filled gray.
 
 use image::{RgbImage, imageops};
+use lookdown_lens::saturating::to_u32;
 
 use super::{Frame, NetworkInput};
 
@@ -20,12 +21,7 @@ impl Letterbox {
     pub fn new(frame_width: u32, frame_height: u32, input: &NetworkInput) -> Self {
         let scale = (f64::from(input.width) / f64::from(frame_width))
             .min(f64::from(input.height) / f64::from(frame_height));
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "positive and no larger than the input"
-        )]
-        let scaled = |side: u32| ((f64::from(side) * scale).round() as u32).max(1);
+        let scaled = |side: u32| to_u32((f64::from(side) * scale).round()).max(1);
         Self {
             scale,
             width: scaled(frame_width).min(input.width),

@@ -3,10 +3,13 @@
 
 use std::ops::Range;
 
-use lookdown_lens::geometry::{
-    Pixel, Polygon,
-    pixels::{PixelConvention, cross_half_pixel},
-    polygon::{Edge, crossing},
+use lookdown_lens::{
+    geometry::{
+        Pixel, Polygon,
+        pixels::{PixelConvention, cross_half_pixel},
+        polygon::{Edge, crossing},
+    },
+    saturating::to_u32,
 };
 
 use super::Frame;
@@ -61,7 +64,7 @@ impl MaskedPixels {
         let position = cross_half_pixel(position, PixelConvention::CornerOrigin);
         position.x >= 0.0
             && position.y >= 0.0
-            && self.hides(whole(position.x.floor()), whole(position.y.floor()))
+            && self.hides(to_u32(position.x.floor()), to_u32(position.y.floor()))
     }
 
     /// Makes the masked pixels black in a frame of the same size.
@@ -120,16 +123,7 @@ fn extent([a, b]: Edge, top: f64, bottom: f64) -> Option<[f64; 2]> {
 
 /// The columns that lie between two positions or contain one of them, clipped to the frame.
 fn columns(left: f64, right: f64, width: u32) -> Range<u32> {
-    whole(left.floor()).min(width)..whole(right.ceil()).min(width)
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "`as` saturates, which clips to the frame"
-)]
-fn whole(coordinate: f64) -> u32 {
-    coordinate as u32
+    to_u32(left.floor()).min(width)..to_u32(right.ceil()).min(width)
 }
 
 /// Merges overlapping spans and sorts them from left to right.

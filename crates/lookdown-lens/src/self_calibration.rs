@@ -4,7 +4,6 @@
 //! planes through the center of projection and nearly all edges contain one of those directions.
 //! `docs/geometry.md` has the derivation.
 
-mod bootstrap;
 mod camera;
 mod camera_height;
 mod climb;
@@ -13,19 +12,16 @@ mod evaluation;
 mod evidence;
 mod fit;
 mod followed_edges;
-mod halves;
 mod known_camera;
 mod level_from_people;
 mod maxima;
 mod prior;
 mod refusal;
-mod residual;
 mod search;
 #[cfg(test)]
 mod tests;
 mod triples;
 mod uncertainty;
-mod upright;
 mod visible_people;
 
 pub use camera_height::{CameraHeight, HeightRefusal};

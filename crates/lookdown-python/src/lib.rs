@@ -9,7 +9,6 @@ mod calibrate;
 mod calibration;
 mod detector;
 mod error;
-mod lens;
 mod view;
 
 use std::{borrow::Cow, ffi::OsString, path::PathBuf, process::ExitCode};
@@ -53,9 +52,9 @@ mod _lookdown {
     #[pymodule_export]
     use super::error::LookdownError;
     #[pymodule_export]
-    use super::lens::PyLens;
-    #[pymodule_export]
     use super::view::PyView;
     #[pymodule_export]
     use super::{read_image, run, use_files};
+    #[pymodule_export]
+    use crate::calibration::PyLens;
 }

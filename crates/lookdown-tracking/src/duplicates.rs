@@ -38,7 +38,7 @@ fn are_one_person(a: &Track, b: &Track, now_s: f64) -> bool {
     {
         return false;
     }
-    let at_s = a.motion.at_s().max(b.motion.at_s());
+    let at_s = a.motion.at_s.max(b.motion.at_s);
     a.motion.separation(&b.motion, at_s).is_some_and(|between| {
         between.residual.norm() < MERGE_DISTANCE_M && between.squared_distance() < MERGE_GATE
     })

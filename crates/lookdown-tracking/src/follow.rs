@@ -6,8 +6,6 @@
 //! relative to its first crop. The caller detects motion, places crops and finds people in them.
 
 mod boxes;
-mod found_person;
-mod score;
 mod target;
 
 use lookdown_lens::geometry::OrientedBox;
@@ -18,8 +16,7 @@ use self::{
 };
 pub use self::{
     boxes::{overlap, widened},
-    found_person::FoundPerson,
-    score::{from_logit, logit},
+    target::{FoundPerson, from_logit, logit},
 };
 
 /// Time from a search to the next one, seconds: a little less than a second, because frames jitter.

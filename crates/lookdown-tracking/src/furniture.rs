@@ -87,12 +87,15 @@ pub enum ThingState {
 /// A thing that stands at one place.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Thing {
-    id: u64,
-    state: ThingState,
+    /// The identifier, unique per camera.
+    pub id: u64,
+    /// The state.
+    pub state: ThingState,
     /// The box at the begin of its presence; that of furniture follows slow changes.
     first: Shape,
     smoothed: Shape,
-    present_s: f64,
+    /// The observed time of its presence, seconds.
+    pub present_s: f64,
     /// Observed time since the thing was seen.
     missing_s: f64,
     /// Part of it in which something else was in its place.
@@ -157,16 +160,6 @@ impl Shape {
 }
 
 impl Thing {
-    /// Returns the identifier, unique per camera.
-    pub fn id(&self) -> u64 {
-        self.id
-    }
-
-    /// Returns the state.
-    pub fn state(&self) -> ThingState {
-        self.state
-    }
-
     /// Returns the center of the box in frame pixels.
     pub fn center_px(&self) -> [f64; 2] {
         self.smoothed.center_px
@@ -175,11 +168,6 @@ impl Thing {
     /// Returns width and height of the oriented box in frame pixels.
     pub fn size_px(&self) -> [f64; 2] {
         self.smoothed.log_size.map(f64::exp)
-    }
-
-    /// Returns the observed time of its presence, seconds.
-    pub fn present_s(&self) -> f64 {
-        self.present_s
     }
 
     /// Returns true if it is not counted.

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use lookdown_lens::saturating::to_u64;
 use serde::{Deserialize, Serialize};
 
 use crate::{Plane, Track, TrackId};
@@ -38,25 +39,19 @@ impl HeatMap {
     pub fn update<'a>(&mut self, tracks: impl IntoIterator<Item = &'a Track>) {
         let mut counted = BTreeMap::new();
         for track in tracks {
-            let first = track.first_seen_s();
-            let mut until = self.counted_s.get(&track.id()).copied().unwrap_or(first);
+            let first = track.first_seen_s;
+            let mut until = self.counted_s.get(&track.id).copied().unwrap_or(first);
             for point in track.tail() {
                 if point.at_s <= until {
                     continue;
                 }
                 if let Some(cell) = point.place(Plane::FloorM).and_then(Cell::at) {
                     let milliseconds = (point.at_s - until).min(MAX_GAP_S) * 1000.0;
-                    #[expect(
-                        clippy::cast_possible_truncation,
-                        clippy::cast_sign_loss,
-                        reason = "from 0 to MAX_GAP_S"
-                    )]
-                    let milliseconds = milliseconds.round() as u64;
-                    *self.milliseconds.entry(cell).or_default() += milliseconds;
+                    *self.milliseconds.entry(cell).or_default() += to_u64(milliseconds.round());
                 }
                 until = point.at_s;
             }
-            counted.insert(track.id(), until);
+            counted.insert(track.id, until);
         }
         self.counted_s = counted;
     }

@@ -4,14 +4,12 @@
 //! once the track is beyond the band. A track that returns within the band cancels it, so that a
 //! person who hesitates on the line is never counted twice.
 
-mod crossings;
-
 use std::collections::BTreeMap;
 
+use nalgebra::{Point2, Vector2};
 use serde::{Deserialize, Serialize};
 
 use crate::{Plane, TailPoint, Track, TrackId};
-use crossings::{distance, signed_crossings};
 
 /// Most points of a line.
 pub const MAX_LINE_POINTS: usize = 64;
@@ -66,8 +64,10 @@ pub struct LineError(String);
 /// The lines over the tracks of one tracker.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LineCounter {
-    lines: Vec<Line>,
-    state: LineState,
+    /// The lines.
+    pub lines: Vec<Line>,
+    /// The state to be stored with that of the tracker.
+    pub state: LineState,
 }
 
 /// The part of a counter that must survive a restart together with the tracker.
@@ -113,23 +113,13 @@ impl LineCounter {
         Ok(Self { lines, state })
     }
 
-    /// Returns the lines.
-    pub fn lines(&self) -> &[Line] {
-        &self.lines
-    }
-
-    /// Returns the state to be stored with that of the tracker.
-    pub fn state(&self) -> &LineState {
-        &self.state
-    }
-
     /// Returns the crossings since the last call. `tracks` are all confirmed tracks of the tracker,
     /// after each of its updates.
     pub fn update<'a>(&mut self, tracks: impl IntoIterator<Item = &'a Track>) -> Vec<Crossing> {
         let mut crossings = Vec::new();
         let mut states = BTreeMap::new();
         for track in tracks {
-            let known = self.state.tracks.remove(&track.id());
+            let known = self.state.tracks.remove(&track.id);
             let mut approaches =
                 known.unwrap_or_else(|| vec![Approach::default(); self.lines.len()]);
             for (index, (line, approach)) in self.lines.iter().zip(&mut approaches).enumerate() {
@@ -137,12 +127,12 @@ impl LineCounter {
                     crossings.push(Crossing {
                         line: index,
                         direction,
-                        track: track.id(),
+                        track: track.id,
                         at_s,
                     });
                 }
             }
-            states.insert(track.id(), approaches);
+            states.insert(track.id, approaches);
         }
         self.state.tracks = states;
         crossings
@@ -201,6 +191,49 @@ impl Line {
         };
         Err(LineError(format!("line `{}` {problem}", self.name)))
     }
+}
+
+/// Returns the crossings of the step `from` – `to` through the polyline to the right-hand side of a
+/// walk along it (x right, y down), minus those to the left.
+///
+/// A point exactly on a line counts as on its left, and so does a corner exactly on the step's
+/// line: a step through a corner crosses one of the two segments that meet there, never both or
+/// none.
+fn signed_crossings(points: &[[f64; 2]], from: [f64; 2], to: [f64; 2]) -> i32 {
+    let segments = points.windows(2).map(|pair| (pair[0], pair[1]));
+    segments
+        .map(|(start, end)| {
+            let was_right = is_right(start, end, from);
+            let is_now_right = is_right(start, end, to);
+            let is_within = is_right(from, to, start) != is_right(from, to, end);
+            match (is_within, was_right, is_now_right) {
+                (true, false, true) => 1,
+                (true, true, false) => -1,
+                _ => 0,
+            }
+        })
+        .sum()
+}
+
+/// Returns true when `point` lies to the right of a walk from `start` to `end`.
+fn is_right(start: [f64; 2], end: [f64; 2], point: [f64; 2]) -> bool {
+    let along = Vector2::from(end) - Vector2::from(start);
+    let to_point = Vector2::from(point) - Vector2::from(start);
+    along.perp(&to_point) > 0.0
+}
+
+/// Returns the distance of a point from the polyline, its ends included.
+fn distance(points: &[[f64; 2]], point: [f64; 2]) -> f64 {
+    let point = Point2::from(point);
+    let segments = points.windows(2);
+    segments
+        .map(|pair| {
+            let start = Point2::from(pair[0]);
+            let along = Point2::from(pair[1]) - start;
+            let share = (point - start).dot(&along) / along.norm_squared();
+            (point - (start + along * share.clamp(0.0, 1.0))).norm()
+        })
+        .fold(f64::INFINITY, f64::min)
 }
 
 #[cfg(test)]

@@ -27,7 +27,8 @@ pub(super) struct Motion {
     /// Rotation from the tangent plane's frame (z through its origin) to the camera, column by
     /// column; absent on the floor.
     tangent: Option<Tangent>,
-    at_s: f64,
+    /// The time of the state, seconds since the Unix epoch.
+    pub at_s: f64,
 }
 
 impl Motion {
@@ -42,11 +43,6 @@ impl Motion {
             tangent,
             at_s,
         }
-    }
-
-    /// Returns the time of the state, seconds since the Unix epoch.
-    pub fn at_s(&self) -> f64 {
-        self.at_s
     }
 
     /// Returns the state on the floor; `None` in bearing space.

@@ -17,7 +17,7 @@ pub(super) fn continue_lost(
     new: TrackId,
     settings: &TrackerSettings,
 ) {
-    let is_new = |track: &&Track| track.id() == new && track.is_confirmed();
+    let is_new = |track: &&Track| track.id == new && track.is_confirmed();
     let Some(mut track) = tracks.iter().find(is_new).cloned() else {
         return;
     };
@@ -28,18 +28,18 @@ pub(super) fn continue_lost(
     };
     if gain > 0.0 {
         track.continue_from(earlier);
-        let is_other = |other: &Track| ![new, track.id()].contains(&other.id());
+        let is_other = |other: &Track| ![new, track.id].contains(&other.id);
         tracks.retain(is_other);
         lost.retain(is_other);
-        let at = tracks.partition_point(|other| other.id() < track.id());
+        let at = tracks.partition_point(|other| other.id < track.id);
         tracks.insert(at, track);
     }
 }
 
 /// The logarithm of the ratio of "the person of this track is back" to "a new person".
 fn likelihood(earlier: &Track, new: &Track, settings: &TrackerSettings) -> f64 {
-    let absent_s = new.motion.at_s() - earlier.seen_s();
-    if !earlier.is_confirmed() || earlier.seen_s() >= new.first_seen_s() {
+    let absent_s = new.motion.at_s - earlier.seen_s;
+    if !earlier.is_confirmed() || earlier.seen_s >= new.first_seen_s {
         return -1.0;
     }
     let innovation = earlier
@@ -51,7 +51,7 @@ fn likelihood(earlier: &Track, new: &Track, settings: &TrackerSettings) -> f64 {
 /// Keeps the confirmed tracks that ended, for a while.
 pub(super) fn keep_lost(lost: &mut Vec<Track>, ended: &[Track], now_s: f64, max_absent_s: f64) {
     lost.extend(ended.iter().filter(|track| track.is_confirmed()).cloned());
-    lost.retain(|track| now_s - track.seen_s() <= max_absent_s);
+    lost.retain(|track| now_s - track.seen_s <= max_absent_s);
     let over = lost.len().saturating_sub(MAX_LOST);
     lost.drain(..over);
 }

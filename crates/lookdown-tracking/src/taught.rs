@@ -9,6 +9,8 @@
 //!
 //! `cargo run -p lookdown-simulate --bin taught < SEQUENCES` measures both.
 
+use lookdown_lens::saturating::to_usize;
+
 /// Candidates with a lower score are not needed: with the lowest thresholds, most boxes are none.
 pub const LEAST_SCORE: f64 = 0.02;
 /// Least number of reference frames for a threshold of the camera's own.
@@ -201,15 +203,6 @@ fn scale(number: f64) -> f64 {
 
 fn to_f64(number: usize) -> f64 {
     number as f64
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "clamped to the range of numbers of persons"
-)]
-fn to_usize(number: f64) -> usize {
-    number.clamp(0.0, 1e9) as usize
 }
 
 #[cfg(test)]

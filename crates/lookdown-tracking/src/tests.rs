@@ -9,7 +9,7 @@ use crate::{
 };
 
 fn ids(tracker: &Tracker) -> Vec<u64> {
-    tracker.tracks().map(|track| track.id().0).collect()
+    tracker.tracks().map(|track| track.id.0).collect()
 }
 
 fn floor_of(track: &Track) -> [f64; 2] {
@@ -34,7 +34,7 @@ fn one_walk_is_one_track() {
     let track = tracker.tracks().next().unwrap();
     let [vx, vy] = track.velocity_m_s().unwrap();
     assert!((vx - 1.0).abs() < 0.1 && vy.abs() < 0.1, "{vx} {vy}");
-    assert_eq!(track.last_person().person, 0);
+    assert_eq!(track.last_person.person, 0);
 }
 
 #[test]
@@ -68,7 +68,7 @@ fn a_track_ends_when_its_person_is_gone() {
         ended.extend(tracker.update(0, f64::from(frame) / 5.0, &[]).unwrap());
     }
     assert_eq!(ended.len(), 1);
-    assert_eq!(ended[0].seen_s(), 9.0 / 5.0);
+    assert_eq!(ended[0].seen_s, 9.0 / 5.0);
     assert_eq!(ids(&tracker), [0; 0]);
 }
 
@@ -94,7 +94,7 @@ fn low_scores_continue_tracks_but_start_none() {
         let at_s = f64::from(frame) / 5.0;
         tracker.update(0, at_s, &[low(at_s)]).unwrap();
     }
-    assert_eq!(tracker.tracks().next().unwrap().seen_s(), 14.0 / 5.0);
+    assert_eq!(tracker.tracks().next().unwrap().seen_s, 14.0 / 5.0);
 }
 
 #[test]
@@ -220,7 +220,7 @@ fn a_stored_tracker_goes_on_as_if_never_stopped() {
     let last = |tracker: &Tracker| {
         let track = tracker.tracks().next().unwrap();
         (
-            track.id(),
+            track.id,
             track.tail().len(),
             floor_of(track).map(|m| (m * 1e9).round()),
         )
@@ -400,7 +400,7 @@ proptest! {
             shuffled.update(0, at_s, &other).unwrap();
             let states = |tracker: &Tracker| -> Vec<_> {
                 let tracks = tracker.tracks();
-                tracks.map(|t| (t.id(), t.place(Plane::FloorM), t.velocity_m_s(), t.seen_s())).collect()
+                tracks.map(|t| (t.id, t.place(Plane::FloorM), t.velocity_m_s(), t.seen_s)).collect()
             };
             prop_assert_eq!(states(&straight), states(&shuffled));
         }
@@ -417,7 +417,7 @@ proptest! {
         for (frame, (x, y)) in (0_u32..).zip(places) {
             let persons = [person(x, y)];
             for track in tracker.update(0, f64::from(frame), &persons).unwrap() {
-                ended.insert(track.id().0);
+                ended.insert(track.id.0);
             }
             let present = ids(&tracker);
             prop_assert!(present.windows(2).all(|pair| pair[0] < pair[1]));

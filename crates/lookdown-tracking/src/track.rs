@@ -6,9 +6,8 @@ use lookdown_lens::geometry::{Posture, PostureBelief};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::Observation;
 use crate::{
-    Plane, TrackId, TrackerSettings, evidence::Evidence, furniture::START_AFTER_S,
+    Observation, Plane, TrackerSettings, evidence::Evidence, furniture::START_AFTER_S,
     measurement::Measurement, motion::Motion,
 };
 
@@ -18,10 +17,13 @@ pub const MAX_TAIL_POINTS: usize = 64;
 /// A confirmed or possible person over time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Track {
-    id: TrackId,
+    /// The track's identifier.
+    pub id: TrackId,
     pub(super) motion: Motion,
-    first_seen_s: f64,
-    seen_s: f64,
+    /// The time of the first observation, seconds since the Unix epoch.
+    pub first_seen_s: f64,
+    /// The time of the last observation, seconds since the Unix epoch.
+    pub seen_s: f64,
     pub(super) evidence: Evidence,
     /// The place at which the present evidence began.
     evidence_place: [f64; 3],
@@ -29,11 +31,13 @@ pub struct Track {
     has_moved: bool,
     pub(super) missed: u32,
     confirmed: bool,
-    last_person: PersonOfReport,
+    /// The person of the report that updated the track last.
+    pub last_person: PersonOfReport,
     foot_px: [f64; 2],
-    center_px: [f64; 2],
+    /// The center of the last box in the frame that showed it, pixels.
+    pub center_px: [f64; 2],
     /// The longer side of the last box.
-    length_px: f64,
+    pub length_px: f64,
     /// True while the last person was in the margin of an area.
     #[serde(default)]
     in_margin: bool,
@@ -172,11 +176,6 @@ impl Track {
         });
     }
 
-    /// Returns the track's identifier.
-    pub fn id(&self) -> TrackId {
-        self.id
-    }
-
     /// Returns true once the track has enough evidence of a person.
     pub fn is_confirmed(&self) -> bool {
         self.confirmed
@@ -194,21 +193,6 @@ impl Track {
         self.confirmed && !self.in_margin
     }
 
-    /// Returns the time of the first observation, seconds since the Unix epoch.
-    pub fn first_seen_s(&self) -> f64 {
-        self.first_seen_s
-    }
-
-    /// Returns the time of the last observation, seconds since the Unix epoch.
-    pub fn seen_s(&self) -> f64 {
-        self.seen_s
-    }
-
-    /// Returns the person of the report that updated the track last.
-    pub fn last_person(&self) -> PersonOfReport {
-        self.last_person
-    }
-
     /// Returns the place at the last observation: filtered on the floor, as observed in the frame.
     /// `None` for the floor without the camera's height.
     pub fn place(&self, plane: Plane) -> Option<[f64; 2]> {
@@ -216,16 +200,6 @@ impl Track {
             Plane::FloorM => self.motion.on_floor().map(|state| state.place().into()),
             Plane::FramePx => Some(self.foot_px),
         }
-    }
-
-    /// Returns the center of the last box in the frame that showed it, pixels.
-    pub fn center_px(&self) -> [f64; 2] {
-        self.center_px
-    }
-
-    /// Returns the longer side of that box, pixels.
-    pub fn length_px(&self) -> f64 {
-        self.length_px
     }
 
     /// Returns the posture at the last observation, with its probability: the boxes before tell the
@@ -249,3 +223,7 @@ impl Track {
         self.tail.iter()
     }
 }
+
+/// Identifies a track within its tracker, and a later one of the same person who came back.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct TrackId(pub u64);

@@ -171,7 +171,7 @@ impl Tracker {
             unknown,
         } = separate(candidates, &shown);
         let possible = self.tracks.iter().filter(|track| !track.is_confirmed());
-        let possible: Vec<TrackId> = possible.map(Track::id).collect();
+        let possible: Vec<TrackId> = possible.map(|track| track.id).collect();
         let used = self.associate(&report, &candidates);
         for id in possible {
             continue_lost(&mut self.tracks, &mut self.lost, id, &self.settings);
@@ -286,7 +286,7 @@ impl Tracker {
     ) {
         let tracks = self.tracks.iter();
         let standing = tracks.filter(|track| report.shows(track) && track.stands());
-        let indices = standing.map(|track| track.last_person().person);
+        let indices = standing.map(|track| track.last_person.person);
         let furniture = &mut self.cameras[report.camera].furniture;
         for index in indices.filter(|index| unknown.contains(index)) {
             furniture.start(&persons[index]);
@@ -339,7 +339,7 @@ impl Tracker {
     fn end_unseen(&mut self, now_s: f64) -> Vec<Track> {
         let settings = &self.settings;
         let is_over = |track: &mut Track| {
-            let unseen_s = now_s - track.seen_s();
+            let unseen_s = now_s - track.seen_s;
             let is_missed = track.missed >= settings.max_missed && unseen_s > settings.max_unseen_s;
             let is_refuted = !track.is_confirmed()
                 && track.missed > 0

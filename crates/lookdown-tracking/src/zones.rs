@@ -70,9 +70,11 @@ pub enum ZoneError {
 /// The zones over the tracks of one tracker.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ZoneCounter {
-    zones: Vec<Zone>,
+    /// The zones.
+    pub zones: Vec<Zone>,
     hold_s: f64,
-    state: ZoneState,
+    /// The state to be stored with that of the tracker.
+    pub state: ZoneState,
 }
 
 /// The part of a counter that must survive a restart together with the tracker.
@@ -125,16 +127,6 @@ impl ZoneCounter {
         })
     }
 
-    /// Returns the zones.
-    pub fn zones(&self) -> &[Zone] {
-        &self.zones
-    }
-
-    /// Returns the state to be stored with that of the tracker.
-    pub fn state(&self) -> &ZoneState {
-        &self.state
-    }
-
     /// Returns entries and exits since the last call. `tracks` are all confirmed tracks of the
     /// tracker, after each of its updates: a track that is gone leaves its zones.
     pub fn update<'a>(&mut self, tracks: impl IntoIterator<Item = &'a Track>) -> Vec<ZoneEvent> {
@@ -142,15 +134,15 @@ impl ZoneCounter {
         let mut states = BTreeMap::new();
         let mut before = std::mem::take(&mut self.state.tracks);
         for track in tracks {
-            let known = before.remove(&track.id());
+            let known = before.remove(&track.id);
             let mut visits = known.unwrap_or_else(|| vec![Visit::default(); self.zones.len()]);
             for (zone, visit) in visits.iter_mut().enumerate() {
                 let area = &self.zones[zone];
                 for side in visit.advance(area, track.tail(), self.hold_s) {
-                    events.push(side.event(zone, track.id()));
+                    events.push(side.event(zone, track.id));
                 }
             }
-            states.insert(track.id(), visits);
+            states.insert(track.id, visits);
         }
         for (&track, visits) in &before {
             let inside = visits

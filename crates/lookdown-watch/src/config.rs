@@ -1,14 +1,12 @@
 //! The cameras and the server that receives their frames.
 
 mod entry;
-mod file;
 
-pub use entry::CameraEntry;
-pub use file::WatchEntry;
-
-use lookdown_common::{ConfigError, ServerOptions};
+use lookdown_common::{ConfigError, ServerEntry, ServerOptions};
 
 use crate::Camera;
+
+pub use entry::CameraEntry;
 
 /// Most cameras of a process.
 pub const MAX_CAMERAS: usize = 256;
@@ -50,5 +48,34 @@ impl WatchOptions {
             }
         }
         Ok(Self { server, cameras })
+    }
+}
+
+/// The cameras as they are written in a file or on the command line.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct WatchEntry {
+    /// The server that receives the frames.
+    pub server: ServerEntry,
+    /// The values of keys that a camera does not have.
+    pub defaults: CameraEntry,
+    /// The cameras.
+    pub cameras: Vec<CameraEntry>,
+}
+
+impl WatchEntry {
+    /// Checks the cameras and reads the files that they name. Paths are relative to the current
+    /// folder. Blocks.
+    ///
+    /// # Errors
+    /// [`ConfigError`].
+    pub fn check(self) -> Result<WatchOptions, ConfigError> {
+        let server = self.server.check()?;
+        let cameras = self.cameras.into_iter().enumerate();
+        let cameras = cameras.map(|(index, camera)| {
+            camera
+                .or(&self.defaults)
+                .check(&format!("cameras[{index}]."))
+        });
+        WatchOptions::new(server, cameras.collect::<Result<_, _>>()?)
     }
 }

@@ -18,10 +18,7 @@ use tokio::{
 
 use crate::{
     MAX_FRAME_BYTES, SourceError, VideoOptions,
-    child::{
-        self, Task,
-        usage::{self, Usage},
-    },
+    child::{self, Task, USAGE_INTERVAL, Usage},
     jpeg_splitter::JpegSplitter,
     memory_budget::Reservation,
     stderr_line::LastLine,
@@ -118,7 +115,7 @@ impl Ffmpeg {
             splitter: JpegSplitter::new(MAX_FRAME_BYTES),
             memory: Reservation::default(),
             usage,
-            checks: interval(usage::INTERVAL),
+            checks: interval(USAGE_INTERVAL),
             shown,
         })
     }

@@ -16,7 +16,6 @@ mod memory_budget;
 mod metrics;
 mod metrics_server;
 mod operating_point;
-mod pace;
 mod rate;
 mod rtsp_relay;
 mod sender;

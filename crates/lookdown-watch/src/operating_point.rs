@@ -115,14 +115,9 @@ impl Choice {
 
 impl fmt::Display for Choice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            profile,
-            rate,
-            search,
-            ..
-        } = self;
-        let seconds = search.as_secs_f64();
-        let unit = if *rate == 1.0 { "frame/s" } else { "frames/s" };
+        let (profile, rate) = (&self.profile, self.rate);
+        let seconds = self.search.as_secs_f64();
+        let unit = if rate == 1.0 { "frame/s" } else { "frames/s" };
         write!(
             f,
             "{profile} at {rate} {unit}: a search takes {seconds:.1} s"

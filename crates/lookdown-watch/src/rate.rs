@@ -66,9 +66,7 @@ impl RateMeter {
 impl Rate {
     /// Returns the sentence for the log, with the remedies; `None` if the rate is reached.
     pub(crate) fn warning(&self) -> Option<String> {
-        let Self {
-            wanted, reached, ..
-        } = self;
+        let (wanted, reached) = (self.wanted, self.reached);
         let (reason, remedies) = if self.is_server_slow {
             (
                 "the machine is too slow",

@@ -103,12 +103,9 @@ impl Follower {
             .expect("reports in order");
         self.crossings
             .extend(self.line.update(self.tracker.tracks()));
-        for track in self.tracker.tracks().filter(|track| track.seen_s() == at_s) {
+        for track in self.tracker.tracks().filter(|track| track.seen_s == at_s) {
             if let Some(place) = track.place(Plane::FloorM) {
-                self.walks
-                    .entry(track.id())
-                    .or_default()
-                    .push((at_s, place));
+                self.walks.entry(track.id).or_default().push((at_s, place));
             }
         }
     }
@@ -125,9 +122,9 @@ impl Follower {
         let current = self
             .tracker
             .tracks()
-            .filter(|track| track.last_person().camera == camera && track.seen_s() == at_s);
+            .filter(|track| track.last_person.camera == camera && track.seen_s == at_s);
         current
-            .map(|track| json!([track.id(), track.last_person().person]))
+            .map(|track| json!([track.id, track.last_person.person]))
             .collect()
     }
 
@@ -135,7 +132,7 @@ impl Follower {
         let present = self
             .tracker
             .tracks()
-            .filter(|track| at_s - track.seen_s() <= PRESENT_S);
+            .filter(|track| at_s - track.seen_s <= PRESENT_S);
         present.filter_map(|track| place_at(track, at_s)).collect()
     }
 
@@ -150,8 +147,8 @@ impl Follower {
 fn place_at(track: &Track, at_s: f64) -> Option<Value> {
     let [x, y] = track.place(Plane::FloorM)?;
     let [vx, vy] = track.velocity_m_s()?;
-    let dt = at_s - track.seen_s();
-    Some(json!([track.id(), x + vx * dt, y + vy * dt]))
+    let dt = at_s - track.seen_s;
+    Some(json!([track.id, x + vx * dt, y + vy * dt]))
 }
 
 /// The hall, its cameras and its followers.

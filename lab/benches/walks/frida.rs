@@ -124,10 +124,10 @@ impl Site {
             tracker.update(0, at_s, &persons(view, frame).1)?;
             for track in tracker
                 .tracks()
-                .filter(|track| track.counts() && track.seen_s() == at_s)
+                .filter(|track| track.counts() && track.seen_s == at_s)
             {
                 let place = track.place(Plane::FloorM).context("a place on the floor")?;
-                walks.entry(track.id()).or_default().push((at_s, place));
+                walks.entry(track.id).or_default().push((at_s, place));
             }
         }
         Ok(walks.into_values().collect())

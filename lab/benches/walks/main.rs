@@ -145,10 +145,10 @@ pub fn continued(
 ) -> Result<Vec<(i64, usize)>> {
     let mut continued = Vec::new();
     for track in tracker.tracks().filter(|track| track.counts()) {
-        let last = track.last_person();
-        if track.seen_s() == at_s && last.camera == camera {
+        let last = track.last_person;
+        if track.seen_s == at_s && last.camera == camera {
             continued.push((
-                serde_json::to_value(track.id())?
+                serde_json::to_value(track.id)?
                     .as_i64()
                     .unwrap_or_default(),
                 boxes[last.person],

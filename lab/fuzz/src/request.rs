@@ -18,10 +18,13 @@ use axum::{
 };
 use http_body_util::BodyExt;
 use lookdown::{
-    api::{self, ApiOptions, ApiState, Readiness},
+    api::{self, Access, ApiOptions, ApiState, Companions, Readiness},
     calibration_store::{CalibrationStore, Calibrations, ListedFile, Replaces, StoreError},
     metrics::Metrics,
     results::{MemoryResults, ResultLimits, ResultStore},
+    settings::load,
+    telemetry::Tracer,
+    views::Views,
 };
 use lookdown_detect::{
     inference::{
@@ -132,7 +135,7 @@ fn router() -> Router {
         rig_cache_bytes: 1 << 24,
         ..EngineOptions::for_testing(MODEL)
     };
-    let registry = Arc::clone(models.registry());
+    let registry = Arc::clone(&models.registry);
     let engine = Engine::new(
         registry,
         Some(calibrations.clone()),
@@ -146,6 +149,10 @@ fn router() -> Router {
     let results = MemoryResults::new(ResultLimits::default(), Arc::clone(&metrics));
     // Ends event streams and waits for reports at once.
     results.listeners().end();
+    let mut settings = load(None, []).unwrap_or_else(|error| panic!("{error}"));
+    settings.server.max_body_bytes = 1 << 16;
+    settings.limits.max_upload_bytes = 1 << 20;
+    settings.limits.min_upload_bytes_per_second = None;
     api::router(ApiState::new(
         Arc::new(workers),
         Arc::new(models),
@@ -154,11 +161,14 @@ fn router() -> Router {
         metrics,
         readiness,
         ApiOptions {
-            max_body_bytes: 1 << 16,
-            max_upload_bytes: 1 << 20,
-            max_header_bytes: 1 << 14,
-            max_headers: 100,
-            ..ApiOptions::for_testing()
+            settings: Arc::new(settings),
+            views: Arc::new(Views::new("state".into(), DecodeLimits::default(), None)),
+            access: Access::Open {
+                own_machine_only: true,
+            },
+            companions: Companions::default(),
+            references: Arc::default(),
+            tracer: Tracer::default(),
         },
     ))
 }

@@ -134,3 +134,45 @@ fn a_key_states_its_highest_priority_or_has_the_default() {
         assert!(message.contains("1 (highest) to 9"), "{message}");
     }
 }
+
+/// The example of FIPS 180-4.
+const OF_ABC: &str = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+
+#[test]
+fn the_digest_is_sha_256() {
+    assert_eq!(KeyDigest::new(b"abc").hexadecimal(), OF_ABC);
+    let parsed = KeyDigest::parse(&OF_ABC.to_uppercase()).unwrap();
+    assert_eq!(parsed, KeyDigest::new(b"abc"));
+}
+
+#[test]
+fn only_64_hexadecimal_digits_are_a_digest() {
+    for wrong in [
+        "",
+        "ab",
+        &OF_ABC[..62],
+        &format!("{OF_ABC}00"),
+        &OF_ABC[..63],
+    ] {
+        assert!(KeyDigest::parse(wrong).is_none(), "{wrong}");
+    }
+    assert!(KeyDigest::parse(&OF_ABC.replace('b', "g")).is_none());
+}
+
+#[test]
+fn digests_that_agree_in_all_but_one_byte_differ() {
+    let whole = KeyDigest::new(b"abc");
+    for at in 0..BYTES {
+        let mut other = whole.clone();
+        other.0[at] ^= 1;
+        assert_ne!(whole, other);
+    }
+}
+
+#[test]
+fn new_keys_are_long_differ_and_are_nowhere_in_debug_output() {
+    let (one, other) = (new_key().unwrap(), new_key().unwrap());
+    assert_ne!(one, other);
+    assert_eq!(one.len(), PREFIX.len() + 64);
+    assert_eq!(format!("{:?}", KeyDigest::new(b"abc")), "KeyDigest(…)");
+}

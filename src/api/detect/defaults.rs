@@ -30,7 +30,7 @@ pub(in crate::api) fn detect_parameters<'a>(
             given.push((DetectParameters::CALIBRATION, name));
         }
     }
-    let server = &state.options.detect_defaults;
+    let server = &state.options.settings.detect;
     let mut layers = Vec::with_capacity(2);
     if let Some(camera) = &camera {
         layers.push((DefaultSource::Calibration, &camera.defaults));

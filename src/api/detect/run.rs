@@ -71,7 +71,7 @@ pub(in crate::api) async fn run_detection<T: Send + 'static>(
     let timeout = job.parameters.timeout;
     let timeline = job.ticket.timeline.clone();
     let is_stored = job.parameters.store;
-    let concealment = state.options.conceal_images;
+    let concealment = state.options.settings.results.conceal_images;
     let observer = state.clone();
     let frame = job.image.clone();
     let work = state.workers.detect_and(job, move |detected| {
@@ -194,7 +194,7 @@ fn describe(trace: &RequestTrace, report: &DetectionReport) {
 
 /// Sets the metrics of the camera's zones.
 fn record_zones(state: &ApiState, report: &DetectionReport) {
-    if state.options.zone_metrics {
+    if state.options.settings.calibrations.zone_metrics {
         let zones = report.zones.iter();
         let zones = zones.map(|zone| (zone.name.as_str(), zone.persons));
         state.metrics.set_zones(&report.camera, zones);

@@ -4,7 +4,6 @@
 //! The whole body is read first, within limits.
 
 mod form;
-mod received_request;
 
 use std::{sync::Arc, time::Instant};
 
@@ -13,17 +12,13 @@ use axum::{
     http::{
         HeaderMap, HeaderValue,
         header::{CONTENT_ENCODING, CONTENT_TYPE},
+        request::Parts,
     },
 };
+use bytes::Bytes;
 use jiff::Timestamp;
 use lookdown_common::text::Quoted;
 use lookdown_detect::{parameters::DetectParameters, pipeline::DetectJob};
-
-pub(in crate::api) use received_request::ReceivedRequest;
-
-use form::{Form, frame_in_query, use_in_detection};
-
-pub(in crate::api) use form::{FieldUse, frames_among};
 
 use crate::{
     access::Scope,
@@ -34,10 +29,15 @@ use crate::{
             context::RequestContext,
             problem::{Problem, ProblemKind},
             query::query_parameters,
-            request_body::UploadBudget,
+            request_body::{BodyReader, Held, UploadBudget},
         },
+        readiness::Phase,
     },
 };
+
+use form::{Form, frame_in_query, use_in_detection};
+
+pub(in crate::api) use form::{FieldUse, frames_among};
 
 /// A frame in memory with the parameters of its request.
 pub(in crate::api) struct Upload {
@@ -163,4 +163,59 @@ pub(in crate::api) fn is_multipart(headers: &HeaderMap) -> bool {
         let value = value.as_bytes();
         value.len() >= 10 && value[..10].eq_ignore_ascii_case(b"multipart/")
     })
+}
+
+/// A complete detection request. As an extractor, it also checks the scope `detect`.
+pub(in crate::api) struct ReceivedRequest {
+    pub(in crate::api) parts: Parts,
+    pub(in crate::api) context: Arc<RequestContext>,
+    pub(in crate::api) body: Held<Bytes>,
+    /// Time at which the request arrived.
+    pub(in crate::api) received_at: Timestamp,
+    /// Time at which the whole body was in memory.
+    pub(in crate::api) arrived: Instant,
+}
+
+impl FromRequest<ApiState> for ReceivedRequest {
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
+        let context = RequestContext::from_extensions(request.extensions())?;
+        let access = &state.options.access;
+        access.check(request.headers(), &context.identity, Scope::Detect)?;
+        Self::receive(request, state, &state.uploads).await
+    }
+}
+
+impl ReceivedRequest {
+    /// Reads the request, whose body uses memory of `budget`. The key is not checked here.
+    pub(in crate::api) async fn receive(
+        request: Request,
+        state: &ApiState,
+        budget: &UploadBudget,
+    ) -> Result<Self, Problem> {
+        let received_at = Timestamp::now();
+        let (parts, body) = request.into_parts();
+        if state.readiness.phase() == Phase::WarmingUp {
+            return Err(Problem::warming_up());
+        }
+        let context = RequestContext::from_extensions(&parts.extensions)?;
+        let client = &context.caller.client;
+        // A frame that finds no place in the queue is refused before its body is read.
+        state.workers.admits(client)?;
+        let max_bytes = state.options.settings.server.max_body_bytes;
+        let remedy = "send a smaller image or raise server.max_body_bytes";
+        let reader = BodyReader {
+            budget: budget.for_client(client),
+            ..state.body_reader(&context, max_bytes, remedy)
+        };
+        let body = reader.read(&parts.headers, body).await?;
+        Ok(Self {
+            parts,
+            context,
+            body,
+            received_at,
+            arrived: Instant::now(),
+        })
+    }
 }

@@ -11,7 +11,10 @@ use lookdown_http::{
 };
 
 use super::problem::{Problem, ProblemKind};
-use crate::access::{AccessKeys, Holder, Scope};
+use crate::{
+    access::{AccessKeys, Holder, Scope},
+    settings::AccessSettings,
+};
 
 /// The access rules of the server.
 #[derive(Debug, Clone)]
@@ -89,14 +92,13 @@ impl Access {
     /// Returns the origins that may make changes; `None` if there are keys.
     pub(in crate::api) fn allowed_origins(
         &self,
-        cors_origins: &[String],
-        hosts: &[String],
+        settings: &AccessSettings,
     ) -> Option<AllowedOrigins> {
         match self {
             Self::Open { own_machine_only } => Some(AllowedOrigins {
                 own_machine_only: *own_machine_only,
-                allowed: cors_origins.into(),
-                hosts: hosts.into(),
+                allowed: settings.cors_origins.as_slice().into(),
+                hosts: settings.hosts.as_slice().into(),
                 remedies: Remedies {
                     keys: "access.keys_file",
                     hosts: "add the name to access.hosts",

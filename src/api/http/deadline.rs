@@ -183,7 +183,7 @@ mod tests {
         timeout(Duration::from_secs(20), all_wait).await.unwrap();
         let refused = deadline().using(&HANGING, || Ok::<_, Problem>(())).await;
         let refused = refused.unwrap_err();
-        assert_eq!(refused.kind(), ProblemKind::Overloaded);
+        assert_eq!(refused.kind, ProblemKind::Overloaded);
         for store in [&CALIBRATIONS, &CAMERAS] {
             let other = deadline().using(store, || Ok::<_, Problem>(1)).await;
             assert_eq!(other.ok(), Some(1));

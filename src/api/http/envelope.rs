@@ -76,10 +76,10 @@ pub(in crate::api) async fn wrap(
     let _in_request = span.enter();
     let mut failure = None;
     if let Some(problem) = Problem::take_from(&mut response, method, &path) {
-        let (reason, occurrence) = (problem.kind().name(), new_id());
+        let (reason, occurrence) = (problem.kind.name(), new_id());
         failure = Some(Failure { reason, occurrence });
         metrics.failures.with_label_values(&[reason]).inc();
-        if let Some(cause) = problem.cause() {
+        if let Some(cause) = &problem.cause {
             tracing::error!(instance = %occurrence, "{cause:#}");
         }
         response = write_problem(response, problem, &occurrence, request_id);
@@ -141,7 +141,7 @@ fn write_problem(
     occurrence: &Uuid,
     request_id: &RequestId,
 ) -> Response {
-    let status = problem.status();
+    let status = problem.status;
     let body = Json(problem.body(occurrence, request_id.as_str())).into_response();
     let (mut parts, _) = response.into_parts();
     parts.status = status;

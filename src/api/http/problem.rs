@@ -30,8 +30,8 @@ const FRAME: &str = "image";
 /// The reason why a request failed.
 #[derive(Debug, Clone)]
 pub(in crate::api) struct Problem {
-    kind: ProblemKind,
-    status: StatusCode,
+    pub(in crate::api) kind: ProblemKind,
+    pub(in crate::api) status: StatusCode,
     detail: String,
     /// The parameter or form field at fault.
     parameter: Option<String>,
@@ -40,7 +40,7 @@ pub(in crate::api) struct Problem {
     /// Members that a protocol adds to the document.
     members: BTreeMap<&'static str, Value>,
     /// The internal error: logged, never sent.
-    cause: Option<Arc<anyhow::Error>>,
+    pub(in crate::api) cause: Option<Arc<anyhow::Error>>,
 }
 
 impl Problem {
@@ -174,18 +174,6 @@ impl Problem {
     ) -> Self {
         self.members.insert(name, value.into());
         self
-    }
-
-    pub(in crate::api) fn kind(&self) -> ProblemKind {
-        self.kind
-    }
-
-    pub(in crate::api) fn status(&self) -> StatusCode {
-        self.status
-    }
-
-    pub(in crate::api) fn cause(&self) -> Option<&anyhow::Error> {
-        self.cause.as_deref()
     }
 
     /// The document that the client gets.

@@ -4,11 +4,8 @@
 //!
 //! The only model, `lookdown`, accepts frames and returns their persons.
 
-mod answer;
 pub(in crate::api) mod describe;
-mod document;
 pub(in crate::api) mod infer;
-mod infer_parameters;
 mod own_metadata;
 mod persons;
 mod request;

@@ -196,7 +196,9 @@ async fn read_gauges(state: &ApiState) {
 /// Sets the metrics of the cameras in the result store, and removes those of others and of paused
 /// ones.
 async fn read_cameras(state: &ApiState) {
-    if !(state.options.zone_metrics || state.options.camera_metrics) {
+    if !(state.options.settings.calibrations.zone_metrics
+        || state.options.settings.results.camera_metrics)
+    {
         return;
     }
     let Ok(mut latest) = state.results.latest_of_all().await else {
@@ -206,7 +208,10 @@ async fn read_cameras(state: &ApiState) {
     latest.retain(|report| !own.is_paused(&report.report.camera));
     let cameras = latest.iter().map(|report| report.report.camera.clone());
     state.metrics.retain_cameras(&cameras.collect::<Vec<_>>());
-    for report in latest.iter().filter(|_| state.options.camera_metrics) {
+    for report in latest
+        .iter()
+        .filter(|_| state.options.settings.results.camera_metrics)
+    {
         let Ok(headline) = state.headline(report).await else {
             return;
         };

@@ -158,7 +158,7 @@ pub(in crate::api) fn router() -> Router<ApiState> {
             has_counts: state.options.companions.has_counts(),
             has_cameras: state.options.companions.cameras().is_some(),
             can_change: admin.is_ok(),
-            image_age_seconds: state.options.image_age.as_secs(),
+            image_age_seconds: state.options.settings.results.limits.max_age.as_secs(),
         };
         let no_store = [(CACHE_CONTROL, HeaderValue::from_static("no-store"))];
         (no_store, Json(options)).into_response()

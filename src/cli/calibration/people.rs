@@ -72,10 +72,7 @@ pub(super) fn set_height(
 
 /// Compares the level of the people with that of the calibration.
 fn report_level(level: &LevelFromPeople, calibration: &NativeCalibration) {
-    let LevelFromPeople {
-        difference_deg,
-        sd_deg,
-    } = level;
+    let (difference_deg, sd_deg) = (level.difference_deg, level.sd_deg);
     let source = calibration.sources.get(&SourcedValue::WorldUp);
     let known_sd_deg = source.and_then(|source| source.uncertainty).unwrap_or(0.0);
     let verdict = if level.contradicts(known_sd_deg) {
@@ -220,15 +217,11 @@ fn report(line: &[u8], camera: &Calibration) -> anyhow::Result<Report> {
 /// Converts a box to pixels of the calibration, with the head at its upper end: the angle of a
 /// report does not tell the head from the foot.
 fn upright_box(reported: &ReportOrientedBox, scale: f64, camera: &Calibration) -> OrientedBox {
-    let ReportOrientedBox {
-        cx,
-        cy,
-        width,
-        height,
-        angle_deg,
-    } = *reported;
-    let angle = angle_deg.to_radians();
-    let upright = OrientedBox::turned(Pixel::new(cx, cy), width, height, angle).scaled(scale);
+    let (center, angle) = (
+        Pixel::new(reported.cx, reported.cy),
+        reported.angle_deg.to_radians(),
+    );
+    let upright = OrientedBox::turned(center, reported.width, reported.height, angle).scaled(scale);
     let vertical = vertical_in_frame(upright.center, camera.lens(), camera.mount());
     upright.with_head_toward(&vertical)
 }

@@ -66,9 +66,7 @@ struct Walks(BTreeMap<u64, Walk>);
 /// Prints the place as a part of a calibration in the native format, with its sources.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let (first, second) = for_this_thread()?.block_on(follow(arguments))?;
-    let Arguments {
-        first: on, camera, ..
-    } = arguments;
+    let (on, camera) = (&arguments.first, &arguments.camera);
     let pose = relative_pose(&first.all(), &second.all())
         .with_context(|| format!("{camera} cannot be placed on the floor of {on}"))?;
     let RelativePose {

@@ -5,6 +5,7 @@ use std::{num::NonZeroUsize, sync::Arc};
 
 use bytes::Bytes;
 use lookdown_common::text::is_camera_name;
+use lookdown_lens::saturating::to_u64;
 use redis::{
     FromRedisValue, Pipeline, RedisResult, Script, Value,
     aio::MultiplexedConnection,
@@ -136,14 +137,9 @@ impl Reader<'_> {
         let sets = both.query_async(&mut self.connection);
         let [earlier, latest]: [Vec<(Vec<u8>, f64)>; 2] = sets.await?;
         // Whole microseconds are exact; the scores of another program may be any number.
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "saturates"
-        )]
         let place = |(element, score): (Vec<u8>, f64)| {
             let element = String::from_utf8(element).ok()?;
-            Some((ReportId::from_micros(score as u64), element))
+            Some((ReportId::from_micros(to_u64(score)), element))
         };
         let earlier = earlier.into_iter().filter_map(place);
         let earlier = earlier.filter_map(|(id, element)| {

@@ -230,11 +230,7 @@ impl News<'_> {
     }
 
     async fn unsubscribe(&mut self) -> RedisResult<()> {
-        let Shared {
-            listeners,
-            followed,
-            ..
-        } = self.shared;
+        let (listeners, followed) = (&self.shared.listeners, &self.shared.followed);
         // A listener that comes at this moment finds its channel followed, and keeps it, or waits
         // until it is followed again.
         let left = followed.remove_unless(|cameras| listeners.has_listener_for(cameras));

@@ -61,8 +61,8 @@ impl Models {
     }
 
     fn revision(&self, name: &str) -> Option<String> {
-        let model = self.repository.registry().get(name);
-        model.map(|model| model.revision().to_owned())
+        let model = self.repository.registry.get(name);
+        model.map(|model| model.revision.clone())
     }
 
     fn counts(&self) -> (u64, u64) {
@@ -224,7 +224,7 @@ fn changed_files_are_retried_after_a_server_outage() {
         }),
         Arc::clone(&models.metrics),
     );
-    let before = repository.load("a").unwrap().revision().to_owned();
+    let before = repository.load("a").unwrap().revision.clone();
     models.write("a", OTHER_ORDER, "any_batch");
     is_unavailable.store(true, Ordering::Relaxed);
     repository.reload_changed();
@@ -233,8 +233,8 @@ fn changed_files_are_retried_after_a_server_outage() {
     is_unavailable.store(false, Ordering::Relaxed);
     repository.reload_changed();
     repository.reload_changed();
-    let now = repository.registry().get("a").unwrap();
-    assert_ne!(now.revision(), before);
+    let now = repository.registry.get("a").unwrap();
+    assert_ne!(now.revision, before);
 }
 
 #[test]

@@ -19,16 +19,19 @@ use axum::{
 };
 use http_body_util::BodyExt;
 use lookdown::{
-    api::{self, ApiOptions, ApiState, Readiness},
+    api::{self, Access, ApiOptions, ApiState, Companions, Readiness},
     calibration_store::{Calibrations, FolderStore},
     metrics::Metrics,
     results::{MemoryResults, ResultLimits},
-    settings::explain,
+    settings::{explain, load},
+    telemetry::Tracer,
+    views::Views,
 };
 use lookdown_detect::{
     inference::{ModelFolder, ModelRepository, RepositoryOptions},
     pipeline::{Engine, EngineOptions, WorkerPool},
 };
+use lookdown_imaging::decode::DecodeLimits;
 use serde_json::Value;
 use tempfile::TempDir;
 use tokio::task::spawn_blocking;
@@ -62,7 +65,7 @@ fn service(folder: &Path) -> (Router, Arc<ModelRepository>) {
         ..EngineOptions::for_testing("person")
     };
     let engine = Engine::new(
-        Arc::clone(models.registry()),
+        Arc::clone(&models.registry),
         None,
         engine,
         Arc::clone(&metrics.detect),
@@ -71,11 +74,22 @@ fn service(folder: &Path) -> (Router, Arc<ModelRepository>) {
     let workers = WorkerPool::start(&Arc::new(engine), two, NonZeroUsize::new(16).unwrap());
     let readiness = Readiness::default();
     readiness.warmed_up();
+    let mut settings = load(None, []).unwrap();
+    settings.limits.min_upload_bytes_per_second = None;
+    settings.server.request_timeout = Duration::from_mins(2);
     let options = ApiOptions {
-        max_body_bytes: 1 << 24,
-        max_upload_bytes: 1 << 27,
-        request_timeout: Duration::from_mins(2),
-        ..ApiOptions::for_testing()
+        settings: Arc::new(settings),
+        views: Arc::new(Views::new(
+            folder.join("state"),
+            DecodeLimits::default(),
+            None,
+        )),
+        access: Access::Open {
+            own_machine_only: true,
+        },
+        companions: Companions::default(),
+        references: Arc::default(),
+        tracer: Tracer::default(),
     };
     let store = FolderStore::that_may_be_missing(&folder.join("calibrations"));
     let calibrations = Calibrations::open(Box::new(store), false, Arc::clone(&metrics)).unwrap();
@@ -139,12 +153,7 @@ async fn a_model_is_swapped_under_load_without_a_failed_request() {
         // The files must be unchanged between two checks.
         let reload = move || (0..2).for_each(|_| reloading.reload_changed());
         spawn_blocking(reload).await.unwrap();
-        let revision = models
-            .registry()
-            .get("person")
-            .unwrap()
-            .revision()
-            .to_owned();
+        let revision = models.registry.get("person").unwrap().revision.clone();
         // A frame that starts now uses the new model.
         let (_, report) = post(&router, "/detect?profile=fast", frame.clone()).await;
         assert_eq!(report["model"]["revision"], revision.as_str());

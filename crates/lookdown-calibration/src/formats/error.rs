@@ -32,12 +32,7 @@ impl FormatError {
             Self::MissingSize => Some("size"),
         }
     }
-}
 
-/// Most characters of a part of a message: files of a mebibyte are quoted in it.
-const MAX_CHARS: usize = 600;
-
-impl FormatError {
     /// Content that is in no format that is read, or broken.
     pub(super) fn malformed(problem: impl Into<String>) -> Self {
         Self::Malformed(shortened(problem.into()))
@@ -51,6 +46,9 @@ impl FormatError {
         }
     }
 }
+
+/// Most characters of a part of a message: files of a mebibyte are quoted in it.
+const MAX_CHARS: usize = 600;
 
 /// At most as many characters as a message may have.
 fn shortened(mut text: String) -> String {

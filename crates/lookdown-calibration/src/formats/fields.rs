@@ -1,5 +1,6 @@
 //! The fields of a document, read so that every refusal names the field, its value and the remedy.
 
+use lookdown_lens::saturating::to_u32;
 use serde_json::{Map, Value};
 
 use super::FormatError;
@@ -175,12 +176,7 @@ impl<'a> Fields<'a> {
 /// A count of pixels that some formats write as a decimal number.
 pub(super) fn whole_pixels(pixels: f64) -> Option<u32> {
     let fits = pixels.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&pixels);
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a whole number within the range"
-    )]
-    fits.then_some(pixels as u32)
+    fits.then_some(to_u32(pixels))
 }
 
 /// Collects numbers in the order in which they are written; false when something else is there.

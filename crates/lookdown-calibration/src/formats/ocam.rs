@@ -4,10 +4,22 @@
 //! Its x axis runs down the rows: the center is row, then column (counted from 0), the size is
 //! height, then width. The polynomials are preceded by their count. The inverse polynomial is an
 //! approximation and not used.
+//!
+//! py-OCamCalib's JSON (<https://github.com/jakarto3d/py-OCamCalib>): Scaramuzza's model with x
+//! along the columns and z out of the lens, so the polynomial has the opposite sign of
+//! `OCamCalib`'s.
+//!
+//! It has no frame size. Its `world2cam` applies `e` to the stretched x; the stretch
+//! matrix is meant as it is written, which is what its `cam2world` inverts.
 
-use super::{Camera, FormatError, fields::whole_pixels};
-use crate::native::NativeImage;
 use lookdown_lens::geometry::lens::Ocam;
+
+use super::{
+    Camera, FormatError,
+    column_first::ColumnFirst,
+    fields::{Fields, whole_pixels},
+};
+use crate::native::NativeImage;
 
 /// Names of the blocks, in the file's order.
 const BLOCKS: [&str; 5] = [
@@ -93,4 +105,11 @@ fn exactly<const N: usize>(
             format!("it has {count} numbers: {N} are needed, {expected}"),
         )
     })
+}
+
+/// Reads a file of `py-OCamCalib`.
+pub(super) fn read_python(fields: &Fields<'_>) -> Result<Camera, FormatError> {
+    let polynomial = fields.numbers("taylor_coefficient")?;
+    let lens = ColumnFirst::read(fields, ["distortion_center", "stretch_matrix"], &polynomial)?;
+    Ok(Camera::new(None, lens.into_lens()?))
 }

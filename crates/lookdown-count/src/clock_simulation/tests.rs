@@ -77,7 +77,7 @@ fn counting_continues_after_a_clock_that_was_ahead() {
     // Each connection takes a second, in which two cameras have five frames each. Their latest
     // reports arrive with the connection.
     assert_eq!(counted, world.sent.len() - 2 * (10 - 2));
-    assert_eq!(world.counter.position_resets(), 1);
+    assert_eq!(world.counter.position_resets, 1);
 }
 
 #[test]
@@ -97,16 +97,16 @@ fn repeated_and_late_reports_are_shown_as_dropped() {
     world.run(4);
     let (id, number) = *world.server.kept.last().unwrap();
     world.deliver(id, number);
-    let drops = world.counter.drops().for_camera("hall").unwrap();
+    let drops = world.counter.drops.for_camera("hall").unwrap();
     assert_eq!((drops.reports, drops.reason.label()), (1, "repeated"));
     assert_eq!(drops.since_ms, Some(world.true_ms));
 
     world.step(&Step::CameraClock { ahead_ms: -4_000 });
     world.run(1);
-    let drops = world.counter.drops().for_camera("hall").unwrap();
+    let drops = world.counter.drops.for_camera("hall").unwrap();
     assert_eq!((drops.reports, drops.reason.label()), (6, "out_of_order"));
     world.run(10);
-    let drops = world.counter.drops().for_camera("hall").unwrap();
+    let drops = world.counter.drops.for_camera("hall").unwrap();
     assert_eq!(drops.since_ms, None);
 }
 

@@ -26,7 +26,7 @@ impl Counter {
         let is_there = |scene: &&Scene| site.is_none_or(|site| scene.owner == *site);
         let places = self.scenes().filter(is_there).flat_map(|scene| {
             scene.cameras.iter().map(|camera| {
-                let last = camera.arrived();
+                let last = camera.arrived;
                 let age = last.map(|last| now.instant.saturating_duration_since(last));
                 Place {
                     camera: (scene.owner.clone(), camera.name.clone()),
@@ -87,7 +87,7 @@ impl Counter {
                 (
                     scene.owner.clone(),
                     camera.name.clone(),
-                    camera.presence().last_ms,
+                    camera.presence.last_ms,
                 )
             })
         });

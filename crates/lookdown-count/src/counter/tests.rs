@@ -57,7 +57,7 @@ impl Places {
             unix_ms: START_MS + second * 1000,
             instant: self.began + Duration::from_secs(second.unsigned_abs()),
         };
-        let event = now.unix_ms.unsigned_abs() * 1000 + self.counter.last_event() % 1000 + 1;
+        let event = now.unix_ms.unsigned_abs() * 1000 + self.counter.last_event % 1000 + 1;
         let accepted = self
             .counter
             .accept(event, &report(camera, second), definition, now);
@@ -74,11 +74,11 @@ fn own_camera_is_counted_after_many_names() {
         assert_eq!(counted, number < 4, "{number}");
     }
     assert!(places.counts("hall", 1, &unknown));
-    assert_eq!(places.counter.displaced_cameras(), 1);
+    assert_eq!(places.counter.displaced_cameras, 1);
     assert_eq!(places.counter.owners.len(), 4);
     // A new name is listed, as names of earlier ones are forgotten.
     assert!(!places.counts("new", 2, &unknown));
-    let reason = places.counter.drops().reason("new").unwrap();
+    let reason = places.counter.drops.reason("new").unwrap();
     assert!(reason.contains("raise counts.max_cameras"), "{reason}");
     assert!(places.counts("hall", 3, &unknown));
 }

@@ -1,8 +1,9 @@
-//! Counts per step as JSON and CSV.
+//! Counts per step as JSON and CSV, and their removal.
 
-mod body;
-
-use std::collections::{BTreeMap, BTreeSet};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fmt::Write as _,
+};
 
 use axum::{
     Json,
@@ -14,6 +15,7 @@ use axum::{
     },
     response::{IntoResponse, Response},
 };
+use jiff::Timestamp;
 use lookdown_calibration::revision::revision_of;
 use lookdown_common::text::{one_line, shortened, with_causes};
 use lookdown_http::{
@@ -21,10 +23,14 @@ use lookdown_http::{
     problem::Problem,
 };
 use lookdown_tracking::taught::default_bar;
+use serde::{Deserialize, Serialize};
+use utoipa::{
+    IntoParams, ToSchema,
+    openapi::{Object, ObjectBuilder, OneOfBuilder, Ref, RefOr, Schema, Type},
+};
 
-use self::body::{Counts, PersonCounts, StepCounts, csv};
 use super::{
-    shared::{Shared, blocking, check_known, stored},
+    shared::{Shared, blocking, check_known, query, stored},
     time::TimeParameters,
 };
 use crate::{
@@ -34,8 +40,6 @@ use crate::{
     sums::{MINUTE_MS, Owner},
     time_span::TimeSpan,
 };
-
-pub(super) use body::ZoneCounts;
 
 /// Most values of an answer: steps times directions of lines and zones. An answer has 12 MB at
 /// most.
@@ -284,6 +288,166 @@ fn ratio(value: u64, of: u64) -> f64 {
 
 fn thousandths(value: f64) -> f64 {
     (value * 1000.0).round() / 1000.0
+}
+
+/// The counts of a camera or a site.
+#[derive(Debug, Serialize, ToSchema)]
+struct Counts {
+    /// The camera; absent for a site.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub(super) camera: Option<String>,
+    /// The site; absent for a camera.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub(super) site: Option<String>,
+    pub(super) from: Timestamp,
+    pub(super) to: Timestamp,
+    pub(super) step_seconds: i64,
+    pub(super) steps: Vec<StepCounts>,
+}
+
+/// The counts of a step. Unknown counts are null.
+#[derive(Debug, Serialize, ToSchema)]
+struct StepCounts {
+    pub(super) from: Timestamp,
+    pub(super) to: Timestamp,
+    /// Seconds of the step in which reports arrived.
+    pub(super) known_seconds: f64,
+    /// Seconds of those with fewer frames than lines need, so that crossings may be missed; absent
+    /// for a site.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub(super) slow_seconds: Option<f64>,
+    pub(super) persons: Option<PersonCounts>,
+    /// Crossings by line and direction; absent for a site.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub(super) lines: Option<BTreeMap<String, BTreeMap<String, Option<u64>>>>,
+    /// Counts by zone; absent for a site.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(schema_with = zones_schema)]
+    pub(super) zones: Option<BTreeMap<String, Option<ZoneCounts>>>,
+}
+
+/// Persons of a step.
+#[derive(Debug, Serialize, ToSchema)]
+struct PersonCounts {
+    pub(super) mean: f64,
+    /// In 90 % of rooms, the true mean is at least this one.
+    pub(super) mean_low: f64,
+    /// In 90 % of rooms, the true mean is at most this one.
+    pub(super) mean_high: f64,
+    pub(super) max: u64,
+}
+
+/// Counts of a zone in a step.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct ZoneCounts {
+    pub(super) entries: u64,
+    pub(super) mean: f64,
+    pub(super) max: u64,
+    /// Visits that ended in the step, and their mean duration.
+    pub(super) visits: u64,
+    pub(super) dwell_seconds: Option<f64>,
+}
+
+/// Describes counts or null by zone, which the derived schema cannot.
+fn zones_schema() -> Object {
+    let counts = OneOfBuilder::new()
+        .item(ObjectBuilder::new().schema_type(Type::Null))
+        .item(Ref::from_schema_name(ZoneCounts::name()));
+    ObjectBuilder::new()
+        .description(Some("Counts by zone; absent for a site."))
+        .additional_properties(Some(RefOr::T(Schema::from(counts))))
+        .build()
+}
+
+/// Writes the counts as a table. Unknown counts are empty cells.
+fn csv(counts: &Counts) -> String {
+    let mut text = "from,to,known_seconds,slow_seconds,persons_mean,persons_mean_low,persons_mean_high,persons_max".to_owned();
+    let first = counts.steps.first();
+    let lines = first.and_then(|step| step.lines.as_ref());
+    for (line, directions) in lines.into_iter().flatten() {
+        for direction in directions.keys() {
+            let _ = write!(text, ",line.{line}.{direction}");
+        }
+    }
+    let zones = first.and_then(|step| step.zones.as_ref());
+    for zone in zones.into_iter().flat_map(BTreeMap::keys) {
+        for column in ["entries", "mean", "max", "visits", "dwell_seconds"] {
+            let _ = write!(text, ",zone.{zone}.{column}");
+        }
+    }
+    text.push_str("\r\n");
+    for step in &counts.steps {
+        let _ = write!(text, "{},{},{}", step.from, step.to, step.known_seconds);
+        cell(&mut text, step.slow_seconds);
+        let persons = step.persons.as_ref();
+        cell(&mut text, persons.map(|persons| persons.mean));
+        cell(&mut text, persons.map(|persons| persons.mean_low));
+        cell(&mut text, persons.map(|persons| persons.mean_high));
+        cell(&mut text, persons.map(|persons| persons.max));
+        for directions in step.lines.iter().flat_map(BTreeMap::values) {
+            for crossings in directions.values() {
+                cell(&mut text, *crossings);
+            }
+        }
+        for zone in step.zones.iter().flat_map(BTreeMap::values) {
+            let zone = zone.as_ref();
+            cell(&mut text, zone.map(|zone| zone.entries));
+            cell(&mut text, zone.map(|zone| zone.mean));
+            cell(&mut text, zone.map(|zone| zone.max));
+            cell(&mut text, zone.map(|zone| zone.visits));
+            cell(&mut text, zone.and_then(|zone| zone.dwell_seconds));
+        }
+        text.push_str("\r\n");
+    }
+    text
+}
+
+fn cell(text: &mut String, value: Option<impl std::fmt::Display>) {
+    text.push(',');
+    if let Some(value) = value {
+        let _ = write!(text, "{value}");
+    }
+}
+
+/// The parameters of a removal.
+#[derive(Deserialize, IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub(super) struct RemovalParameters {
+    /// `true` keeps the stored counts: the camera only leaves the list, the metrics and MQTT.
+    #[serde(default)]
+    keep_history: bool,
+}
+
+/// Delete the counts of a camera
+///
+/// Deletes its history, its tracks and its furniture. A camera that still sends frames begins
+/// again with its next report.
+#[utoipa::path(
+    delete, path = "/counts/{camera}", tag = "counts", operation_id = "delete_camera_counts",
+    security((), ("bearer" = ["admin"]), ("api_key" = ["admin"])),
+    params(("camera" = String, Path, description = "The name of the camera."), RemovalParameters),
+    responses((status = NO_CONTENT, description = "The counts are deleted."))
+)]
+pub(super) async fn delete(
+    State(api): State<Shared>,
+    Path(camera): Path<String>,
+    parameters: Result<Query<RemovalParameters>, QueryRejection>,
+) -> Result<StatusCode, Problem> {
+    let Query(parameters) = parameters.map_err(|refused| unusable_query(&refused))?;
+    let keeps = parameters.keep_history;
+    let is_followed = api.counter.lock().remove(&camera, keeps);
+    if !is_followed {
+        check_known(&api, &Owner::Camera(camera.clone())).await?;
+    }
+    if !keeps {
+        query(&api, move |store| store.remove(&camera)).await?;
+    }
+    Ok(StatusCode::NO_CONTENT)
 }
 
 #[cfg(test)]

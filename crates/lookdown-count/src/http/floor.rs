@@ -75,7 +75,7 @@ pub(super) async fn list(
     let counter = api.counter.lock();
     let scene = counter.scene_of(&camera);
     let known = scene.and_then(|scene| Some(&scene.camera(&camera)?.1.floor));
-    let persons = known.map_or(&[][..], |floor| floor.persons());
+    let persons = known.map_or(&[][..], |floor| &floor.persons);
     Ok(Json(OnFloor {
         is_on: counter.floor_alert_after_ms().is_some(),
         persons: persons.iter().map(PersonOnFloor::from).collect(),

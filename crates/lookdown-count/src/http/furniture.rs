@@ -130,23 +130,23 @@ pub(super) fn things(scene: &Scene, camera: &str) -> Vec<Thing> {
         .furniture(camera)
         .into_iter()
         .flat_map(Furniture::things);
-    let listed = things.filter(|thing| thing.is_furniture() || thing.present_s() >= LISTED_AFTER_S);
+    let listed = things.filter(|thing| thing.is_furniture() || thing.present_s >= LISTED_AFTER_S);
     listed
         .filter_map(|thing| row(thing, &known.definition))
         .collect()
 }
 
 fn row(thing: &Stored, definition: &CameraDefinition) -> Option<Thing> {
-    let state = match thing.state() {
+    let state = match thing.state {
         ThingState::Candidate => StateOfThing::Candidate,
         ThingState::Remembered => StateOfThing::Remembered,
         ThingState::Confirmed => StateOfThing::Confirmed,
         ThingState::TakenBack => return None,
     };
     Some(Thing {
-        id: thing.id(),
+        id: thing.id,
         state,
-        present_seconds: thing.present_s().round(),
+        present_seconds: thing.present_s.round(),
         outline_px: outline(thing, definition),
     })
 }

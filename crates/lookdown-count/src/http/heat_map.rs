@@ -1,25 +1,27 @@
-//! The heat map of the floor as JSON and PNG.
+//! The heat map of the floor as JSON and PNG, and over the frame of a camera.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::Arc};
 
 use axum::{
     Json,
     extract::{Path, Query, State, rejection::QueryRejection},
-    response::Response,
+    http::header::CONTENT_TYPE,
+    response::{IntoResponse, Response},
 };
 use jiff::Timestamp;
 use lookdown_http::problem::Problem;
+use lookdown_lens::saturating::{to_u8, to_u32};
 use lookdown_tracking::heat_map::{CELL_M, Cell};
 use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::{
     counts::unusable_query,
-    heat_map_image::draw,
-    shared::{Shared, blocking, check_known, query},
+    shared::{Shared, blocking, check_known, not_found, query},
     time::TimeParameters,
 };
 use crate::{
+    definition::CameraDefinition,
     now::time_of,
     sums::{DAY_MS, Owner},
     time_span::TimeSpan,
@@ -188,4 +190,112 @@ fn grid(cells: &BTreeMap<Cell, u64>) -> (Cell, Vec<Vec<f64>>) {
 
 async fn png(map: HeatMap) -> Result<Response, Problem> {
     blocking(move || draw(&map.seconds)).await
+}
+
+/// Pixels of a cell.
+const CELL_PX: usize = 8;
+
+/// Draws rows of seconds: transparent without presence, from blue to red with the logarithm of the
+/// time.
+fn draw(seconds: &[Vec<f64>]) -> Result<Response, Problem> {
+    let columns = seconds.first().map_or(1, Vec::len);
+    let rows = seconds.len().max(1);
+    let most = seconds.iter().flatten().copied().fold(0.0, f64::max);
+    let mut pixels = vec![0; columns * rows * CELL_PX * CELL_PX * 4];
+    let width = columns * CELL_PX;
+    for (row, cells) in seconds.iter().enumerate() {
+        for (column, seconds) in cells.iter().enumerate() {
+            let color = color(*seconds, most);
+            for y in row * CELL_PX..(row + 1) * CELL_PX {
+                let start = (y * width + column * CELL_PX) * 4;
+                for pixel in pixels[start..start + CELL_PX * 4].chunks_exact_mut(4) {
+                    pixel.copy_from_slice(&color);
+                }
+            }
+        }
+    }
+    image(&pixels, width, rows * CELL_PX)
+}
+
+/// Returns pixels with red, green, blue and alpha as a PNG.
+fn image(pixels: &[u8], width: usize, height: usize) -> Result<Response, Problem> {
+    let file = encoded(pixels, width, height).map_err(|problem| {
+        tracing::error!("the heat map cannot be encoded: {problem}");
+        Problem::internal()
+    })?;
+    Ok(([(CONTENT_TYPE, "image/png")], file).into_response())
+}
+
+fn encoded(pixels: &[u8], width: usize, height: usize) -> Result<Vec<u8>, png::EncodingError> {
+    let mut file = Vec::new();
+    let side = |pixels: usize| u32::try_from(pixels).unwrap_or(u32::MAX);
+    let mut encoder = png::Encoder::new(&mut file, side(width), side(height));
+    encoder.set_color(png::ColorType::Rgba);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.write_header()?.write_image_data(pixels)?;
+    Ok(file)
+}
+
+/// Returns the color of a time of presence, with the most of any cell.
+fn color(seconds: f64, most: f64) -> [u8; 4] {
+    if seconds <= 0.0 {
+        return [0; 4];
+    }
+    let share = (1.0 + seconds).ln() / (1.0 + most).ln();
+    let channel = |value: f64| to_u8((value * 255.0).round());
+    [
+        channel(2.0 * share - 0.6),
+        channel(1.2 - (2.4 * share - 1.2).abs()),
+        channel(1.0 - 1.6 * share),
+        channel(0.35 + 0.5 * share),
+    ]
+}
+
+/// Width of the image, pixels. Its height follows from the frame.
+const WIDTH: u32 = 480;
+
+/// Draw a heat map over frames
+///
+/// Covers whole days (UTC). `step` and `format` have no effect.
+#[utoipa::path(
+    get, path = "/counts/{camera}/heatmap-frame.png", tag = "counts", operation_id = "draw_frame_heat_map",
+    security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
+    params(("camera" = String, Path, description = "The name of the camera."), TimeParameters),
+    responses((status = OK, description = "The heat map.", body = Vec<u8>, content_type = "image/png"))
+)]
+pub(super) async fn png_of_frame(
+    State(api): State<Shared>,
+    Path(camera): Path<String>,
+    parameters: Parameters,
+) -> Result<Response, Problem> {
+    let (_, cells) = stored(&api, Owner::Camera(camera.clone()), parameters).await?;
+    let definition = api.counter.lock().definition(&camera);
+    let Some(definition) = definition.filter(|definition| definition.geometry.is_some()) else {
+        let detail = "the camera has no calibration now: send frames with one";
+        return Err(not_found(detail));
+    };
+    blocking(move || {
+        let (pixels, height) = drawn(&cells, &definition);
+        image(&pixels, WIDTH as usize, height as usize)
+    })
+    .await
+}
+
+/// Draws the map, transparent without presence. Returns the pixels and the height.
+fn drawn(cells: &BTreeMap<Cell, u64>, definition: &Arc<CameraDefinition>) -> (Vec<u8>, u32) {
+    let key = &definition.key;
+    let scale = f64::from(key.width) / f64::from(WIDTH);
+    let height = to_u32((f64::from(key.height) / scale).round()).clamp(1, 16 * WIDTH);
+    let seconds = |milliseconds: u64| milliseconds as f64 / 1000.0;
+    let most = cells.values().copied().max().map_or(0.0, seconds);
+    let mut pixels = Vec::with_capacity(WIDTH as usize * height as usize * 4);
+    for y in 0..height {
+        for x in 0..WIDTH {
+            let middle = [x, y].map(|pixel| (f64::from(pixel) + 0.5) * scale);
+            let cell = definition.floor_at(middle).and_then(Cell::at);
+            let time = cell.and_then(|cell| cells.get(&cell));
+            pixels.extend(color(time.copied().map_or(0.0, seconds), most));
+        }
+    }
+    (pixels, height)
 }

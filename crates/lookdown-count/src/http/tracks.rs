@@ -142,14 +142,14 @@ pub(super) async fn site_tracks(
 
 fn tracks(counter: &Counter, scene: &Scene, camera: Option<&str>) -> Tracks {
     let of_camera = camera.and_then(|name| scene.camera(name));
-    let presence = of_camera.map_or(scene.presence(), |(_, camera)| camera.presence());
+    let presence = of_camera.map_or(scene.presence(), |(_, camera)| &camera.presence);
     let now_ms = now_ms();
     let is_current = presence
         .last_ms
         .is_some_and(|last_ms| now_ms - last_ms <= counter.longest_gap_ms());
     let is_site = matches!(scene.owner, Owner::Site(_));
     let seen = scene.tracks().filter(|track| match of_camera {
-        Some((index, _)) if is_site => track.last_person().camera == index,
+        Some((index, _)) if is_site => track.last_person.camera == index,
         _ => true,
     });
     let snapshot = camera.and_then(|name| {
@@ -238,7 +238,7 @@ fn row(track: &Track, camera: Option<&SceneCamera>) -> TrackRow {
     } else {
         Plane::FramePx
     };
-    let since = track.seen_s() - TAIL_S;
+    let since = track.seen_s - TAIL_S;
     let recent = track.tail().filter(|point| point.at_s >= since);
     let recent: Vec<&TailPoint> = recent.collect();
     let tail = recent.iter().filter_map(|point| point.place(plane));
@@ -253,11 +253,11 @@ fn row(track: &Track, camera: Option<&SceneCamera>) -> TrackRow {
         pixels.map(rounded).collect()
     });
     TrackRow {
-        id: track.id().0,
+        id: track.id.0,
         posture: track.posture().0.name(),
         posture_probability: (track.posture().1 * 100.0).round() / 100.0,
-        first_seen: time(track.first_seen_s()),
-        last_seen: time(track.seen_s()),
+        first_seen: time(track.first_seen_s),
+        last_seen: time(track.seen_s),
         floor_m: floor_m.map(rounded),
         velocity_m_s: track.velocity_m_s().map(rounded),
         frame_px: camera

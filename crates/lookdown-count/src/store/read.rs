@@ -64,12 +64,10 @@ impl Store {
     pub(crate) fn resumed(&self) -> Result<Resumed, StoreError> {
         let connection = self.reader.lock();
         let last_event = connection
-            .query_row("SELECT last_event FROM progress", [], |row| {
-                row.get::<_, i64>(0)
-            })
+            .query_row("SELECT last_event FROM progress", [], |row| row.get(0))
             .optional()?;
         Ok(Resumed {
-            last_event: last_event.unwrap_or_default().cast_unsigned(),
+            last_event: last_event.unwrap_or_default(),
             totals: totals(&connection)?,
             scenes: scenes(&connection)?,
             calibrations: calibrations(&connection)?,
@@ -101,9 +99,9 @@ impl Store {
         let mut rows = statement.query(params![owner.key(), from, to, step])?;
         while let Some(row) = rows.next()? {
             steps.entry(row.get(0)?).or_default().presence = PresenceSum {
-                known_ms: row.get::<_, i64>(1)?.cast_unsigned(),
-                person_ms: row.get::<_, i64>(2)?.cast_unsigned(),
-                most: row.get::<_, i64>(3)?.cast_unsigned(),
+                known_ms: row.get(1)?,
+                person_ms: row.get(2)?,
+                most: row.get(3)?,
             };
         }
         let Owner::Camera(camera) = owner else {
@@ -115,8 +113,7 @@ impl Store {
         )?;
         let mut rows = statement.query(params![camera, from, to, step])?;
         while let Some(row) = rows.next()? {
-            let slow_ms = row.get::<_, i64>(1)?.cast_unsigned();
-            steps.entry(row.get(0)?).or_default().slow_ms = slow_ms;
+            steps.entry(row.get(0)?).or_default().slow_ms = row.get(1)?;
         }
         let mut statement = connection.prepare_cached(
             "SELECT (minute - ?2) / ?4, line, direction, sum(crossings) FROM crossings
@@ -129,10 +126,7 @@ impl Store {
                 return Ok(None);
             }
             let crossings = &mut steps.entry(row.get(0)?).or_default().crossings;
-            crossings.insert(
-                (row.get(1)?, row.get(2)?),
-                row.get::<_, i64>(3)?.cast_unsigned(),
-            );
+            crossings.insert((row.get(1)?, row.get(2)?), row.get(3)?);
         }
         let mut statement = connection.prepare_cached(
             "SELECT (minute - ?2) / ?4, zone, sum(entries), sum(visits), sum(visit_ms), sum(person_ms),
@@ -146,11 +140,11 @@ impl Store {
             }
             let zones = &mut steps.entry(row.get(0)?).or_default().zones;
             let sum = ZoneSum {
-                entries: row.get::<_, i64>(2)?.cast_unsigned(),
-                visits: row.get::<_, i64>(3)?.cast_unsigned(),
-                visit_ms: row.get::<_, i64>(4)?.cast_unsigned(),
-                person_ms: row.get::<_, i64>(5)?.cast_unsigned(),
-                most: row.get::<_, i64>(6)?.cast_unsigned(),
+                entries: row.get(2)?,
+                visits: row.get(3)?,
+                visit_ms: row.get(4)?,
+                person_ms: row.get(5)?,
+                most: row.get(6)?,
             };
             zones.insert(row.get(1)?, sum);
         }
@@ -179,7 +173,7 @@ impl Store {
                 column: row.get(0)?,
                 row: row.get(1)?,
             };
-            cells.insert(cell, row.get::<_, i64>(2)?.cast_unsigned());
+            cells.insert(cell, row.get(2)?);
         }
         Ok(cells)
     }
@@ -204,9 +198,7 @@ fn totals(connection: &Connection) -> rusqlite::Result<Totals> {
             line: row.get(1)?,
             direction: row.get(2)?,
         };
-        totals
-            .crossings
-            .insert(of, row.get::<_, i64>(3)?.cast_unsigned());
+        totals.crossings.insert(of, row.get(3)?);
     }
     let mut statement =
         connection.prepare("SELECT camera, zone, entries, person_ms FROM zone_totals")?;
@@ -217,8 +209,8 @@ fn totals(connection: &Connection) -> rusqlite::Result<Totals> {
             zone: row.get(1)?,
         };
         let total = ZoneTotal {
-            entries: row.get::<_, i64>(2)?.cast_unsigned(),
-            person_ms: row.get::<_, i64>(3)?.cast_unsigned(),
+            entries: row.get(2)?,
+            person_ms: row.get(3)?,
         };
         totals.zones.insert(of, total);
     }

@@ -8,7 +8,7 @@ use super::{STATE_VERSION, Store, StoreError};
 use crate::{
     batch::Batch,
     message::{HeldCondition, Message},
-    sums::{DAY_MS, MINUTE_MS, Owner, Sums},
+    sums::{DAY_MS, MINUTE_MS, Owner, Sums, ZoneSum},
 };
 
 impl Owner {
@@ -67,7 +67,7 @@ impl Store {
         }
         transaction.execute(
             "INSERT OR REPLACE INTO progress VALUES (1, ?)",
-            [batch.last_event.cast_signed()],
+            [batch.last_event],
         )?;
         Ok(transaction.commit()?)
     }
@@ -153,16 +153,20 @@ fn add(transaction: &Transaction<'_>, sums: &Sums) -> rusqlite::Result<()> {
          most = max(most, excluded.most)",
     )?;
     for ((owner, minute), sum) in &sums.presence {
-        let [known_ms, person_ms, most] =
-            [sum.known_ms, sum.person_ms, sum.most].map(u64::cast_signed);
-        presence.execute(params![owner.key(), minute, known_ms, person_ms, most])?;
+        presence.execute(params![
+            owner.key(),
+            minute,
+            sum.known_ms,
+            sum.person_ms,
+            sum.most
+        ])?;
     }
     let mut slow = transaction.prepare_cached(
         "INSERT INTO slow VALUES (?, ?, ?) ON CONFLICT DO UPDATE SET
          slow_ms = slow_ms + excluded.slow_ms",
     )?;
     for ((camera, minute), slow_ms) in &sums.slow {
-        slow.execute(params![camera, minute, slow_ms.cast_signed()])?;
+        slow.execute(params![camera, minute, slow_ms])?;
     }
     let mut crossings = transaction.prepare_cached(
         "INSERT INTO crossings VALUES (?, ?, ?, ?, ?) ON CONFLICT DO UPDATE SET
@@ -173,7 +177,6 @@ fn add(transaction: &Transaction<'_>, sums: &Sums) -> rusqlite::Result<()> {
          crossings = crossings + excluded.crossings",
     )?;
     for ((of, minute), count) in &sums.crossings {
-        let count = count.cast_signed();
         crossings.execute(params![of.camera, of.line, of.direction, minute, count])?;
         line_totals.execute(params![of.camera, of.line, of.direction, count])?;
     }
@@ -188,14 +191,13 @@ fn add(transaction: &Transaction<'_>, sums: &Sums) -> rusqlite::Result<()> {
          entries = entries + excluded.entries, person_ms = person_ms + excluded.person_ms",
     )?;
     for ((of, minute), sum) in &sums.zones {
-        let [entries, visits, visit_ms, person_ms, most] = [
-            sum.entries,
-            sum.visits,
-            sum.visit_ms,
-            sum.person_ms,
-            sum.most,
-        ]
-        .map(u64::cast_signed);
+        let ZoneSum {
+            entries,
+            visits,
+            visit_ms,
+            person_ms,
+            most,
+        } = sum;
         zones.execute(params![
             of.camera, of.zone, minute, entries, visits, visit_ms, person_ms, most
         ])?;
@@ -206,7 +208,6 @@ fn add(transaction: &Transaction<'_>, sums: &Sums) -> rusqlite::Result<()> {
          milliseconds = milliseconds + excluded.milliseconds",
     )?;
     for ((owner, day, cell), milliseconds) in &sums.cells {
-        let milliseconds = milliseconds.cast_signed();
         cells.execute(params![
             owner.key(),
             day,

@@ -13,6 +13,8 @@
 //! * A fused box that lies mostly within a better one (or the other way round) is probably a part
 //!   of the same person or a group, so its score is lowered ([`penalise_nested`]).
 
+use lookdown_lens::saturating::to_usize;
+
 use super::{
     BBox, Candidate, FramePixels, MergedDetection, RefinementParameters,
     overlap_grid::{Overlap, OverlapGrid},
@@ -194,13 +196,7 @@ impl Cluster {
     }
 
     fn required_votes(&self) -> usize {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "at least 1 and clamped"
-        )]
-        let expected = self.expected_views.round().min(1e6) as usize;
-        expected.clamp(1, MAX_SUPPORTING_VIEWS)
+        to_usize(self.expected_views.round()).clamp(1, MAX_SUPPORTING_VIEWS)
     }
 }
 

@@ -6,6 +6,8 @@
 //! that remains when `t` is cut off at both ends, which from `t` = ½ on is the center alone. The
 //! cells of the core therefore contain all boxes that can match.
 
+use lookdown_lens::saturating::to_usize;
+
 use super::{BBox, FramePixels};
 
 /// Cells along a side of the mean box when whole boxes are searched, and how many more when only
@@ -184,7 +186,7 @@ impl Axis {
         }
         let extent = end - start;
         // Without boxes or without extent the quotient is NaN, which gives one cell.
-        let cells = to_cell(cells_per_box * extent * count / sides).clamp(1, MAX_CELLS_PER_AXIS);
+        let cells = to_usize(cells_per_box * extent * count / sides).clamp(1, MAX_CELLS_PER_AXIS);
         let cells_per_pixel = cells as f64 / extent;
         Self {
             origin: start,
@@ -194,17 +196,8 @@ impl Axis {
     }
 
     fn cell(&self, position: f64) -> usize {
-        to_cell((position - self.origin) * self.cells_per_pixel).min(self.cells - 1)
+        to_usize((position - self.origin) * self.cells_per_pixel).min(self.cells - 1)
     }
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "NaN and negative numbers become 0, large ones the maximum: the outermost cells"
-)]
-fn to_cell(position: f64) -> usize {
-    position as usize
 }
 
 #[cfg(test)]

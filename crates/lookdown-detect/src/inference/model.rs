@@ -10,13 +10,16 @@ use lookdown_imaging::{NetworkInput, ViewBatch};
 /// A loaded model. A frame keeps a reference to its model, so a replaced model is dropped when its
 /// last frame ends.
 pub struct Model {
-    name: String,
-    revision: String,
-    input: NetworkInput,
+    /// Name of the model.
+    pub name: String,
+    /// Identifier that changes with the model.
+    pub revision: String,
+    /// Input format of the network.
+    pub input: NetworkInput,
     views_per_run: Option<NonZeroUsize>,
     /// Each session runs one batch at a time, in parallel with the others.
     sessions: Vec<Mutex<Box<dyn Detector>>>,
-    files: Option<ModelFiles>,
+    pub(super) files: Option<ModelFiles>,
 }
 
 /// Origin of a model, and the state of its files at the time of loading.
@@ -60,25 +63,6 @@ impl Model {
             files: Some(files),
             ..self
         }
-    }
-
-    pub(super) fn files(&self) -> Option<&ModelFiles> {
-        self.files.as_ref()
-    }
-
-    /// Name of the model.
-    pub fn name(&self) -> &str {
-        &self.name
-    }
-
-    /// Identifier that changes with the model.
-    pub fn revision(&self) -> &str {
-        &self.revision
-    }
-
-    /// Input format of the network.
-    pub fn input(&self) -> &NetworkInput {
-        &self.input
     }
 
     /// The largest useful batch of at most `max_views` views. It is at least the number of views

@@ -1,17 +1,28 @@
 //! Detectors run by ONNX Runtime. Only this module and `description` use `ort`.
 
-mod environment;
 mod first_line;
-mod loader;
-mod options;
-mod provider;
 
-use std::{num::NonZeroUsize, path::Path};
+use std::{
+    num::NonZeroUsize,
+    path::{Path, PathBuf},
+    sync::OnceLock,
+};
 
 use lookdown_calibration::revision::{revision_of, sha256_of};
-use ort::{session::Session, value::TensorRef};
+use lookdown_imaging::{NetworkInput, ViewBatch};
+use ort::{
+    environment::Environment,
+    ep::{
+        CUDA, ExecutionProvider, ExecutionProviderDispatch, OpenVINO, TensorRT,
+        cuda::ConvAlgorithmSearch,
+    },
+    session::{Session, builder::SessionBuilder},
+    value::TensorRef,
+};
+use parking_lot::Mutex;
 
 use super::{
+    CandidateOptions, Device, Model, ModelLoader,
     description::{self, ModelDescription, OnnxTensor},
     detector::Detector,
     error::InferenceError,
@@ -22,11 +33,8 @@ use super::{
     signature::Signature,
     staging::{Staged, Staging},
 };
-use lookdown_imaging::{NetworkInput, ViewBatch};
 
 use first_line::first_line;
-pub use loader::onnx_loader;
-pub use options::OnnxOptions;
 
 /// A model in an ONNX file, with the output head of its manifest.
 pub struct OnnxDetector {
@@ -62,7 +70,7 @@ impl OnnxDetector {
         options: &OnnxOptions,
         count: NonZeroUsize,
     ) -> Result<(Self, Vec<Self>), InferenceError> {
-        let environment = environment::load(library)?;
+        let environment = load_environment(library)?;
         let manifest = ModelManifest::locate(model)?;
         let path = manifest.onnx.clone();
         let unusable = |problem: String| InferenceError::Unusable {
@@ -78,7 +86,7 @@ impl OnnxDetector {
         onnx_file::check(&bytes).map_err(unusable)?;
 
         let open = || {
-            let session = provider::builder(environment, library, options)?.commit(&bytes);
+            let session = session_builder(environment, library, options)?.commit(&bytes);
             session.map_err(|error| unusable(first_line(&error)))
         };
         // Reports a failing model once, before every thread logs the same failure.
@@ -106,12 +114,7 @@ impl OnnxDetector {
             offset,
         };
         // The revision covers the settings of the manifest in addition to the weights.
-        let ModelManifest {
-            input: from,
-            output,
-            ..
-        } = &manifest;
-        let used = format!("{sha256} {from:?} {output:?}");
+        let used = format!("{sha256} {:?} {:?}", manifest.input, manifest.output);
         let description = ModelDescription {
             revision: revision_of(used.as_bytes()),
             bytes: bytes.len(),
@@ -143,7 +146,7 @@ impl OnnxDetector {
         file: &Path,
         options: &OnnxOptions,
     ) -> Result<(Vec<OnnxTensor>, Vec<OnnxTensor>), InferenceError> {
-        let environment = environment::load(library)?;
+        let environment = load_environment(library)?;
         let path = || file.to_owned();
         let unusable = |problem| InferenceError::Unusable {
             path: path(),
@@ -154,7 +157,7 @@ impl OnnxDetector {
             detail,
         })?;
         onnx_file::check(&bytes).map_err(unusable)?;
-        let session = provider::builder(environment, library, options)?.commit(&bytes);
+        let session = session_builder(environment, library, options)?.commit(&bytes);
         let session = session.map_err(|error| unusable(first_line(&error)))?;
         Ok(description::tensors(&session))
     }
@@ -240,4 +243,130 @@ fn run(
         })
         .collect();
     head.decode(&tensors, views, input, options.candidates.score_floor)
+}
+
+static ENVIRONMENT: OnceLock<Environment> = OnceLock::new();
+/// The runtime refuses a second environment, so only one thread may create it.
+static LOADING: Mutex<()> = Mutex::new(());
+
+/// Loads the library on the first call. Later calls return the same environment.
+fn load_environment(library: &Path) -> Result<&'static Environment, InferenceError> {
+    let _only_loader = LOADING.lock();
+    if let Some(environment) = ENVIRONMENT.get() {
+        return Ok(environment);
+    }
+    let unusable = |detail: String| InferenceError::Runtime {
+        path: library.to_owned(),
+        detail,
+    };
+    // A bare path would first be searched beside the executable.
+    let library = library
+        .canonicalize()
+        .map_err(|error| unusable(error.to_string()))?;
+    let environment = ort::environment::init_from(&library)
+        .map_err(|error| unusable(error.to_string()))?
+        .with_name("lookdown")
+        // The builds on PyPI record telemetry by default; SECURITY.md.
+        .with_telemetry(false)
+        .build()
+        .map_err(|error| unusable(error.to_string()))?;
+    Ok(ENVIRONMENT.get_or_init(|| environment))
+}
+
+/// Returns the loader of models that run in `sessions` sessions of the ONNX Runtime in `library`.
+pub fn onnx_loader(library: PathBuf, options: OnnxOptions, sessions: NonZeroUsize) -> ModelLoader {
+    Box::new(move |path| {
+        let (first, others) = OnnxDetector::load_sessions(&library, path, &options, sessions)?;
+        Ok(Model::from_sessions(first, others))
+    })
+}
+
+/// Options for running a model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OnnxOptions {
+    /// Device of the network.
+    pub device: Device,
+    /// Threads within one run of the network.
+    pub threads: NonZeroUsize,
+    /// Views of every run of a network that takes any number; black views take the place of missing
+    /// ones. A GPU needs it: it prepares a network for each new number, which takes longer than a
+    /// run. `None`: as many as there are.
+    pub views_per_run: Option<NonZeroUsize>,
+    /// Limits on the candidates that are kept.
+    pub candidates: CandidateOptions,
+}
+
+/// Builder of sessions.
+struct Builder(SessionBuilder);
+
+impl Builder {
+    fn commit(mut self, model: &[u8]) -> Result<Session, ort::Error> {
+        self.0.commit_from_memory(model)
+    }
+}
+
+/// Returns a builder of sessions on the options' device, without a fallback to another device.
+fn session_builder(
+    environment: &Environment,
+    library: &Path,
+    options: &OnnxOptions,
+) -> Result<Builder, InferenceError> {
+    let device = options.device;
+    let (providers, available) = providers(device, options.threads);
+    if !available {
+        return Err(InferenceError::NoProvider {
+            device,
+            path: library.to_owned(),
+        });
+    }
+    let failed = |error: ort::Error| InferenceError::Run(first_line(&error));
+    let builder = Session::builder(environment)
+        .map_err(failed)?
+        .with_intra_threads(options.threads.get())
+        .map_err(|error| failed(error.into()))?
+        // Idle pool threads must not spin: spinning takes CPU time from decoding and remapping.
+        .with_intra_op_spinning(false)
+        .map_err(|error| failed(error.into()))?
+        .with_execution_providers(providers)
+        .map_err(|error| InferenceError::NoDevice {
+            device,
+            detail: first_line(&error.into()),
+        })?;
+    Ok(Builder(builder))
+}
+
+/// The device's execution providers in order of preference, and true if the library has them. The
+/// CPU is always the last choice, for operators without GPU code.
+fn providers(device: Device, threads: NonZeroUsize) -> (Vec<ExecutionProviderDispatch>, bool) {
+    let cuda = |number| {
+        CUDA::default()
+            .with_device_id(number)
+            // The default measures all algorithms for each new size of a batch, about a second each
+            // time, and the number of crops changes from frame to frame.
+            .with_conv_algorithm_search(ConvAlgorithmSearch::Heuristic)
+            .build()
+            .error_on_failure()
+    };
+    match device {
+        Device::Cpu => (Vec::new(), true),
+        Device::Cuda(number) => (vec![cuda(number)], has::<CUDA>()),
+        Device::TensorRt(number) => {
+            let tensor_rt = TensorRT::default().with_device_id(number).build();
+            let providers = vec![tensor_rt.error_on_failure(), cuda(number)];
+            (providers, has::<TensorRT>() && has::<CUDA>())
+        }
+        Device::OpenVino(kind) => {
+            let open_vino = OpenVINO::default()
+                .with_device_type(<&str>::from(kind).to_uppercase())
+                .with_num_threads(threads.get())
+                .with_num_streams(1)
+                .build();
+            (vec![open_vino.error_on_failure()], has::<OpenVINO>())
+        }
+    }
+}
+
+/// Returns true if the library was built with this provider.
+fn has<P: ExecutionProvider>() -> bool {
+    P::is_available().unwrap_or(false)
 }

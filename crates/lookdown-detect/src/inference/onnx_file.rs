@@ -4,14 +4,14 @@
 //! An ONNX tensor may keep its values in another file, at a path chosen by the model. The runtime
 //! resolves such paths even for models passed as bytes, so the graph is checked here first. The
 //! field numbers are those of `onnx.proto`, which are stable.
-
-mod protobuf;
+//!
+//! The wire format of protocol buffers, as far as ONNX files need it.
+//!
+//! Source: "Encoding", protocol buffers documentation.
 
 use std::path::Path;
 
 use lookdown_common::files;
-
-use self::protobuf::{Field, MAX_DEPTH, Value, fields, no_model};
 
 /// Largest ONNX file, bytes. Protocol buffers are limited to 2 GiB.
 const MAX_BYTES: u64 = 1 << 30;
@@ -128,6 +128,101 @@ fn check_tensor(bytes: &[u8]) -> Result<(), String> {
         return Err(format!("it has a tensor of more than {MAX_VALUES} values"));
     }
     Ok(())
+}
+
+/// Deepest nesting of graphs within graphs.
+const MAX_DEPTH: usize = 64;
+
+/// The message about bytes that are not a complete model.
+fn no_model() -> String {
+    "it is not an ONNX model, or is cut off".to_owned()
+}
+
+/// A field of a message.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Field<'a> {
+    number: u64,
+    value: Value<'a>,
+}
+
+/// Value of a field.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Value<'a> {
+    Varint(u64),
+    /// A string, a message or packed numbers.
+    Bytes(&'a [u8]),
+    /// A number of four or eight bytes, which is skipped.
+    Fixed,
+}
+
+impl<'a> Value<'a> {
+    /// The numbers of a repeated field, packed or not. Ends with an error where they are cut off.
+    fn varints(self) -> impl Iterator<Item = Result<u64, ()>> + use<'a> {
+        let (single, mut packed) = match self {
+            Self::Varint(number) => (Some(Ok(number)), &[][..]),
+            Self::Bytes(bytes) => (None, bytes),
+            Self::Fixed => (Some(Err(())), &[][..]),
+        };
+        let rest = std::iter::from_fn(move || {
+            (!packed.is_empty()).then(|| {
+                let number = varint(&mut packed).ok_or(());
+                if number.is_err() {
+                    packed = &[];
+                }
+                number
+            })
+        });
+        single.into_iter().chain(rest)
+    }
+}
+
+/// The fields of a message in order. Ends with an error at the first invalid field.
+fn fields(mut bytes: &[u8]) -> impl Iterator<Item = Result<Field<'_>, ()>> {
+    std::iter::from_fn(move || {
+        (!bytes.is_empty()).then(|| {
+            let field = field(&mut bytes).ok_or(());
+            if field.is_err() {
+                bytes = &[];
+            }
+            field
+        })
+    })
+}
+
+fn field<'a>(bytes: &mut &'a [u8]) -> Option<Field<'a>> {
+    let tag = varint(bytes)?;
+    let value = match tag & 7 {
+        0 => Value::Varint(varint(bytes)?),
+        1 => take(bytes, 8).map(|_| Value::Fixed)?,
+        2 => {
+            let len = usize::try_from(varint(bytes)?).ok()?;
+            Value::Bytes(take(bytes, len)?)
+        }
+        5 => take(bytes, 4).map(|_| Value::Fixed)?,
+        _ => return None,
+    };
+    let number = tag >> 3;
+    (number > 0).then_some(Field { number, value })
+}
+
+fn take<'a>(bytes: &mut &'a [u8], len: usize) -> Option<&'a [u8]> {
+    let (taken, rest) = bytes.split_at_checked(len)?;
+    *bytes = rest;
+    Some(taken)
+}
+
+/// Reads a varint: seven bits per byte, least significant first, at most ten bytes.
+fn varint(bytes: &mut &[u8]) -> Option<u64> {
+    let mut number = 0;
+    for shift in (0..64).step_by(7) {
+        let (&byte, rest) = bytes.split_first()?;
+        *bytes = rest;
+        number |= u64::from(byte & 0x7f) << shift;
+        if byte < 0x80 {
+            return Some(number);
+        }
+    }
+    None
 }
 
 #[cfg(test)]

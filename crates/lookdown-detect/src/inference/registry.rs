@@ -38,10 +38,10 @@ impl ModelRegistry {
     /// [`RegistryFull`] when the limit is exceeded.
     pub fn put(&self, model: Arc<Model>) -> Result<Option<Arc<Model>>, RegistryFull> {
         let mut models = self.0.write();
-        if models.len() >= MAX_MODELS && !models.contains_key(model.name()) {
+        if models.len() >= MAX_MODELS && !models.contains_key(&model.name) {
             return Err(RegistryFull);
         }
-        Ok(models.insert(model.name().to_owned(), model))
+        Ok(models.insert(model.name.clone(), model))
     }
 }
 

@@ -3,30 +3,36 @@
 //! supports that, otherwise within the JSON. The head in the model's manifest decodes the outputs
 //! locally.
 
-mod breaker;
 mod connection;
 mod exchange;
 mod options;
 mod server;
-mod token;
-mod understood;
 
 use std::{num::NonZeroUsize, path::Path, sync::Arc};
 
-use self::{
-    exchange::{Answer, Question},
-    understood::RemoteModel,
-};
+use lookdown_calibration::revision::revision_of;
+use lookdown_common::text::{Quoted, one_line};
+use lookdown_imaging::{NetworkInput, ViewBatch};
+use serde::Deserialize;
+
 use super::{
-    CandidateOptions, Detector, HeadOutput, InferenceError, ModelManifest,
+    CandidateOptions, Detector, HeadOutput, InferenceError, ModelManifest, OnnxTensor,
+    description::{FLOAT, Metadata, float_shapes},
     heads::TensorView,
+    signature::Signature,
     staging::{Staged, Staging},
 };
-use lookdown_imaging::{NetworkInput, ViewBatch};
+use crate::open_inference::{
+    BINARY_EXTENSION, Datatype,
+    bounded_json::MAX_ENTRIES,
+    metadata::{ModelMetadata, ServerMetadata, TensorMetadata},
+};
 
-pub use options::RemoteOptions;
+use exchange::{Answer, Question};
+use server::refusal;
+
+pub use options::{BearerToken, InvalidToken, RemoteOptions};
 pub use server::RemoteServer;
-pub use token::{BearerToken, InvalidToken};
 
 /// A model on an inference server.
 pub struct RemoteDetector {
@@ -118,6 +124,125 @@ fn run(
         .collect();
     let head = &understood.manifest.output;
     head.decode(&tensors, staged.shape[0], &understood.input, score_floor)
+}
+
+/// Longest name of a tensor or a datatype.
+const MAX_NAME_BYTES: usize = 256;
+
+/// Metadata of a model on a server, checked against its manifest.
+struct RemoteModel {
+    manifest: ModelManifest,
+    /// Name of the model on the server.
+    name_there: String,
+    /// Identifier that changes with the server's metadata or the manifest.
+    revision: String,
+    signature: Signature,
+    input: NetworkInput,
+    /// The outputs that heads can read.
+    outputs: Vec<String>,
+    /// True if the server supports tensors as bytes.
+    as_bytes: bool,
+}
+
+impl RemoteModel {
+    /// Fetches the metadata and checks it against the manifest.
+    fn ask(server: &RemoteServer, manifest: ModelManifest) -> Result<Self, InferenceError> {
+        let name_there = server.name_of(&manifest.name).to_owned();
+        let unusable = |problem: String| InferenceError::RemoteModel {
+            model: name_there.clone(),
+            problem,
+        };
+        let metadata: ServerMetadata = fetch(server, &["v2"])?;
+        let model: ModelMetadata = fetch(server, &["v2", "models", &name_there])?;
+        if model.inputs.is_empty() || model.outputs.is_empty() {
+            return Err(unusable(
+                "its metadata lacks inputs and outputs: declare them on the server".to_owned(),
+            ));
+        }
+        for tensor in model.inputs.iter().chain(&model.outputs) {
+            check_tensor(tensor).map_err(unusable)?;
+        }
+        let (inputs, outputs) = (tensors(&model.inputs), tensors(&model.outputs));
+        let signature = Signature::new(&inputs, &manifest.input, &Metadata::default());
+        let signature = signature.map_err(unusable)?;
+        let shapes: Vec<_> = float_shapes(&outputs).collect();
+        let size = (signature.width, signature.height);
+        manifest.output.check(&shapes, size).map_err(unusable)?;
+        let (scale, offset) = manifest.input.normalization().map_err(unusable)?;
+        let versions = &model.versions;
+        let ModelManifest { input, output, .. } = &manifest;
+        let used = format!("{name_there} {versions:?} {inputs:?} {outputs:?} {input:?} {output:?}");
+        Ok(Self {
+            revision: revision_of(used.as_bytes()),
+            input: NetworkInput {
+                width: signature.width,
+                height: signature.height,
+                channel_order: manifest.input.channel_order,
+                scale,
+                offset,
+            },
+            outputs: shapes.iter().map(|output| output.name.to_owned()).collect(),
+            as_bytes: metadata
+                .extensions
+                .iter()
+                .any(|name| name == BINARY_EXTENSION),
+            name_there,
+            signature,
+            manifest,
+        })
+    }
+}
+
+/// Fetches and parses the metadata at a path.
+fn fetch<T: for<'de> Deserialize<'de>>(
+    server: &RemoteServer,
+    path: &[&str],
+) -> Result<T, InferenceError> {
+    let reply = server.get(path)?;
+    match reply.status {
+        200 => {}
+        401 | 403 => return Err(server.denied(refusal(&reply))),
+        _ => return Err(server.unavailable(refusal(&reply))),
+    }
+    let read = serde_json::from_slice(&reply.body);
+    read.map_err(|error| {
+        let error = one_line(&error);
+        server.unavailable(format!("its metadata cannot be read: {error}"))
+    })
+}
+
+/// Checks that messages can repeat the name and the shape of a tensor.
+fn check_tensor(tensor: &TensorMetadata) -> Result<(), String> {
+    let axes = tensor.shape.len();
+    if axes > MAX_ENTRIES {
+        let name = Quoted(&tensor.name);
+        return Err(format!(
+            "its tensor {name} has {axes} axes: at most {MAX_ENTRIES} are supported"
+        ));
+    }
+    if let Some(text) = [&tensor.name, &tensor.datatype]
+        .into_iter()
+        .find(|it| it.len() > MAX_NAME_BYTES)
+    {
+        let text = Quoted(text);
+        return Err(format!(
+            "the name {text} in its metadata is too long: at most {MAX_NAME_BYTES} bytes are supported"
+        ));
+    }
+    Ok(())
+}
+
+fn tensors(declared: &[TensorMetadata]) -> Vec<OnnxTensor> {
+    let tensor = |declared: &TensorMetadata| OnnxTensor {
+        name: declared.name.clone(),
+        element: if declared.datatype == Datatype::Fp32.name() {
+            FLOAT.to_owned()
+        } else {
+            declared.datatype.clone()
+        },
+        shape: declared.shape.clone(),
+    };
+    declared.iter().map(tensor).collect()
 }
 
 #[cfg(test)]

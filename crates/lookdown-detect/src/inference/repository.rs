@@ -4,24 +4,24 @@
 //! A model is put into service only after it was loaded, checked and run once. If that fails, the
 //! previous model stays in service.
 
-mod error;
-mod folder;
-
-use std::{collections::BTreeMap, num::NonZeroUsize, path::Path, sync::Arc};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    num::NonZeroUsize,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use parking_lot::{Mutex, MutexGuard};
 
 use super::{
     error::InferenceError,
+    manifest::{FILE_NAME, is_name},
     model::{Model, ModelFiles},
-    registry::ModelRegistry,
+    registry::{ModelRegistry, RegistryFull},
     remote::RemoteServer,
     stamp::{Stamp, files_of, stamp},
 };
 use crate::metrics::{DetectMetrics, replace_info, start_at_zero};
-
-pub use error::RepositoryError;
-pub use folder::{ModelFolder, is_fetched, model_names};
 
 /// Loads a model from its folder or ONNX file.
 pub type ModelLoader = Box<dyn Fn(&Path) -> Result<Model, InferenceError> + Send + Sync>;
@@ -41,9 +41,11 @@ pub struct RepositoryOptions {
 /// The models of a folder, loaded or not.
 pub struct ModelRepository {
     options: RepositoryOptions,
-    registry: Arc<ModelRegistry>,
+    /// The loaded models.
+    pub registry: Arc<ModelRegistry>,
     loader: ModelLoader,
-    remote: Option<Arc<RemoteServer>>,
+    /// The server on which the networks run, or `None` if they run locally.
+    pub remote: Option<Arc<RemoteServer>>,
     /// Locked while a model is loaded, so that only one is loaded at a time.
     memory: Mutex<Memory>,
     metrics: Arc<DetectMetrics>,
@@ -84,21 +86,11 @@ impl ModelRepository {
         }
     }
 
-    /// The server on which the networks run, or `None` if they run locally.
-    pub fn remote(&self) -> Option<&Arc<RemoteServer>> {
-        self.remote.as_ref()
-    }
-
     /// Returns false while the inference server is unavailable.
     pub fn is_remote_available(&self) -> bool {
         self.remote
             .as_ref()
             .is_none_or(|remote| remote.is_available())
-    }
-
-    /// The loaded models.
-    pub fn registry(&self) -> &Arc<ModelRegistry> {
-        &self.registry
     }
 
     /// Loads or reloads the model with that name. Blocks.
@@ -126,8 +118,8 @@ impl ModelRepository {
         }
         let mut memory = self.lock();
         for model in self.registry.all() {
-            let Some(files) = model.files() else { continue };
-            let name = model.name();
+            let Some(files) = &model.files else { continue };
+            let name = &model.name;
             let found = stamp(&files_of(&files.path));
             let is_changed =
                 found.is_some() && found != files.stamp && memory.refused.get(name) != Some(&found);
@@ -138,7 +130,7 @@ impl ModelRepository {
                 // The error is already logged.
                 let _ = self.replace(&mut memory, name, &files.path);
             } else {
-                memory.changed.insert(name.to_owned(), found);
+                memory.changed.insert(name.clone(), found);
             }
         }
     }
@@ -161,19 +153,14 @@ impl ModelRepository {
             Ok((model, replaced)) => {
                 self.count_load("success");
                 memory.refused.remove(name);
-                let replaced = replaced.as_ref().map(|replaced| replaced.revision());
+                let replaced = replaced.as_ref().map(|replaced| &*replaced.revision);
                 let before = replaced.map(|revision| [name, revision]);
                 replace_info(
                     &self.metrics.model_info,
                     before.as_ref().map(<[_; 2]>::as_slice),
-                    &[name, model.revision()],
+                    &[name, &model.revision],
                 );
-                tracing::info!(
-                    model = name,
-                    revision = model.revision(),
-                    replaced,
-                    "loaded"
-                );
+                tracing::info!(model = name, revision = model.revision, replaced, "loaded");
                 Ok(model)
             }
             Err(error) => {
@@ -193,10 +180,10 @@ impl ModelRepository {
             cause,
         };
         let model = (self.loader)(path).map_err(refused)?;
-        if model.name() != name {
+        if model.name != name {
             return Err(RepositoryError::OtherName {
                 name: name.to_owned(),
-                found: model.name().to_owned(),
+                found: model.name.clone(),
                 path: path.to_owned(),
             });
         }
@@ -221,5 +208,127 @@ impl ModelRepository {
     fn lock(&self) -> MutexGuard<'_, Memory> {
         // After a panic the maps contain only complete entries.
         self.memory.lock()
+    }
+}
+
+/// Most entries of the folder that are read for a listing.
+const MAX_ENTRIES: usize = 1000;
+/// Most characters of a name that an error message repeats.
+const MAX_NAME_CHARS: usize = 64;
+
+/// A folder with one subfolder per model, named like the model.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ModelFolder {
+    /// The folder.
+    pub path: PathBuf,
+    /// Name and path of a model outside the folder: a folder or an ONNX file.
+    pub elsewhere: Option<(String, PathBuf)>,
+}
+
+impl ModelFolder {
+    /// Returns the path of the model with that name.
+    pub(super) fn find(&self, name: &str) -> Result<PathBuf, RepositoryError> {
+        match &self.elsewhere {
+            Some((there, path)) if there == name => return Ok(path.clone()),
+            _ => {}
+        }
+        let path = self.path.join(name);
+        if is_name(name) && path.join(FILE_NAME).is_file() {
+            return Ok(path);
+        }
+        Err(RepositoryError::Unknown {
+            name: name.chars().take(MAX_NAME_CHARS).collect(),
+            known: self.names().join(", "),
+        })
+    }
+
+    /// The names of all models, sorted.
+    pub(super) fn names(&self) -> Vec<String> {
+        let entries = std::fs::read_dir(&self.path).into_iter().flatten();
+        let folders = entries.take(MAX_ENTRIES).flatten().filter_map(|entry| {
+            let name = entry.file_name().into_string().ok()?;
+            (is_name(&name) && entry.path().join(FILE_NAME).is_file()).then_some(name)
+        });
+        let elsewhere = self.elsewhere.iter().map(|(name, _)| name.clone());
+        let names: BTreeSet<_> = folders.chain(elsewhere).collect();
+        names.into_iter().collect()
+    }
+}
+
+/// Returns the names of the models in a folder, sorted.
+pub fn model_names(folder: &Path) -> Vec<String> {
+    let folder = ModelFolder {
+        path: folder.to_owned(),
+        elsewhere: None,
+    };
+    folder.names()
+}
+
+/// A model that was not loaded. Every message is one sentence that includes the remedy.
+#[derive(Debug, thiserror::Error)]
+pub enum RepositoryError {
+    /// There is no such model.
+    #[error("model: there is no {name:?} in the repository; there are {known}")]
+    Unknown {
+        /// The requested name.
+        name: String,
+        /// The available names.
+        known: String,
+    },
+    /// The manifest's name differs from its folder's.
+    #[error(
+        "model: {path} has the name {found:?}: rename it to {name:?} like its folder or rename \
+         the folder"
+    )]
+    OtherName {
+        /// The requested name.
+        name: String,
+        /// The name in the manifest.
+        found: String,
+        /// Path of the model.
+        path: PathBuf,
+    },
+    /// One model is loaded at a time.
+    #[error("another model is being loaded: try again in a second")]
+    Busy,
+    /// The largest number of models is loaded.
+    #[error(transparent)]
+    Full(#[from] RegistryFull),
+    /// It cannot be read, failed its check, or failed to run.
+    #[error("{text}")]
+    Refused {
+        /// The cause.
+        cause: InferenceError,
+        /// The cause as [`RepositoryOptions::explain`] describes it.
+        ///
+        /// [`RepositoryOptions::explain`]: super::RepositoryOptions::explain
+        text: String,
+    },
+}
+
+impl RepositoryError {
+    /// Returns true if a retry after a short time may succeed without a change.
+    pub fn is_passing(&self) -> bool {
+        matches!(
+            self,
+            Self::Busy
+                | Self::Refused {
+                    cause: InferenceError::Remote { .. } | InferenceError::RemoteBusy { .. },
+                    ..
+                }
+        )
+    }
+
+    /// Returns true if the error is caused by the model itself, so that it persists until the files
+    /// change.
+    pub fn is_of_model(&self) -> bool {
+        let is_denied = matches!(
+            self,
+            Self::Refused {
+                cause: InferenceError::RemoteDenied { .. },
+                ..
+            }
+        );
+        !self.is_passing() && !is_denied
     }
 }

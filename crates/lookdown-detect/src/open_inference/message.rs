@@ -4,13 +4,16 @@
 //! unparsed text ([`serde_json::value::RawValue`]) when they are read, [`TensorValues`] when they
 //! are written.
 
+use std::num::TryFromIntError;
+
 use bytes::Bytes;
 use serde::{Deserialize, Serialize, ser::Error};
 
 use super::{
+    Datatype,
+    binary_data::{LENGTH_BYTES, put_element},
     bounded_json::{Entries, Table},
     parameters::Parameters,
-    tensor_values::TensorValues,
 };
 
 /// The JSON of an inference request. Unknown members are an error.
@@ -142,6 +145,59 @@ impl Message {
 /// Returns an error if the JSON is malformed or is not a request.
 pub fn read_request<'a, D: Deserialize<'a>>(json: &'a [u8]) -> serde_json::Result<InferRequest<D>> {
     serde_json::from_slice(json).map(|Table(request)| request)
+}
+
+/// The values of a tensor, row-major.
+#[derive(Debug, Clone, Serialize)]
+#[serde(untagged)]
+pub enum TensorValues<'a> {
+    /// `FP32`.
+    Floats(&'a [f32]),
+    /// `INT32`.
+    Integers(&'a [i32]),
+    /// The elements of a `BYTES` tensor.
+    Texts(Vec<&'a str>),
+}
+
+impl TensorValues<'_> {
+    /// Returns the datatype.
+    pub fn datatype(&self) -> Datatype {
+        match self {
+            Self::Floats(_) => Datatype::Fp32,
+            Self::Integers(_) => Datatype::Int32,
+            Self::Texts(_) => Datatype::Bytes,
+        }
+    }
+
+    /// Returns the number of bytes of the values as bytes.
+    pub fn byte_count(&self) -> usize {
+        match self {
+            Self::Floats(values) => size_of_val(*values),
+            Self::Integers(values) => size_of_val(*values),
+            Self::Texts(texts) => texts.iter().map(|text| LENGTH_BYTES + text.len()).sum(),
+        }
+    }
+
+    /// Appends the values as bytes.
+    ///
+    /// # Errors
+    /// Returns an error if the length of an element exceeds four bytes.
+    pub fn put_bytes(&self, bytes: &mut Vec<u8>) -> Result<(), TryFromIntError> {
+        match self {
+            Self::Floats(values) => {
+                bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+            }
+            Self::Integers(values) => {
+                bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+            }
+            Self::Texts(texts) => {
+                for text in texts {
+                    put_element(text.as_bytes(), bytes)?;
+                }
+            }
+        }
+        Ok(())
+    }
 }
 
 #[cfg(test)]

@@ -1,9 +1,20 @@
 //! The values of a tensor that is read: a part of the JSON, or bytes after it.
+//!
+//! Tensors in JSON: lists, flat or nested like the shape. Elements are converted one by one, as a
+//! tree of JSON values takes many times the memory.
 
+use std::{borrow::Cow, fmt};
+
+use base64::{
+    Engine,
+    alphabet::STANDARD,
+    engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig},
+};
 use bytes::Bytes;
+use serde::de::{DeserializeSeed, Deserializer, Error, SeqAccess, Visitor};
 use serde_json::value::RawValue;
 
-use super::{BINARY_SIZE, HEAD_LENGTH, binary_data, json_data};
+use super::{BINARY_SIZE, HEAD_LENGTH, binary_data};
 
 /// The values of a tensor as they were sent.
 #[derive(Debug)]
@@ -46,7 +57,7 @@ impl<'a> TensorData<'a> {
     /// message, in bytes, before they are read.
     pub fn unpacked_bytes(&self) -> usize {
         match self {
-            Self::Json(text) => json_data::bytes_at_most(text),
+            Self::Json(text) => bytes_at_most(text),
             // The values are a part of the message.
             Self::Binary(_) => 0,
         }
@@ -58,7 +69,7 @@ impl<'a> TensorData<'a> {
     /// The end of a sentence: what was sent, and what is needed.
     pub fn elements(self, count: usize) -> Result<Vec<Bytes>, String> {
         match self {
-            Self::Json(text) => json_data::byte_elements(text, count),
+            Self::Json(text) => byte_elements(text, count),
             Self::Binary(bytes) => binary_data::elements(&bytes, count),
         }
     }
@@ -69,7 +80,7 @@ impl<'a> TensorData<'a> {
     /// The end of a sentence: what was sent, and what is needed.
     pub fn floats(self, count: usize) -> Result<Vec<f32>, String> {
         match self {
-            Self::Json(text) => json_data::floats(text, count),
+            Self::Json(text) => json_floats(text, count),
             Self::Binary(bytes) => binary_data::floats(&bytes, count),
         }
     }
@@ -78,4 +89,266 @@ impl<'a> TensorData<'a> {
 /// Returns the number of elements of a shape; `None` if it exceeds the address space.
 pub fn element_count(shape: impl IntoIterator<Item = usize>) -> Option<usize> {
     shape.into_iter().try_fold(1_usize, usize::checked_mul)
+}
+
+/// Base64 with or without padding.
+const BASE64: GeneralPurpose = GeneralPurpose::new(
+    &STANDARD,
+    GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
+);
+
+/// Most bytes that [`byte_elements`] returns for data of this length: three of four letters.
+fn bytes_at_most(json: &str) -> usize {
+    // With the quotes and the separator around it, each element has at least three letters more
+    // than are decoded.
+    json.len() / 4 * 3
+}
+
+/// Most numbers that [`floats`] returns for data of this length: each has a digit and a separator.
+fn numbers_at_most(json: &str, count: usize) -> usize {
+    count.min(json.len() / 2)
+}
+
+/// Returns the `count` elements of a tensor of `BYTES`, each encoded in base64.
+///
+/// # Errors
+/// The end of a sentence: what was sent, and what is needed.
+fn byte_elements(json: &str, count: usize) -> Result<Vec<Bytes>, String> {
+    let mut texts = Texts {
+        count,
+        values: Vec::new(),
+    };
+    read(json, &mut texts)?;
+    let sent = texts.values.len();
+    if sent != count {
+        return Err(format!(
+            "its data have {sent} elements, but its shape needs {count}: send strings in base64"
+        ));
+    }
+    let bytes = texts.values.iter().map(|text| BASE64.decode(&**text));
+    let bytes = bytes.map(|bytes| bytes.map(Bytes::from));
+    let bytes = bytes.collect::<Result<_, _>>();
+    bytes.map_err(|error| format!("its data are not base64: {error}"))
+}
+
+/// Returns `count` finite numbers of `FP32`.
+///
+/// # Errors
+/// The end of a sentence: what was sent, and what is needed.
+fn json_floats(json: &str, count: usize) -> Result<Vec<f32>, String> {
+    let mut numbers = Numbers {
+        count,
+        values: Vec::with_capacity(numbers_at_most(json, count)),
+    };
+    read(json, &mut numbers)?;
+    let values = numbers.values;
+    if values.len() == count {
+        Ok(values)
+    } else {
+        let sent = values.len();
+        Err(format!(
+            "it has {sent} numbers, but its shape needs {count}"
+        ))
+    }
+}
+
+/// Receives the elements of a list one by one.
+trait Elements<'de> {
+    fn number(&mut self, _number: f64) -> Result<(), String> {
+        Err("it holds a number: send a string in base64".to_owned())
+    }
+
+    fn text(&mut self, _text: Cow<'de, str>) -> Result<(), String> {
+        Err("it holds a string: send numbers".to_owned())
+    }
+}
+
+struct Texts<'de> {
+    count: usize,
+    values: Vec<Cow<'de, str>>,
+}
+
+impl<'de> Elements<'de> for Texts<'de> {
+    fn text(&mut self, text: Cow<'de, str>) -> Result<(), String> {
+        if self.values.len() < self.count {
+            self.values.push(text);
+            return Ok(());
+        }
+        let count = self.count;
+        Err(format!(
+            "it has more elements than the {count} that its shape needs"
+        ))
+    }
+}
+
+struct Numbers {
+    count: usize,
+    values: Vec<f32>,
+}
+
+impl Elements<'_> for Numbers {
+    fn number(&mut self, number: f64) -> Result<(), String> {
+        if self.values.len() == self.count {
+            let count = self.count;
+            return Err(format!(
+                "it has more numbers than the {count} that its shape needs"
+            ));
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "FP32 is the target format")]
+        let value = number as f32;
+        if !value.is_finite() {
+            return Err(format!("it holds {number}, which is out of range for FP32"));
+        }
+        self.values.push(value);
+        Ok(())
+    }
+}
+
+fn read<'de>(json: &'de str, elements: &mut impl Elements<'de>) -> Result<(), String> {
+    let mut reader = serde_json::Deserializer::from_str(json);
+    if !json.trim_start().starts_with('[') {
+        return Err("its data are not a list".to_owned());
+    }
+    // The position is not useful: the data are one line of many.
+    let without_position = |error: serde_json::Error| {
+        let error = error.to_string();
+        let error = error
+            .rsplit_once(" at line ")
+            .map_or(&*error, |(error, _)| error);
+        format!("its data cannot be used: {error}")
+    };
+    Reading(elements)
+        .deserialize(&mut reader)
+        .map_err(without_position)
+}
+
+struct Reading<'a, E>(&'a mut E);
+
+impl<'de, E: Elements<'de>> DeserializeSeed<'de> for Reading<'_, E> {
+    type Value = ();
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
+        deserializer.deserialize_any(self)
+    }
+}
+
+impl<'de, E: Elements<'de>> Visitor<'de> for Reading<'_, E> {
+    type Value = ();
+
+    fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("a list")
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<(), A::Error> {
+        while list.next_element_seed(Reading(&mut *self.0))?.is_some() {}
+        Ok(())
+    }
+
+    fn visit_u64<F: Error>(self, number: u64) -> Result<(), F> {
+        self.visit_f64(number as f64)
+    }
+
+    fn visit_i64<F: Error>(self, number: i64) -> Result<(), F> {
+        self.visit_f64(number as f64)
+    }
+
+    fn visit_f64<F: Error>(self, number: f64) -> Result<(), F> {
+        self.0.number(number).map_err(F::custom)
+    }
+
+    fn visit_borrowed_str<F: Error>(self, text: &'de str) -> Result<(), F> {
+        self.0.text(Cow::Borrowed(text)).map_err(F::custom)
+    }
+
+    fn visit_str<F: Error>(self, text: &str) -> Result<(), F> {
+        let text = Cow::Owned(text.to_owned());
+        self.0.text(text).map_err(F::custom)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use base64::engine::general_purpose::STANDARD_NO_PAD;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn lists_are_flat_or_nested() {
+        for json in ["[1,2.5,3,4]", "[[1,2.5],[3,4]]", " [[[1],[2.5]],[[3],[4]]]"] {
+            let read = json_floats(json, 4).unwrap();
+            assert_eq!(read, [1.0, 2.5, 3.0, 4.0], "{json}");
+        }
+    }
+
+    #[test]
+    fn data_that_do_not_fit_the_shape_are_refused() {
+        for (json, count, part) in [
+            ("[1,2]", 3, "it has 2 numbers, but its shape needs 3"),
+            ("[1,2,3]", 2, "more numbers than the 2"),
+            ("[\"a\"]", 1, "holds a string"),
+            ("[true]", 1, "boolean"),
+            ("{\"a\":1}", 1, "not a list"),
+            ("7", 1, "not a list"),
+        ] {
+            let error = json_floats(json, count).unwrap_err();
+            assert!(
+                error.contains(part) && !error.contains("at line"),
+                "{json}: {error}"
+            );
+        }
+        let error = json_floats("[1e39]", 1).unwrap_err();
+        assert!(error.contains("out of range for FP32"), "{error}");
+    }
+
+    #[test]
+    fn frames_are_base64_with_or_without_padding() {
+        for json in ["[\"AP8B\"]", "[[\"AP8B\"]]", "[\"\\u0041P8B\"]"] {
+            assert_eq!(
+                byte_elements(json, 1).unwrap(),
+                [&b"\0\xff\x01"[..]],
+                "{json}"
+            );
+        }
+        assert_eq!(
+            byte_elements("[\"AP8=\", \"AA==\"]", 2),
+            byte_elements("[[\"AP8\"], [\"AA\"]]", 2)
+        );
+        for (json, part) in [
+            ("[]", "0 elements, but its shape needs 1"),
+            ("[\"AA==\",\"AA==\"]", "more elements than the 1"),
+            ("[\"a b\"]", "not base64"),
+            ("[7]", "holds a number"),
+            ("\"AA==\"", "not a list"),
+        ] {
+            let error = byte_elements(json, 1).unwrap_err();
+            assert!(error.contains(part), "{json}: {error}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn any_text_gives_a_list_or_an_error(json in "[\\[\\]{},:\"0-9a-e.+\\- ]{0,40}", count in 0_usize..5) {
+            let length = json_floats(&json, count).map(|read| read.len());
+            prop_assert!(length.is_err() || length == Ok(count));
+            let _ = byte_elements(&json, count);
+        }
+
+        #[test]
+        fn data_take_no_more_memory_than_their_length_implies(
+            bytes in prop::collection::vec(any::<u8>(), 1..40), count in 1_usize..5,
+        ) {
+            for json in [BASE64.encode(&bytes), STANDARD_NO_PAD.encode(&bytes)] {
+                let json = format!("{:?}", vec![json; count]).replace(", ", ",");
+                let decoded = byte_elements(&json, count).unwrap().into_iter();
+                let capacity: usize = decoded.map(|bytes| bytes.try_into_mut().unwrap().capacity()).sum();
+                prop_assert!(capacity <= bytes_at_most(&json), "{capacity}");
+            }
+            let digits: Vec<_> = bytes.iter().map(|byte| byte % 10).collect();
+            let json = format!("{digits:?}").replace(' ', "");
+            let read = json_floats(&json, digits.len()).unwrap();
+            prop_assert_eq!(numbers_at_most(&json, usize::MAX), digits.len());
+            prop_assert_eq!(read.capacity(), digits.len());
+        }
+    }
 }

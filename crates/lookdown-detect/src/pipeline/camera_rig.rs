@@ -2,23 +2,25 @@
 //!
 //! A rig is immutable. All frames of a camera share the rig of a view plan.
 
+use std::sync::Arc;
+
 use lookdown_calibration::CameraGeometry;
+use lookdown_imaging::{Frame, Letterbox, MaskedPixels, NetworkInput, RemapTable};
 use lookdown_lens::geometry::{
     BackProjection, Footprint, FrameCrop, Pixel, ViewPlan, VirtualView,
     crop_placement::CropTarget,
+    foot_filter::AreaReach,
     pixels::{PixelConvention, cross_half_pixel},
 };
 
 use super::{
     mosaic::Mosaics,
     outline::{crop_outline, view_outline},
-    visible_views::{Hidden, LeftOut, Visible},
 };
 use crate::{
     detection::{BBox, FramePixels, ViewPixels},
     inference::ViewDetection,
 };
-use lookdown_imaging::{Frame, Letterbox, NetworkInput, RemapTable};
 
 /// Distance to the view's border, as a share of the view's width, below which a box is considered
 /// cut off.
@@ -27,13 +29,16 @@ const BORDER_SHARE: f64 = 0.0125;
 /// A camera ready for frames of one size.
 #[derive(Debug)]
 pub(super) struct CameraRig {
-    geometry: CameraGeometry,
-    frame: BBox<FramePixels>,
+    /// The lens, the mount and the areas of the camera.
+    pub(super) geometry: CameraGeometry,
+    /// The box of the whole frame.
+    pub(super) frame: BBox<FramePixels>,
     hidden: Hidden,
     views: Views,
     /// Views of parts of the frame, for those that may show a person.
     details: Vec<(VirtualView, RemapTable)>,
-    left_out: LeftOut,
+    /// The numbers of planned views that the network does not process.
+    pub(super) left_out: LeftOut,
 }
 
 /// The network's views of a frame.
@@ -141,16 +146,6 @@ impl CameraRig {
         self.hidden.masked.is_empty()
     }
 
-    /// Returns the lens, the mount and the areas of the camera.
-    pub(super) fn geometry(&self) -> &CameraGeometry {
-        &self.geometry
-    }
-
-    /// Returns the box of the whole frame.
-    pub(super) fn frame(&self) -> &BBox<FramePixels> {
-        &self.frame
-    }
-
     /// Returns the number of detail views.
     pub(super) fn detail_count(&self) -> usize {
         self.details.len()
@@ -196,11 +191,6 @@ impl CameraRig {
         reach.map_or_else(Vec::new, |reach| reach.boxes_outside())
     }
 
-    /// Returns the numbers of planned views that the network does not process.
-    pub(super) fn left_out(&self) -> LeftOut {
-        self.left_out
-    }
-
     /// Returns the outlines of the views in corner-origin frame pixels.
     pub(super) fn view_outlines(&self) -> Vec<Vec<Pixel>> {
         match &self.views {
@@ -222,7 +212,7 @@ impl CameraRig {
                 RemapTable::bytes(views.map(|(_, table)| table))
             }
             Views::Crops(mosaics) => {
-                RemapTable::bytes(mosaics.crops().iter().map(|(_, table)| table))
+                RemapTable::bytes(mosaics.crops.iter().map(|(_, table)| table))
             }
             Views::Direct(_) => 0,
         };
@@ -262,7 +252,7 @@ impl CameraRig {
                 &self.geometry.mount,
             ),
             Views::Crops(mosaics) => {
-                let crop = &mosaics.crops()[view].0;
+                let crop = &mosaics.crops[view].0;
                 Footprint::from_crop_box(bbox.corners(), crop, &self.geometry.lens)
             }
             Views::Direct(letterbox) => Some(Footprint::from_frame_box(
@@ -278,7 +268,7 @@ impl CameraRig {
 
     fn placed_crops(&self) -> &[(FrameCrop, RemapTable)] {
         match &self.views {
-            Views::Crops(mosaics) => mosaics.crops(),
+            Views::Crops(mosaics) => &mosaics.crops,
             Views::Virtual(_) | Views::Direct(_) => &[],
         }
     }
@@ -350,4 +340,82 @@ fn touches_border([x_min, y_min, x_max, y_max]: [f64; 4], width: u32, height: u3
     let (width, height) = (f64::from(width), f64::from(height));
     let margin = BORDER_SHARE * width;
     x_min < margin || y_min < margin || x_max > width - margin || y_max > height - margin
+}
+
+/// The pixels of a frame that show no person who counts.
+#[derive(Debug, Clone)]
+struct Hidden {
+    masked: Arc<MaskedPixels>,
+    /// The pixels that can show a person of the areas; `None` without areas.
+    reach: Option<Arc<AreaReach>>,
+}
+
+impl Hidden {
+    fn new(geometry: &CameraGeometry, width: u32, height: u32) -> Self {
+        let CameraGeometry { lens, mount, areas } = geometry;
+        let reach = AreaReach::new(&areas.foot_filter, lens, mount, width, height);
+        Self {
+            masked: Arc::new(MaskedPixels::new(&areas.masks, width, height)),
+            reach: reach.map(Arc::new),
+        }
+    }
+
+    /// Returns true if a view shows an unmasked pixel that can show a person of the areas.
+    fn leaves_something(&self, table: &RemapTable) -> bool {
+        let Some(reach) = &self.reach else {
+            return true;
+        };
+        table.sees_pixel(|x, y| {
+            reach.holds(Pixel::new(f64::from(x) + 0.5, f64::from(y) + 0.5))
+                && !self.masked.hides(x, y)
+        })
+    }
+}
+
+/// The numbers of planned views that the network does not process.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct LeftOut {
+    /// Views outside the lens image.
+    pub outside: usize,
+    /// Views whose part of the lens image is wholly masked.
+    pub masked: usize,
+    /// Views that cannot show a person in an area.
+    pub outside_areas: usize,
+}
+
+impl LeftOut {
+    /// Returns the sums.
+    fn and(self, other: Self) -> Self {
+        Self {
+            outside: self.outside + other.outside,
+            masked: self.masked + other.masked,
+            outside_areas: self.outside_areas + other.outside_areas,
+        }
+    }
+}
+
+/// The views that can show a person, and the numbers of the others.
+struct Visible<V> {
+    views: Vec<(V, RemapTable)>,
+    left_out: LeftOut,
+}
+
+impl<V> Visible<V> {
+    fn new(planned: impl Iterator<Item = (V, RemapTable)>, hidden: &Hidden) -> Self {
+        let mut views = Vec::new();
+        let mut left_out = LeftOut::default();
+        let masked = &hidden.masked;
+        for (view, table) in planned {
+            if !table.sees_anything() {
+                left_out.outside += 1;
+            } else if !masked.is_empty() && !table.sees_beside(masked) {
+                left_out.masked += 1;
+            } else if !hidden.leaves_something(&table) {
+                left_out.outside_areas += 1;
+            } else {
+                views.push((view, table));
+            }
+        }
+        Self { views, left_out }
+    }
 }

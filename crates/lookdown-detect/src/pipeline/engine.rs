@@ -1,14 +1,15 @@
 //! The engine: converts the bytes of a frame to its report. The calling thread decodes the frame
 //! and merges detections; the inference threads render views and run inference.
 
+#[cfg(test)]
+mod area_tests;
 mod camera;
-mod crop_pass;
-mod detail_pass;
 mod first_pass;
 mod follow_pass;
+#[cfg(test)]
+mod follow_tests;
 mod further_looks;
 mod observation;
-mod placed;
 
 use std::{
     num::NonZeroUsize,
@@ -17,11 +18,15 @@ use std::{
 };
 
 use lookdown_calibration::warning::{Warning, WarningCode};
+use lookdown_imaging::{
+    Frame,
+    decode::{DecodeLimits, decode},
+    with_even_light,
+};
+use lookdown_lens::geometry::{FootFilter, FootPlace};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use strum::VariantNames as _;
 
-pub use self::observation::Observation;
-use self::{first_pass::FirstPass, placed::Placed};
 use super::{
     BatchOptions, CalibrationLookup, DefaultModels, DetectJob, DetectedFrame, DetectionReport,
     JobImage, Person, PipelineError, Search, Stage, StageTimings,
@@ -38,11 +43,10 @@ use crate::{
     metrics::{DetectMetrics, start_at_zero},
     parameters::DetectParameters,
 };
-use lookdown_imaging::{
-    Frame,
-    decode::{DecodeLimits, decode},
-    with_even_light,
-};
+
+use first_pass::FirstPass;
+
+pub use observation::Observation;
 
 /// The smallest frame side that can hold a lens image, pixels.
 const MIN_FRAME_SIDE: u32 = 32;
@@ -102,8 +106,9 @@ pub struct Engine {
     follow_cache: FollowCache,
     /// The turn of all view plans, radians.
     plan_turn: f64,
-    options: EngineOptions,
-    metrics: Arc<DetectMetrics>,
+    /// The options.
+    pub options: EngineOptions,
+    pub(super) metrics: Arc<DetectMetrics>,
 }
 
 impl Engine {
@@ -164,7 +169,7 @@ impl Engine {
             None => found(&with_candidates(&parameters.refinement)),
         };
         timeline.leave(Instant::now());
-        let foot_filter = &observation.camera.rig.geometry().areas.foot_filter;
+        let foot_filter = &observation.camera.rig.geometry.areas.foot_filter;
         let mut placed = Placed::new(persons, foot_filter);
         let scores = scores(&placed.persons);
         placed.retain(parameters.refinement.score_threshold);
@@ -177,7 +182,7 @@ impl Engine {
         let search = observation.search();
         let searches = &self.metrics.frame_searches;
         searches.with_label_values(&[search.name()]).inc();
-        let zones = ZoneCount::for_zones(&observation.camera.rig.geometry().areas.zones, &persons);
+        let zones = ZoneCount::for_zones(&observation.camera.rig.geometry.areas.zones, &persons);
         let calibration = observation.camera.used.clone();
         let camera = parameters.camera.clone();
         let report = DetectionReport {
@@ -189,7 +194,7 @@ impl Engine {
             image_width: observation.frame.width(),
             image_height: observation.frame.height(),
             crop_model: observation.crop_model().map(ModelUsed::from),
-            model: ModelUsed::from(observation.model()),
+            model: ModelUsed::from(&*observation.model),
             profile: parameters.profile,
             refinement: parameters.refinement,
             defaults: parameters.defaults.clone(),
@@ -307,13 +312,8 @@ impl Engine {
         observation: &Observation,
         refinement: &RefinementParameters,
     ) -> Vec<Person> {
-        let Observation {
-            passes,
-            profile,
-            tuning,
-            ..
-        } = observation;
-        merge::persons(passes, *profile, tuning, refinement)
+        let Observation { passes, tuning, .. } = observation;
+        merge::persons(passes, observation.profile, tuning, refinement)
     }
 
     /// Returns the camera's views in the motion cache, if the request enables motion detection.
@@ -323,15 +323,6 @@ impl Engine {
             self.motion_cache
                 .camera_views(camera, &seen.camera.rig, &seen.model),
         )
-    }
-
-    /// Returns the options.
-    pub fn options(&self) -> &EngineOptions {
-        &self.options
-    }
-
-    pub(super) fn metrics(&self) -> &Arc<DetectMetrics> {
-        &self.metrics
     }
 
     /// Returns the model for requests that name none.
@@ -347,7 +338,7 @@ impl Engine {
         };
         self.models.get(name).ok_or_else(|| {
             let loaded = self.models.all();
-            let loaded: Vec<_> = loaded.iter().map(|model| model.name()).collect();
+            let loaded: Vec<_> = loaded.iter().map(|model| &*model.name).collect();
             PipelineError::UnknownModel {
                 name: name.clone(),
                 loaded: loaded.join(", "),
@@ -373,9 +364,42 @@ fn check_size(frame: &Frame) -> Result<(), PipelineError> {
     Ok(())
 }
 
-#[cfg(test)]
-mod area_tests;
-#[cfg(test)]
-mod follow_tests;
+/// The persons of a frame by the places of their feet.
+#[derive(Default)]
+struct Placed {
+    /// Those who count.
+    persons: Vec<Person>,
+    /// Those in the margin of an area; `None` without areas.
+    margin: Option<Vec<Person>>,
+    /// All others.
+    outside: Vec<Person>,
+}
+
+impl Placed {
+    /// Sorts persons by the places of their feet, in their order.
+    fn new(persons: Vec<Person>, filter: &FootFilter) -> Self {
+        let mut placed = Self {
+            margin: (!filter.areas.is_empty()).then(Vec::new),
+            ..Self::default()
+        };
+        for person in persons {
+            match filter.place(person.oriented_box.foot(), person.floor) {
+                FootPlace::Inside => placed.persons.push(person),
+                FootPlace::Margin => placed.margin.get_or_insert_default().push(person),
+                FootPlace::Outside => placed.outside.push(person),
+            }
+        }
+        placed
+    }
+
+    /// Removes those of lower scores than the threshold.
+    fn retain(&mut self, score_threshold: f64) {
+        let margin = self.margin.iter_mut();
+        for persons in margin.chain([&mut self.persons, &mut self.outside]) {
+            persons.retain(|person| person.score >= score_threshold);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests;

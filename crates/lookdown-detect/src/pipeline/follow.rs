@@ -154,6 +154,28 @@ impl Followed {
         let others = self.people.unexplained(&bounds, reach_px, seconds(at));
         others.iter().all(|&other| moved[other].levels < NEW_LEVELS)
     }
+
+    /// Confirms persons in motion by those found in crops. Others that were found become persons of
+    /// their own if their score suffices.
+    fn confirm(&mut self, moving: &[bool], found: Vec<Person>, at: Timestamp, rig: &CameraRig) {
+        self.at = at;
+        let least_score = self.origin.refinement.score_threshold;
+        let place = |found: &Person, score, oriented_box| {
+            merge::placed(found.bbox, score, oriented_box, found.views, rig)
+        };
+        self.people
+            .confirm(moving, found, seconds(at), least_score, place);
+    }
+
+    /// Returns the persons that are seen, highest score first.
+    fn persons(&self, refinement: &RefinementParameters) -> Vec<Person> {
+        let seen = self.people.seen();
+        let seen = seen.filter(|person| person.score >= refinement.score_threshold);
+        let mut persons: Vec<_> = seen.cloned().collect();
+        persons.sort_by(|a, b| b.score.total_cmp(&a.score));
+        persons.truncate(refinement.max_detections);
+        persons
+    }
 }
 
 /// A frame of a camera whose persons are followed.
@@ -174,7 +196,7 @@ impl FollowedFrame {
     /// Returns the places of the crops, best persons first; `None` if the whole frame is searched.
     pub(super) fn targets(&self, rig: &CameraRig) -> Option<Vec<CropTarget>> {
         let (before, moving) = (self.before.as_ref()?, self.moving.as_ref()?);
-        let geometry = rig.geometry();
+        let geometry = &rig.geometry;
         let expected = before.people.expected(moving, seconds(self.at));
         let mut targets: Vec<_> = expected
             .map(|(person, bbox)| {
@@ -254,30 +276,6 @@ impl FollowedFrame {
         };
         persons.extend_from_slice(&state.candidates);
         *self.kept.lock() = Some(state);
-        persons
-    }
-}
-
-impl Followed {
-    /// Confirms persons in motion by those found in crops. Others that were found become persons of
-    /// their own if their score suffices.
-    fn confirm(&mut self, moving: &[bool], found: Vec<Person>, at: Timestamp, rig: &CameraRig) {
-        self.at = at;
-        let least_score = self.origin.refinement.score_threshold;
-        let place = |found: &Person, score, oriented_box| {
-            merge::placed(found.bbox, score, oriented_box, found.views, rig)
-        };
-        self.people
-            .confirm(moving, found, seconds(at), least_score, place);
-    }
-
-    /// Returns the persons that are seen, highest score first.
-    fn persons(&self, refinement: &RefinementParameters) -> Vec<Person> {
-        let seen = self.people.seen();
-        let seen = seen.filter(|person| person.score >= refinement.score_threshold);
-        let mut persons: Vec<_> = seen.cloned().collect();
-        persons.sort_by(|a, b| b.score.total_cmp(&a.score));
-        persons.truncate(refinement.max_detections);
         persons
     }
 }

@@ -198,12 +198,8 @@ impl Drop for InFlightGuard {
 
 impl fmt::Display for StalledWork {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            request_id,
-            stage,
-            age,
-        } = self;
-        write!(f, "{request_id} ({stage}, {} s)", age.as_secs())
+        let seconds = self.age.as_secs();
+        write!(f, "{} ({}, {seconds} s)", self.request_id, self.stage)
     }
 }
 

@@ -130,7 +130,7 @@ impl DetectedFrame {
     /// Returns the camera of the frame: its lens, mount and areas in pixels of the frame.
     pub fn camera(&self) -> Option<&CameraGeometry> {
         // All rigs belong to one camera.
-        self.rigs.first().map(|rig| rig.geometry())
+        self.rigs.first().map(|rig| &rig.geometry)
     }
 
     /// Returns the outlines of the calibration's zones in the frame.

@@ -1,9 +1,16 @@
 //! Merges boxes of views into persons of the frame.
+//!
+//! The score weight of a box: a factor from its position in its view and from the implied size of
+//! the person.
+
+#[cfg(test)]
+mod properties;
 
 use lookdown_lens::geometry::{
-    BackProjection, BoxAngles, Footprint, OrientedBox, PersonHeight, Posture, PostureBelief,
+    BackProjection, BoxAngles, Footprint, Mount, OrientedBox, PersonHeight, Posture, PostureBelief,
     crop_placement::CropTarget,
     floor::{bearing, floor_position},
+    height_ratio::HeightRatio,
     oriented_box::vertical_in_frame,
 };
 
@@ -11,7 +18,6 @@ use super::{
     Person,
     camera_rig::CameraRig,
     pass::{Pass, PassDetection, detections, views_holding},
-    plausibility::score_weight,
 };
 use crate::{
     detection::{
@@ -39,7 +45,7 @@ impl Mapped {
     /// number of views that hold the whole person.
     /// `crop_vote` is the factor for scores from crops.
     fn weighted(&self, passes: &[Pass], rig: &CameraRig, crop_vote: f64) -> Candidate {
-        let mount = &rig.geometry().mount;
+        let mount = &rig.geometry.mount;
         let height_ratio = self
             .footprint
             .extremities()
@@ -119,12 +125,12 @@ pub(super) fn possible_persons(
         max_detections: 500,
     };
     let (mapped, mut merged) = merged(passes, rig, profile, tuning, &parameters);
-    if !rig.geometry().areas.foot_filter.areas.is_empty() {
+    if !rig.geometry.areas.foot_filter.areas.is_empty() {
         merged.retain(|merged| may_count(merged, &mapped, rig));
     }
-    let geometry = rig.geometry();
+    let geometry = &rig.geometry;
     let targets = merged.iter().filter_map(|merged| {
-        let bbox = merged.bbox.clipped_to(rig.frame())?;
+        let bbox = merged.bbox.clipped_to(&rig.frame)?;
         let center = nalgebra::Point2::from(bbox.center());
         Some(CropTarget {
             bbox: bbox.corners(),
@@ -142,7 +148,7 @@ fn may_count(merged: &MergedDetection, mapped: &[Mapped], rig: &CameraRig) -> bo
         .iter()
         .map(|&member| &mapped[member])
         .collect();
-    let filter = &rig.geometry().areas.foot_filter;
+    let filter = &rig.geometry.areas.foot_filter;
     let person = person(merged.bbox, merged.score, &members, rig);
     person.is_none_or(|person| {
         filter.is_near(person.oriented_box.foot(), person.floor, TARGET_MARGINS)
@@ -182,7 +188,7 @@ fn map(find: &PassDetection<'_>, back_projection: BackProjection) -> Option<Mapp
     let footprint = rig.footprint(find.view, &found.bbox, back_projection)?;
     let is_exact = rig.is_exact();
     let bbox = BBox::new(footprint.bounds()).ok()?;
-    let cut_off = rig.cuts_off(find.view, &found.bbox, model.input());
+    let cut_off = rig.cuts_off(find.view, &found.bbox, &model.input);
     let candidate = Candidate {
         bbox,
         score: found.score,
@@ -206,9 +212,9 @@ fn person(
     members: &[&Mapped],
     rig: &CameraRig,
 ) -> Option<Person> {
-    let geometry = rig.geometry();
+    let geometry = &rig.geometry;
     let bounds = bbox.corners();
-    let bbox = bbox.clipped_to(rig.frame())?;
+    let bbox = bbox.clipped_to(&rig.frame)?;
     let center = nalgebra::Point2::from(bbox.center());
     let up = vertical_in_frame(center, &geometry.lens, &geometry.mount);
     // Upright views determine the proportions, crops the extent.
@@ -242,7 +248,7 @@ pub(super) fn placed(
     views: usize,
     rig: &CameraRig,
 ) -> Person {
-    let geometry = rig.geometry();
+    let geometry = &rig.geometry;
     let foot = oriented_box.foot();
     let floor = floor_position(foot, &geometry.lens, &geometry.mount);
     Person {
@@ -260,7 +266,7 @@ pub(super) fn placed(
 
 /// Returns the posture that the box alone tells, with its probability.
 fn posture(person: &OrientedBox, rig: &CameraRig) -> (Posture, f64) {
-    let geometry = rig.geometry();
+    let geometry = &rig.geometry;
     let camera_m = geometry.mount.height_m();
     let mut belief = PostureBelief::new(camera_m.is_some());
     if let Some(angles) = BoxAngles::new(person, &geometry.lens, &geometry.mount) {
@@ -270,5 +276,87 @@ fn posture(person: &OrientedBox, rig: &CameraRig) -> (Posture, f64) {
     (Posture::Unknown, 0.0)
 }
 
+/// The factor for a box cut off by the border of its view. Other views show the person whole.
+const CUT_OFF_WEIGHT: f64 = 0.7;
+/// The share of the score that an impossible height or an impossible width removes.
+const IMPOSSIBLE_PENALTY: f64 = 0.7;
+/// Heights in camera heights: impossible below the first, fully plausible from the second to the
+/// third, impossible from the fourth. Sitting and half hidden people are included.
+const HEIGHT: [f64; 4] = [0.1, 0.35, 0.85, 1.05];
+/// Widths in camera heights, with the same meaning of the four values.
+const WIDTH: [f64; 4] = [0.03, 0.12, 0.7, 1.1];
+/// Angles from straight down, radians. Heights have no influence up to the first and full influence
+/// from the second.
+const HEIGHT_ANGLES: [f64; 2] = [0.15, 0.45];
+
+/// Returns the factor for the score of a box, above 0 and at most 1.
+fn score_weight(cut_off: bool, height_ratio: Option<HeightRatio>, mount: &Mount) -> f64 {
+    let whole = if cut_off { CUT_OFF_WEIGHT } else { 1.0 };
+    // Only a camera that faces down is above the heads of all persons.
+    match height_ratio {
+        Some(height_ratio) if mount.is_near_nadir() => {
+            let influence = rise(height_ratio.off_nadir, HEIGHT_ANGLES);
+            let height = 1.0 - influence * (1.0 - trapezium(height_ratio.height, HEIGHT));
+            let width = trapezium(height_ratio.width, WIDTH);
+            whole * penalized(height) * penalized(width)
+        }
+        _ => whole,
+    }
+}
+
+fn penalized(plausibility: f64) -> f64 {
+    1.0 - IMPOSSIBLE_PENALTY * (1.0 - plausibility)
+}
+
+/// Returns 0 up to `from`, 1 from `to` on, and a linear ramp between.
+fn rise(value: f64, [from, to]: [f64; 2]) -> f64 {
+    ((value - from) / (to - from)).clamp(0.0, 1.0)
+}
+
+fn trapezium(value: f64, [from, low, high, to]: [f64; 4]) -> f64 {
+    rise(value, [from, low]) * (1.0 - rise(value, [high, to]))
+}
+
 #[cfg(test)]
-mod properties;
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+
+    fn height_ratio(height: f64, width: f64, off_nadir: f64) -> HeightRatio {
+        HeightRatio {
+            height,
+            width,
+            off_nadir,
+        }
+    }
+
+    #[test]
+    fn implausible_sizes_lower_the_score_and_plausible_keep_it() {
+        let mount = Mount::default();
+        assert_eq!(
+            score_weight(false, Some(height_ratio(0.6, 0.2, 1.0)), &mount),
+            1.0
+        );
+        assert!(
+            (score_weight(false, Some(height_ratio(0.05, 0.2, 1.0)), &mount) - 0.3).abs() < 1e-12
+        );
+        assert!(
+            (score_weight(false, Some(height_ratio(0.6, 2.0, 1.0)), &mount) - 0.3).abs() < 1e-12
+        );
+        assert!((score_weight(true, None, &mount) - 0.7).abs() < 1e-12);
+    }
+
+    #[test]
+    fn height_is_ignored_at_the_nadir_and_for_wall_cameras() {
+        assert_eq!(
+            score_weight(false, Some(height_ratio(0.0, 0.2, 0.1)), &Mount::default()),
+            1.0
+        );
+        let wall = Mount::new(-Vector3::y_axis(), None);
+        assert_eq!(
+            score_weight(false, Some(height_ratio(1.0, 0.2, 1.0)), &wall),
+            1.0
+        );
+    }
+}

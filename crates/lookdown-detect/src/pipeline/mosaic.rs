@@ -11,7 +11,8 @@ use lookdown_imaging::{Frame, NetworkInput, RemapTable};
 /// side, row by row.
 #[derive(Debug)]
 pub(super) struct Mosaics {
-    crops: Vec<(FrameCrop, RemapTable)>,
+    /// The crops.
+    pub(super) crops: Vec<(FrameCrop, RemapTable)>,
     /// The crops of each input.
     inputs: Vec<Range<usize>>,
     /// The side of the square that the crops of an input share, pixels.
@@ -35,11 +36,6 @@ impl Mosaics {
             inputs,
             side,
         }
-    }
-
-    /// Returns the crops.
-    pub(super) fn crops(&self) -> &[(FrameCrop, RemapTable)] {
-        &self.crops
     }
 
     /// Returns the crops of each input.
@@ -177,7 +173,7 @@ mod tests {
             let [local] = per_crop[number][..] else {
                 panic!("{per_crop:?}");
             };
-            let [x, y, ..] = mosaics.crops()[number].0.frame_box(local.bbox.corners());
+            let [x, y, ..] = mosaics.crops[number].0.frame_box(local.bbox.corners());
             let index = top as usize * 80 + left as usize;
             let shown = [slot[index], slot[input.plane_len() + index]].map(f64::from);
             assert!((shown[0] - x).abs() < 0.6 && (shown[1] - y).abs() < 0.6);

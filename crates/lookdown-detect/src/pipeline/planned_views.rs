@@ -85,8 +85,8 @@ impl Engine {
         calibration: &Calibration,
         profile: Profile,
     ) -> Result<PlannedViews, PipelineError> {
-        let (model, options) = (self.default_model()?, self.options());
-        let input = model.input();
+        let (model, options) = (self.default_model()?, &self.options);
+        let input = &model.input;
         let (lens, (image_width, image_height)) = (calibration.lens(), calibration.image_size());
         let masked = CoarseMasks::new(&calibration.areas().masks, image_width, image_height);
         let areas = &calibration.areas().foot_filter;
@@ -107,7 +107,7 @@ impl Engine {
         let images = views.as_ref().map_or(1, Vec::len);
         Ok(PlannedViews {
             profile,
-            model: model.name().to_owned(),
+            model: model.name.clone(),
             image_width,
             image_height,
             seen_share: coverage.map_or(1.0, |coverage| coverage.seen_share),

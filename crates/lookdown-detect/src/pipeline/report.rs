@@ -149,8 +149,8 @@ pub struct ModelUsed {
 impl From<&Model> for ModelUsed {
     fn from(model: &Model) -> Self {
         Self {
-            name: model.name().to_owned(),
-            revision: model.revision().to_owned(),
+            name: model.name.clone(),
+            revision: model.revision.clone(),
         }
     }
 }

@@ -78,7 +78,7 @@ impl WorkerPool {
             budget: SharedBudget::new(capacity.get()),
             in_flight: Arc::default(),
             rate: Mutex::default(),
-            metrics: Arc::clone(engine.metrics()),
+            metrics: Arc::clone(&engine.metrics),
         });
         let threads = (0..workers.get()).map(|index| {
             let shared = Arc::clone(&shared);
@@ -120,7 +120,7 @@ impl WorkerPool {
     ) -> Result<T, PipelineError> {
         let ticket = job.ticket.clone();
         ticket.timeline.enter(Stage::Queue, job.arrived);
-        let cost = frame_cost::for_frame(&job, self.engine().options().decode_limits.max_pixels);
+        let cost = frame_cost::for_frame(&job, self.engine().options.decode_limits.max_pixels);
         let work = move |engine: &Engine| engine.detect(&job).map(finish);
         self.queue(ticket, cost, work).await
     }

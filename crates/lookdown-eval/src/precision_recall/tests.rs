@@ -87,12 +87,12 @@ proptest! {
         let right = outcomes.iter().filter(|outcome| outcome.1).count();
         let curve = curve(&outcomes, (right + missed).max(1));
         let ap = curve.average_precision();
-        let from_points = curve.points().iter().flat_map(|point| [point.precision, point.recall, point.f1]);
+        let from_points = curve.points.iter().flat_map(|point| [point.precision, point.recall, point.f1]);
         let all = from_points.chain([ap.all_point_area, ap.eleven_point, ap.coco_101_point]);
         for value in all {
             prop_assert!((0.0..=1.0 + 1e-12).contains(&value), "{}", value);
         }
-        prop_assert!(curve.points().is_sorted_by(|a, b| a.recall <= b.recall));
+        prop_assert!(curve.points.is_sorted_by(|a, b| a.recall <= b.recall));
     }
 
     #[test]

@@ -1,26 +1,30 @@
 //! One connection, from the first byte to the last.
 
-use std::{convert::Infallible, io, net::SocketAddr, pin::pin, sync::Arc, time::Duration};
+use std::{
+    convert::Infallible,
+    io::{self, IoSlice},
+    net::SocketAddr,
+    pin::{Pin, pin},
+    sync::Arc,
+    task::{Context, Poll},
+    time::Duration,
+};
 
 use hyper::{
     Request, Response,
-    body::{Body, Incoming},
+    body::{Body, Frame, Incoming, SizeHint},
     header::{CONNECTION, HeaderValue},
     server::conn::http1,
     service::service_fn,
 };
 use hyper_util::rt::TokioIo;
 use tokio::{
-    io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt},
+    io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt, ReadBuf},
     time::timeout,
 };
 use tower::{BoxError, Service, ServiceExt};
 
-use super::{
-    ConnectionLimits,
-    connection_timeouts::ConnectionTimeouts,
-    instrumented_io::{InstrumentedBody, InstrumentedStream},
-};
+use super::{ConnectionLimits, connection_timeouts::ConnectionTimeouts};
 use crate::Shutdown;
 
 /// The connection passes heads of up to this multiple of the limit to the service, which refuses
@@ -120,4 +124,100 @@ async fn discard_rest(mut stream: impl AsyncRead + AsyncWrite + Unpin) -> io::Re
     let mut rest = stream.take(MAX_DISCARDED_BYTES);
     tokio::io::copy(&mut rest, &mut tokio::io::sink()).await?;
     Ok(())
+}
+
+/// The stream of a client.
+struct InstrumentedStream<T> {
+    stream: T,
+    timeouts: Arc<ConnectionTimeouts>,
+}
+
+impl<T> InstrumentedStream<T> {
+    fn record(&self, written: &Poll<io::Result<usize>>) {
+        match written {
+            Poll::Pending => self.timeouts.blocked(),
+            Poll::Ready(bytes) => self.timeouts.sent(*bytes.as_ref().unwrap_or(&0)),
+        }
+    }
+}
+
+impl<T: AsyncRead + Unpin> AsyncRead for InstrumentedStream<T> {
+    fn poll_read(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<io::Result<()>> {
+        let before = buffer.filled().len();
+        let outcome = Pin::new(&mut self.stream).poll_read(context, buffer);
+        if buffer.filled().len() > before {
+            self.timeouts.received();
+        }
+        outcome
+    }
+}
+
+impl<T: AsyncWrite + Unpin> AsyncWrite for InstrumentedStream<T> {
+    fn poll_write(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        bytes: &[u8],
+    ) -> Poll<io::Result<usize>> {
+        let outcome = Pin::new(&mut self.stream).poll_write(context, bytes);
+        self.record(&outcome);
+        outcome
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_flush(context)
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_shutdown(context)
+    }
+
+    fn poll_write_vectored(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        parts: &[IoSlice<'_>],
+    ) -> Poll<io::Result<usize>> {
+        let outcome = Pin::new(&mut self.stream).poll_write_vectored(context, parts);
+        self.record(&outcome);
+        outcome
+    }
+
+    fn is_write_vectored(&self) -> bool {
+        self.stream.is_write_vectored()
+    }
+}
+
+/// The body of a response. The request ends when this is dropped.
+struct InstrumentedBody<B> {
+    body: B,
+    timeouts: Arc<ConnectionTimeouts>,
+}
+
+impl<B: Body + Unpin> Body for InstrumentedBody<B> {
+    type Data = B::Data;
+    type Error = B::Error;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<B::Data>, B::Error>>> {
+        Pin::new(&mut self.body).poll_frame(context)
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.body.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.body.size_hint()
+    }
+}
+
+impl<B> Drop for InstrumentedBody<B> {
+    fn drop(&mut self) {
+        self.timeouts.request_ends();
+    }
 }

@@ -3,6 +3,8 @@
 
 use std::ops::Range;
 
+use lookdown_lens::saturating::{to_u8, to_u32};
+
 use crate::frame::Frame;
 
 /// A color, 8 bits a channel.
@@ -16,27 +18,14 @@ pub(super) fn blend(frame: &mut Frame, x: u32, y: u32, color: Rgb, opacity: f64)
     };
     for (value, target) in pixel.iter_mut().zip(color) {
         let mixed = f64::from(*value) + (f64::from(target) - f64::from(*value)) * opacity;
-        // `as` cuts off the fraction, so that adding 0.5 rounds; `round` is slower.
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "between two bytes"
-        )]
-        {
-            *value = (mixed + 0.5) as u8;
-        }
+        // Adding 0.5 rounds; `round` is slower.
+        *value = to_u8(mixed + 0.5);
     }
 }
 
 /// Pixels whose centers lie between two coordinates, clipped to `0..length`.
 pub(super) fn pixels(from: f64, to: f64, length: u32) -> Range<u32> {
-    // `as` saturates, which clips. NaN becomes 0.
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "clipped to the frame"
-    )]
-    let bound = |coordinate: f64| ((coordinate - 0.5).ceil() as u32).min(length);
+    let bound = |coordinate: f64| to_u32((coordinate - 0.5).ceil()).min(length);
     bound(from)..bound(to)
 }
 

@@ -6,6 +6,8 @@
 
 use std::ops::Range;
 
+use lookdown_lens::saturating::to_u32;
+
 use super::{
     canvas::{Rgb, edge_span, pixels},
     effort::Cancelled,
@@ -107,12 +109,7 @@ impl Area {
         Self {
             corners,
             rows: pixels(top - 0.5, bottom + 0.5, frame.height()),
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "clamped to the frame"
-            )]
-            side: (side.ceil() as u32).max(MIN_BLOCK),
+            side: to_u32(side.ceil()).max(MIN_BLOCK),
         }
     }
 

@@ -1,5 +1,7 @@
 //! The dark surround of the lens image, whose outline is not an edge of the room.
 
+use lookdown_lens::saturating::to_usize;
+
 use crate::{frame::Frame, lens_circle::surround_threshold};
 
 /// Side of a cell, in pixels of the divided frame.
@@ -13,12 +15,7 @@ pub(super) struct SurroundMask {
 
 impl SurroundMask {
     pub(super) fn contains(&self, [x, y]: [f64; 2]) -> bool {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "in the frame"
-        )]
-        let (column, row) = (x as usize / CELL, y as usize / CELL);
+        let [column, row] = [x, y].map(|at| to_usize(at) / CELL);
         self.dark
             .get(row * self.columns + column)
             .copied()

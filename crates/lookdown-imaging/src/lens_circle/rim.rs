@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use lookdown_lens::saturating::to_usize;
+
 use super::LensCircle;
 use super::surround::{Surround, brightness};
 use crate::frame::Frame;
@@ -123,12 +125,7 @@ fn brightness_at(frame: &Frame, [x, y]: [f64; 2]) -> Option<f64> {
     if !is_inside {
         return None;
     }
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "checked to lie in the frame"
-    )]
-    let (column, row) = (left as usize, top as usize);
+    let (column, row) = (to_usize(left), to_usize(top));
     let line = 3 * frame.width() as usize;
     let upper = row * line + 3 * column;
     let [upper, lower] = [upper, upper + line].map(|first| {

@@ -89,7 +89,7 @@ proptest! {
         let polygon = polygon.unwrap();
         let masked = MaskedPixels::new(std::slice::from_ref(&polygon), WIDTH, HEIGHT);
         for (x, y) in places {
-            let is_masked = masked.hides(whole(x.floor()), whole(y.floor()));
+            let is_masked = masked.hides(to_u32(x.floor()), to_u32(y.floor()));
             if polygon.holds(Point2::new(x, y)) {
                 prop_assert!(is_masked, "{x} {y} is inside");
             }

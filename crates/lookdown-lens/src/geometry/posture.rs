@@ -6,6 +6,7 @@
 //! postures: a person who lies along the line of sight covers what a smaller person who stands
 //! would. So a [`PostureBelief`] keeps the size that earlier boxes showed.
 
+use crate::saturating::to_usize;
 use std::sync::OnceLock;
 
 use serde::{Deserialize, Serialize};
@@ -182,23 +183,13 @@ impl BoxAngles {
     fn likelihoods(&self, camera_m: Option<f64>) -> [[f64; SIZES]; POSTURES] {
         let measured = [self.along.ln(), self.across.ln()];
         let angle = self.from_nadir / ANGLE_STEP;
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "0 to ANGLES"
-        )]
-        let lower = (angle as usize).min(ANGLES - 2);
+        let lower = to_usize(angle).min(ANGLES - 2);
         let share = angle - float(lower);
         let first =
             (SMALLEST / camera_m.unwrap_or(USUAL_CAMERA_M) / SMALLEST_RATIO).ln() / STEP.ln();
         let mut likelihoods = [[0.0; SIZES]; POSTURES];
         for size in 0..SIZES {
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "0 to RATIOS"
-            )]
-            let ratio = (first.round() + float(size)).clamp(0.0, float(RATIOS - 1)) as usize;
+            let ratio = to_usize(first.round() + float(size)).min(RATIOS - 1);
             let rows = TABLE[ratio].get_or_init(|| rows(ratio));
             let (near, far) = (&rows[lower], &rows[lower + 1]);
             let mut counts = [0.0; POSTURES];

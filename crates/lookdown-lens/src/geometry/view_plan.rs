@@ -1,12 +1,8 @@
 //! View plans: which directions a camera is looked at from within.
 
-mod coverage;
-
 use std::f64::consts::TAU;
 
-pub use coverage::Coverage;
-
-use super::{Mount, VirtualView, virtual_view::ViewDirection};
+use super::{Lens, Mount, Pixel, VirtualView, virtual_view::ViewDirection};
 
 /// The reading of the paper's field of view (Seidel et al., section III; their formula for the
 /// field of view contradicts its own symbols, so three readings exist).
@@ -148,6 +144,45 @@ impl ViewPlan {
             .iter()
             .map(|direction| VirtualView::new(direction, mount, width, height))
             .collect()
+    }
+}
+
+/// Sample points along each side of the frame.
+const SAMPLES: u32 = 160;
+
+/// The share of a lens image that some views see, by area of the frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Coverage {
+    /// Share of the lens image that lies in at least one view, 0 to 1.
+    pub seen_share: f64,
+    /// In how many views a place of the lens image lies on average.
+    pub mean_views: f64,
+}
+
+impl Coverage {
+    /// Measures `views` on a frame of `width` × `height` pixels, at points of a regular grid.
+    pub fn new(lens: &Lens, views: &[VirtualView], width: u32, height: u32) -> Self {
+        let position = |index: u32, side: u32| {
+            (f64::from(index) + 0.5) / f64::from(SAMPLES) * f64::from(side) - 0.5
+        };
+        let (mut inside, mut seen, mut sightings) = (0_u32, 0_u32, 0_u32);
+        for row in 0..SAMPLES {
+            for column in 0..SAMPLES {
+                let pixel = Pixel::new(position(column, width), position(row, height));
+                let Some(ray) = lens.unproject(&pixel) else {
+                    continue;
+                };
+                let holding: u32 = views.iter().map(|view| u32::from(view.holds(&ray))).sum();
+                inside += 1;
+                seen += u32::from(holding > 0);
+                sightings += holding;
+            }
+        }
+        let of_inside = |count: u32| f64::from(count) / f64::from(inside.max(1));
+        Self {
+            seen_share: of_inside(seen),
+            mean_views: of_inside(sightings),
+        }
     }
 }
 

@@ -3,6 +3,7 @@
 use nalgebra::Rotation3;
 
 use crate::geometry::Ray;
+use crate::saturating::to_usize;
 
 /// Largest angle of the table of angles, radians.
 const MAX_THETA: f64 = 2.2;
@@ -174,12 +175,7 @@ impl Angles {
     /// The angle at a radius in focal lengths: linear between the entries, then one step of Newton.
     pub(super) fn theta(&self, radius: f64) -> f64 {
         let at = radius * self.entries_per_focal;
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "not negative"
-        )]
-        let entry = (at as usize).min(self.thetas.len() - 2);
+        let entry = to_usize(at).min(self.thetas.len() - 2);
         let share = (at - entry as f64).min(1.0);
         let theta = self.thetas[entry] + share * (self.thetas[entry + 1] - self.thetas[entry]);
         let (value, slope) = curve(self.shape, theta);

@@ -5,6 +5,7 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use crate::geometry::Ray;
+use crate::saturating::to_usize;
 
 /// Largest tilt of a vertical, degrees.
 const MAX_TILT: f64 = 36.0;
@@ -80,19 +81,9 @@ impl Triples {
 fn nearest(starts: &[usize], ray: &Ray) -> usize {
     let ray = if ray.z < 0.0 { -ray } else { *ray };
     let tilt = ray.x.hypot(ray.y).atan2(ray.z).to_degrees();
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "0 to 30"
-    )]
-    let ring = ((tilt / STEP).round() as usize).min(RINGS);
+    let ring = to_usize((tilt / STEP).round()).min(RINGS);
     let count = starts[ring + 1] - starts[ring];
     let turn = (ray.y.atan2(ray.x) / TAU).rem_euclid(1.0);
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a small index"
-    )]
-    let index = (turn * count as f64).round() as usize % count;
+    let index = to_usize((turn * count as f64).round()) % count;
     starts[ring] + index
 }

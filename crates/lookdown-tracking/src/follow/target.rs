@@ -3,11 +3,7 @@
 use lookdown_lens::geometry::OrientedBox;
 use nalgebra::Vector2;
 
-use super::{
-    boxes::{hull, iou, widened},
-    found_person::FoundPerson,
-    score::{from_logit, logit},
-};
+use super::boxes::{hull, iou, widened};
 
 /// The margin around a person's box that belongs to the person, as a share of its larger side. It
 /// holds shadows and the next step.
@@ -198,4 +194,30 @@ pub(super) fn targets_of<P: FoundPerson>(
 
 fn center([x_min, y_min, x_max, y_max]: &[f64; 4]) -> Vector2<f64> {
     Vector2::new(f64::midpoint(*x_min, *x_max), f64::midpoint(*y_min, *y_max))
+}
+
+/// A person that was found in a frame.
+pub trait FoundPerson: Clone {
+    /// The box `[x_min, y_min, x_max, y_max]`, corner-origin frame pixels.
+    fn bounds(&self) -> [f64; 4];
+    /// The oriented box in the frame.
+    fn oriented_box(&self) -> OrientedBox;
+    /// The score, a probability.
+    fn score(&self) -> f64;
+    /// Returns the person with another score.
+    fn with_score(self, score: f64) -> Self;
+}
+
+/// Least distance of a probability from 0 and from 1, for a finite logit.
+const LEAST: f64 = 1e-6;
+
+/// Returns the logit of a probability.
+pub fn logit(score: f64) -> f64 {
+    let score = score.clamp(LEAST, 1.0 - LEAST);
+    (score / (1.0 - score)).ln()
+}
+
+/// Returns the probability of a logit.
+pub fn from_logit(logit: f64) -> f64 {
+    1.0 / (1.0 + (-logit).exp())
 }

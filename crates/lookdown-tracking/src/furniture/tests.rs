@@ -38,7 +38,7 @@ fn report(tracker: &mut Tracker, seconds: std::ops::Range<u64>, of: impl Fn(u64)
 
 fn states(tracker: &Tracker) -> Vec<ThingState> {
     let furniture = tracker.furniture(0).unwrap();
-    furniture.things().map(Thing::state).collect()
+    furniture.things().map(|thing| thing.state).collect()
 }
 
 fn persons(tracker: &Tracker) -> usize {
@@ -177,7 +177,7 @@ fn things_of_a_camera_are_bounded() {
         furniture.update(&[], 0.1);
     }
     assert_eq!(furniture.things().count(), MAX_THINGS);
-    assert_eq!(furniture.things().next().map(Thing::id), Some(137));
+    assert_eq!(furniture.things().next().map(|thing| thing.id), Some(137));
 }
 
 #[test]

@@ -105,7 +105,7 @@ fn a_resumed_counter_completes_a_pending_crossing() {
         let at_s = f64::from(frame) / 10.0;
         tracker.update(0, at_s, &[person(at_s - 3.0, 1.0)]).unwrap();
         sum += counter.update(tracker.tracks()).len();
-        let text = serde_json::to_string(counter.state()).unwrap();
+        let text = serde_json::to_string(&counter.state).unwrap();
         let state = serde_json::from_str(&text).unwrap();
         counter = LineCounter::resumed(vec![long()], state).unwrap();
     }
@@ -122,7 +122,7 @@ fn the_state_of_ended_tracks_is_dropped() {
         tracker.update(0, f64::from(frame) / 5.0, persons).unwrap();
         counter.update(tracker.tracks());
     }
-    assert!(counter.state().tracks.is_empty());
+    assert!(counter.state.tracks.is_empty());
 }
 
 #[test]

@@ -79,7 +79,7 @@ fn a_track_that_ends_inside_leaves() {
     };
     assert_eq!(events, [entered, left]);
     assert_eq!(counter.occupancy(), [0]);
-    assert!(counter.state().tracks.is_empty());
+    assert!(counter.state.tracks.is_empty());
 }
 
 #[test]
@@ -92,7 +92,7 @@ fn a_resumed_counter_keeps_its_visits() {
             .update(0, f64::from(frame) / 5.0, &[person(1.0, 1.0)])
             .unwrap();
         events += counter.update(tracker.tracks()).len();
-        let text = serde_json::to_string(counter.state()).unwrap();
+        let text = serde_json::to_string(&counter.state).unwrap();
         let state = serde_json::from_str(&text).unwrap();
         counter = ZoneCounter::resumed(vec![zone()], DEFAULT_HOLD_S, state).unwrap();
     }

@@ -24,7 +24,7 @@ pub(in crate::api) async fn server(State(state): State<ApiState>) -> Json<Server
         name: NAME.to_owned(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
         extensions: EXTENSIONS.map(ToOwned::to_owned).into(),
-        follow: state.options.detect_defaults.follow(),
+        follow: state.options.settings.detect.follow(),
     })
 }
 

@@ -2,21 +2,29 @@
 
 use std::time::Instant;
 
-use axum::http::HeaderValue;
+use axum::{
+    http::{HeaderName, HeaderValue, header::CONTENT_TYPE},
+    response::{AppendHeaders, IntoResponse, Response},
+};
 use bytes::Bytes;
 use jiff::Timestamp;
 use lookdown_common::report::ReportPerson;
 use lookdown_detect::{
-    open_inference::{Datatype, metadata::ModelMetadata},
+    open_inference::{
+        Datatype, HEAD_LENGTH, TensorValues,
+        bounded_json::Entries,
+        message::{InferResponse, Message, OutputParameters, OutputTensor},
+        metadata::ModelMetadata,
+        parameters::Parameter,
+    },
+    parameters::{DetectParameters, JsonType, ParameterError},
     pipeline::DetectJob,
 };
 
 use super::{
-    answer::{InferAnswer, Output, OutputValues},
-    infer_parameters::as_texts,
     own_metadata::{FRAME_MODEL, FRAME_MODEL_VERSION, NAME, tensor},
     request::InferRequest,
-    tensor::misfit,
+    tensor::{Wanted, misfit},
 };
 use crate::api::{
     ApiState,
@@ -88,11 +96,8 @@ pub(super) async fn infer(
     let mut headers = Vec::new();
     for (index, frame) in frames.into_iter().enumerate() {
         let ticket = context.caller.ticket_at(parameters.priority)?;
-        let ArrivalTimes {
-            received_at,
-            arrived,
-        } = times;
-        let job = DetectJob::sent(frame, parameters.clone(), ticket, received_at, arrived);
+        let parameters = parameters.clone();
+        let job = DetectJob::sent(frame, parameters, ticket, times.received_at, times.arrived);
         let tokens = tokens.as_ref().filter(|_| index > 0);
         let done = detect(state, context, job, tokens).await;
         let answered = done.map_err(|problem| {
@@ -202,5 +207,182 @@ impl FrameOutputs {
             values,
         };
         named.map(output).collect()
+    }
+}
+
+/// The name of [`TIMEOUT_MILLIS`] in the protocol; its unit is microseconds.
+const TIMEOUT: &str = "timeout";
+const TIMEOUT_MILLIS: &str = "timeout_millis";
+const MICROS_PER_MILLI: u64 = 1000;
+
+/// Returns the parameters of a request as names and values of `/detect`.
+fn as_texts(given: &[(String, Parameter)]) -> Result<Vec<(String, String)>, ParameterError> {
+    let texts = given.iter().map(|(name, value)| match name.as_str() {
+        TIMEOUT => timeout(value),
+        _ => as_text(name, value),
+    });
+    texts.collect()
+}
+
+/// Returns a parameter as text, as in a query. The value of an unknown one is omitted: its name is
+/// refused.
+fn as_text(name: &str, value: &Parameter) -> Result<(String, String), ParameterError> {
+    let spec = DetectParameters::TABLE
+        .iter()
+        .find(|spec| spec.name == name);
+    let text = match spec {
+        Some(spec) => text_of(name, value, spec.kind.json_type())?,
+        None => "",
+    };
+    Ok((name.to_owned(), text.to_owned()))
+}
+
+/// Converts the protocol's `timeout` to `timeout_millis`.
+fn timeout(value: &Parameter) -> Result<(String, String), ParameterError> {
+    let text = text_of(TIMEOUT, value, JsonType::Number)?;
+    let micros: u64 = text
+        .parse()
+        .map_err(|_| ParameterError::is_not(TIMEOUT, text, "a whole number of microseconds"))?;
+    let millis = micros.div_ceil(MICROS_PER_MILLI);
+    Ok((TIMEOUT_MILLIS.to_owned(), millis.to_string()))
+}
+
+/// Returns the text of a value of a JSON type.
+fn text_of<'a>(
+    name: &str,
+    value: &'a Parameter,
+    wanted: JsonType,
+) -> Result<&'a str, ParameterError> {
+    match (value, wanted) {
+        (Parameter::Text(text), JsonType::Text) | (Parameter::Number(text), JsonType::Number) => {
+            Ok(text)
+        }
+        (Parameter::Flag(true), JsonType::Switch) => Ok("true"),
+        (Parameter::Flag(false), JsonType::Switch) => Ok("false"),
+        _ => {
+            let problem = format!("{} is needed", wanted.described());
+            Err(ParameterError::bad_value(name, problem))
+        }
+    }
+}
+
+/// An inference response.
+pub(super) struct InferAnswer {
+    message: Message,
+    /// The headers about a report.
+    report_headers: Vec<(HeaderName, HeaderValue)>,
+}
+
+/// An output tensor.
+struct Output {
+    name: &'static str,
+    shape: Vec<usize>,
+    values: OutputValues,
+}
+
+/// The values of an output, row-major.
+enum OutputValues {
+    Floats(Vec<f32>),
+    Integers(Vec<i32>),
+    /// The elements of a `BYTES` tensor.
+    Texts(Vec<Bytes>),
+}
+
+impl OutputValues {
+    fn as_tensor(&self) -> Result<TensorValues<'_>, Problem> {
+        Ok(match self {
+            Self::Floats(values) => TensorValues::Floats(values),
+            Self::Integers(values) => TensorValues::Integers(values),
+            Self::Texts(texts) => {
+                let texts = texts.iter().map(|text| str::from_utf8(text));
+                let texts = texts.collect::<Result<_, _>>();
+                TensorValues::Texts(texts.map_err(Problem::internal)?)
+            }
+        })
+    }
+}
+
+impl InferAnswer {
+    /// Writes the requested outputs; `id` is that of the request.
+    fn write(id: Option<String>, outputs: &[Output], wanted: &Wanted) -> Result<Self, Problem> {
+        let mut behind = Vec::new();
+        let mut written = Vec::with_capacity(outputs.len());
+        for output in outputs {
+            let Some(binary) = wanted.how(output.name) else {
+                continue;
+            };
+            let values = output.values.as_tensor()?;
+            if binary {
+                behind.push(values.clone());
+            }
+            written.push(OutputTensor {
+                name: output.name.to_owned(),
+                datatype: values.datatype().to_string(),
+                shape: Entries(output.shape.clone()),
+                parameters: binary.then(|| OutputParameters {
+                    binary_data_size: Some(values.byte_count()),
+                }),
+                data: (!binary).then_some(values),
+            });
+        }
+        let response = InferResponse {
+            model_name: FRAME_MODEL.to_owned(),
+            model_version: Some(FRAME_MODEL_VERSION.to_owned()),
+            id,
+            outputs: Entries(written),
+        };
+        let message = Message::write(&response, &behind).map_err(Problem::internal)?;
+        Ok(Self {
+            message,
+            report_headers: Vec::new(),
+        })
+    }
+}
+
+impl IntoResponse for InferAnswer {
+    fn into_response(self) -> Response {
+        let Message { body, head_length } = self.message;
+        let media_type = match head_length {
+            Some(_) => "application/octet-stream",
+            None => "application/json",
+        };
+        let mut response = (AppendHeaders(self.report_headers), body).into_response();
+        let headers = response.headers_mut();
+        headers.insert(CONTENT_TYPE, HeaderValue::from_static(media_type));
+        if let Some(length) = head_length {
+            headers.insert(
+                HeaderName::from_static(HEAD_LENGTH),
+                HeaderValue::from(length),
+            );
+        }
+        response
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_parameter_is_read_as_its_json_type() {
+        for spec in DetectParameters::TABLE {
+            let values = [
+                (JsonType::Text, Parameter::Text("1".to_owned())),
+                (JsonType::Number, Parameter::Number("1".to_owned())),
+                (JsonType::Switch, Parameter::Flag(true)),
+            ];
+            for (json_type, value) in values {
+                let read = as_text(spec.name, &value);
+                let is_right = json_type == spec.kind.json_type();
+                assert_eq!(read.is_ok(), is_right, "{}: {value:?}", spec.name);
+            }
+        }
+    }
+
+    #[test]
+    fn timeout_in_microseconds_is_rounded_up() {
+        let given = [("timeout".to_owned(), Parameter::Number("1500".to_owned()))];
+        let texts = as_texts(&given).unwrap();
+        assert_eq!(texts, [(TIMEOUT_MILLIS.to_owned(), "2".to_owned())]);
     }
 }

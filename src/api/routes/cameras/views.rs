@@ -135,7 +135,7 @@ pub(in crate::api) async fn get(
         }
     };
     Ok(answered.unwrap_or_else(|problem| {
-        let is_without_key = problem.kind() == ProblemKind::KeyRequired;
+        let is_without_key = problem.kind == ProblemKind::KeyRequired;
         let mut response = problem.into_response();
         if is_without_key {
             // Players of streams send the password of their URL after this challenge only.
@@ -496,7 +496,8 @@ async fn newest(
     let wait = deadline.within(Some(FIRST_FRAME), "");
     let frame = timeout_at(wait.at(), frames.wait_for(Option::is_some)).await;
     let frame = frame.ok().and_then(|frame| frame.ok()?.clone());
-    let is_kept = |frame: &Arc<LiveFrame>| frame.age() < state.options.image_age;
+    let is_kept =
+        |frame: &Arc<LiveFrame>| frame.age() < state.options.settings.results.limits.max_age;
     frame.filter(is_kept).ok_or_else(|| {
         let camera = Quoted(camera);
         let detail = format!(

@@ -21,7 +21,7 @@ use lookdown_lens::geometry::{OrientedBox, Pixel};
 use serde_json::{Value, json};
 use tokio::time::sleep;
 
-use super::address::CameraAddress;
+use super::CameraAddress;
 use crate::{
     api::{
         ApiState,

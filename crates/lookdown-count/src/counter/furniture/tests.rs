@@ -4,7 +4,7 @@ use std::{
 };
 
 use lookdown_calibration::CalibrationFile;
-use lookdown_tracking::furniture::{Furniture, Thing, ThingState};
+use lookdown_tracking::furniture::{Furniture, ThingState};
 
 use crate::{
     counter::{Counter, CountingOptions},
@@ -100,7 +100,7 @@ impl Hall {
     fn states(&self) -> Vec<ThingState> {
         let furniture = self.counter.furniture("hall");
         let things = furniture.into_iter().flat_map(Furniture::things);
-        things.map(Thing::state).collect()
+        things.map(|thing| thing.state).collect()
     }
 
     /// A hall with a mannequin that is furniture.
@@ -140,7 +140,7 @@ fn furniture_and_decisions_survive_a_restart() {
         hall.counter.change_furniture("hall", |all| all.confirm(1)),
         Some(true)
     );
-    assert!(hall.counter.is_urgent());
+    assert!(hall.counter.is_urgent);
     let batch = hall.counter.take_batch().unwrap();
     Store::open(&path)
         .unwrap()

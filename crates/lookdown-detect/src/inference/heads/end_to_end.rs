@@ -1,10 +1,8 @@
 //! Graphs that include suppression.
 
-mod columns;
-
+use lookdown_lens::saturating::to_usize;
 use serde::Deserialize;
 
-use self::columns::Indices;
 use super::{
     candidate_collector::CandidateCollector,
     decoder::{Decoder, Selected},
@@ -13,8 +11,6 @@ use super::{
     shape::{Axis, Batch},
     tensor::{Output, TensorView},
 };
-
-pub use columns::Column;
 
 /// Graphs that suppress overlaps: rows of final detections in `[views, rows, columns]`. If a column
 /// holds the view of a row, the shape is `[…, rows, columns]` with any leading axes. Rows of
@@ -64,7 +60,7 @@ impl EndToEndHead {
     fn columns(&self, length: Option<usize>) -> Option<&[Column]> {
         match (&self.columns, length) {
             (Some(columns), _) => Some(columns),
-            (None, None | Some(6)) => Some(&columns::SIX),
+            (None, None | Some(6)) => Some(&SIX_COLUMNS),
             (None, Some(_)) => None,
         }
     }
@@ -98,13 +94,8 @@ impl EndToEndHead {
 
 /// The view with the number `raw`, if it is less than `views`.
 fn view_number(raw: f32, views: usize) -> Option<usize> {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "the cast saturates and negative numbers are excluded"
-    )]
     (raw > -0.5)
-        .then_some(raw.round() as usize)
+        .then_some(to_usize(raw.round().into()))
         .filter(|&view| view < views)
 }
 
@@ -158,5 +149,76 @@ impl Decoder for EndToEndHead {
                 self.offer(row, &indices, view, batch, collector);
             }
         }
+    }
+}
+
+/// Content of a column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Column {
+    /// Index of the view in the batch.
+    View,
+    /// The box's left side.
+    XMin,
+    /// The box's top side.
+    YMin,
+    /// The box's right side.
+    XMax,
+    /// The box's bottom side.
+    YMax,
+    /// The score, 0 to 1.
+    Score,
+    /// Number of the class.
+    Class,
+}
+
+/// The default order of six columns.
+const SIX_COLUMNS: [Column; 6] = [
+    Column::XMin,
+    Column::YMin,
+    Column::XMax,
+    Column::YMax,
+    Column::Score,
+    Column::Class,
+];
+
+/// Indices of the columns in a row.
+#[derive(Debug, Clone, Copy)]
+struct Indices {
+    pub(super) view: Option<usize>,
+    pub(super) sides: [usize; 4],
+    pub(super) score: usize,
+    pub(super) class: usize,
+}
+
+impl Indices {
+    pub(super) fn new(columns: &[Column]) -> Result<Self, String> {
+        Ok(Self {
+            view: find(columns, Column::View, "view")?,
+            sides: [
+                need(columns, Column::XMin, "x_min")?,
+                need(columns, Column::YMin, "y_min")?,
+                need(columns, Column::XMax, "x_max")?,
+                need(columns, Column::YMax, "y_max")?,
+            ],
+            score: need(columns, Column::Score, "score")?,
+            class: need(columns, Column::Class, "class")?,
+        })
+    }
+}
+
+fn need(columns: &[Column], wanted: Column, name: &str) -> Result<usize, String> {
+    find(columns, wanted, name)?
+        .ok_or_else(|| format!("`columns` in the manifest's [output] lacks {name:?}"))
+}
+
+fn find(columns: &[Column], wanted: Column, name: &str) -> Result<Option<usize>, String> {
+    let mut indices = (0..columns.len()).filter(|&index| columns[index] == wanted);
+    let first = indices.next();
+    match indices.next() {
+        None => Ok(first),
+        Some(_) => Err(format!(
+            "`columns` in the manifest's [output] has {name:?} twice"
+        )),
     }
 }

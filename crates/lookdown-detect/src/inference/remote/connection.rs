@@ -29,7 +29,7 @@ const MAX_RETRY_AFTER: Duration = Duration::from_mins(1);
 /// Connections to a server.
 pub(super) struct Connection {
     client: Client,
-    address: Url,
+    pub(super) address: Url,
     timeout: Duration,
 }
 
@@ -76,10 +76,6 @@ impl Connection {
             address: options.url.clone(),
             timeout: options.timeout,
         })
-    }
-
-    pub(super) fn address(&self) -> &Url {
-        &self.address
     }
 
     /// Sends a GET request to the path with the given segments.

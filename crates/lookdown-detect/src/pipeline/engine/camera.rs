@@ -97,7 +97,7 @@ impl Engine {
             id: used.id.clone(),
             revision: used.revision.clone(),
         };
-        let rig = self.rig(camera, geometry, frame, profile, model.input());
+        let rig = self.rig(camera, geometry, frame, profile, &model.input);
         Ok(FrameCamera { used, rig })
     }
 
@@ -160,7 +160,7 @@ impl Engine {
             revision: format!("{:.0}-{:.0}-{:.0}", circle.cx, circle.cy, circle.radius),
             assumed_circle: Some(circle),
         };
-        let rig = self.rig(camera, geometry, frame, profile, model.input());
+        let rig = self.rig(camera, geometry, frame, profile, &model.input);
         Ok(FrameCamera { used, rig })
     }
 

@@ -79,7 +79,7 @@ fn the_whole_frame_is_searched_every_second() {
         (searches[5], searches[6]),
         (Search::Full, Search::Unchanged)
     );
-    let metric = &camera.0.metrics().frame_searches;
+    let metric = &camera.0.metrics.frame_searches;
     assert_eq!(metric.with_label_values(&["full"]).get(), 2);
     assert_eq!(metric.with_label_values(&["unchanged"]).get(), 5);
 }

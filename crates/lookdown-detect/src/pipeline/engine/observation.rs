@@ -23,7 +23,8 @@ pub struct Observation {
     /// The frame that views and crops show: in even light if it has no color, else the same.
     pub(super) network_frame: Arc<Frame>,
     pub(super) camera: FrameCamera,
-    pub(super) model: Arc<Model>,
+    /// The model of the first pass.
+    pub model: Arc<Model>,
     pub(super) profile: Profile,
     pub(super) tuning: Tuning,
     pub(super) passes: Vec<Pass>,
@@ -49,7 +50,7 @@ impl Observation {
 
     /// Returns the counts of views by outcome.
     pub(super) fn view_counts(&self) -> ViewCounts {
-        let left_out = self.camera.rig.left_out();
+        let left_out = self.camera.rig.left_out;
         ViewCounts {
             inferred: self.view_count() - self.unchanged_views,
             unchanged: self.unchanged_views,
@@ -86,16 +87,11 @@ impl Observation {
         self.timeline.timings()
     }
 
-    /// Returns the model of the first pass.
-    pub fn model(&self) -> &Model {
-        &self.model
-    }
-
     /// Returns the model of the upright crops, if it is another one than that of the first pass.
     pub(super) fn crop_model(&self) -> Option<&Model> {
         let crops = self.passes.iter().filter(|pass| pass.is_of_crops());
         let mut models = crops.map(|pass| &*pass.model);
-        models.find(|model| model.name() != self.model.name())
+        models.find(|model| model.name != self.model.name)
     }
 
     /// Waits for a queued pass, and adds its detections. Rendering and inference overlap, so the

@@ -75,7 +75,7 @@ pub(super) fn execute(
 ) -> Result<Run, InferenceError> {
     let began = Instant::now();
     let model = &claims[0].task.model;
-    let input = model.input();
+    let input = &model.input;
     let mut slots: Vec<_> = claims.iter().flat_map(Claim::slots).collect();
     let planes = batch.prepare(slots.len(), input);
     let mut pairs: Vec<_> = slots.iter_mut().zip(planes).collect();

@@ -15,6 +15,7 @@ use crate::geometry::{
     pixels::{PixelConvention, cross_half_pixel},
     zone::ZoneArea,
 };
+use crate::saturating::to_u32;
 
 /// Tallest person, meters.
 const TALLEST_M: f64 = 2.1;
@@ -120,13 +121,8 @@ fn cell_side(side: u32) -> f64 {
     f64::from(side.max(1)) / f64::from(CELLS)
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "`as` saturates, which clips to the frame"
-)]
 fn cell(position: f64, side: f64) -> u32 {
-    ((position / side) as u32).min(CELLS - 1)
+    to_u32(position / side).min(CELLS - 1)
 }
 
 /// Returns true if a position of the frame can show a person who stands near an area.

@@ -4,6 +4,7 @@
 //! brackets the root first, and Newton steps that leave the bracket become bisections.
 
 use super::polynomial::Rising;
+use crate::saturating::to_usize;
 
 /// Steps of the bracketing table: one Newton step from a bracket this narrow is nearly exact.
 const TABLE_STEPS: usize = 1024;
@@ -66,12 +67,7 @@ impl<F: Rising> Tabulated<F> {
     pub(super) fn invert(&self, value: f64) -> f64 {
         let step = value * self.steps_per_value;
         // `as` cuts off the fraction and saturates.
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "an index into the table"
-        )]
-        let index = (step as usize).min(TABLE_STEPS - 1);
+        let index = to_usize(step).min(TABLE_STEPS - 1);
         let (low, high) = (self.places[index], self.places[index + 1]);
         let start = low + (step - fraction(index)) * (high - low);
         let curve = |x| self.function.value_and_slope(x);

@@ -1,7 +1,7 @@
 use nalgebra::{Rotation3, Vector3};
 
 use super::*;
-use crate::geometry::Pixel;
+use crate::geometry::{Mount, Pixel, ViewPlan};
 
 #[test]
 fn the_paper_plan_has_four_rings_of_thirty_two_views() {
@@ -52,4 +52,24 @@ fn a_turned_plan_looks_where_a_turned_camera_would() {
         let expected = spin * view.ray_in_camera(&pixel);
         assert!((turned.ray_in_camera(&pixel) - expected).norm() < 1e-12);
     }
+}
+
+#[test]
+fn wider_lenses_leave_more_beyond_the_plan() {
+    let views = ViewPlan::balanced().views(&Mount::default(), 416, 416);
+    let coverage = |max_theta: f64| {
+        let lens = Lens::equidistant_circle(499.5, 499.5, 500.0, max_theta);
+        Coverage::new(&lens.expect("a plausible lens"), &views, 1000, 1000)
+    };
+    let (narrow, wide) = (coverage(1.2), coverage(3.0));
+    assert!(narrow.seen_share > 0.999, "{narrow:?}");
+    assert!(wide.seen_share < 0.6, "{wide:?}");
+    assert!(narrow.mean_views > wide.mean_views);
+    let none = Coverage::new(
+        &Lens::equidistant_circle(499.5, 499.5, 500.0, 1.2).expect("a plausible lens"),
+        &[],
+        1000,
+        1000,
+    );
+    assert_eq!((none.seen_share, none.mean_views), (0.0, 0.0));
 }
