@@ -254,7 +254,7 @@ fn a_camera_is_not_read_in_the_middle_of_a_change() {
         .unwrap();
     let changing = hold(&cameras);
     std::thread::scope(|scope| {
-        let (sender, answers) = std::sync::mpsc::channel();
+        let (sender, answers) = std::sync::mpsc::sync_channel(1);
         let reader = &cameras;
         scope.spawn(move || sender.send(reader.get("hall").is_ok()));
         let early = answers.recv_timeout(Duration::from_millis(300));
