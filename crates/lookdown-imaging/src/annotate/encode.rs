@@ -75,8 +75,8 @@ impl ImageBuffer for Rows<'_> {
 /// Side of the blocks of pixels that JPEG keeps together with colors at half resolution.
 const BLOCK: usize = 16;
 
-// ITU-T T.871, section 7, with weights in 256ths: vectors hold twice as many 16-bit numbers, and
-// the error is less than half a level.
+// ITU-T T.871, section 7, with weights divided by 256: vectors hold twice as many 16-bit numbers,
+// and the error is less than half a level.
 
 #[multiversion(targets("x86_64+avx2"))]
 fn fill_luma(pixels: &[[u8; 3]], luma: &mut [u8]) {
