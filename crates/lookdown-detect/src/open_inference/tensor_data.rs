@@ -104,7 +104,8 @@ fn bytes_at_most(json: &str) -> usize {
     json.len() / 4 * 3
 }
 
-/// Most numbers that [`floats`] returns for data of this length: each has a digit and a separator.
+/// Most numbers that [`TensorData::floats`] returns for data of this length: each has a digit and a
+/// separator.
 fn numbers_at_most(json: &str, count: usize) -> usize {
     count.min(json.len() / 2)
 }
