@@ -88,7 +88,7 @@ fn fill_luma(pixels: &[[u8; 3]], luma: &mut [u8]) {
 
 #[multiversion(targets("x86_64+avx2"))]
 fn fill_colors(pixels: &[[u8; 3]], blue: &mut [u8], red: &mut [u8]) {
-    // Half a level more, but pure blue and red stay within a byte.
+    // 128 levels and nearly a half to round by: with a whole half, pure blue would exceed a byte.
     const MIDDLE: u16 = 128 * 256 + 127;
     for ((pixel, blue), red) in pixels.iter().zip(blue).zip(red) {
         let [r, g, b] = pixel.map(u16::from);
