@@ -129,3 +129,28 @@ pub fn encode_png(frame: &Frame) -> Result<Vec<u8>, EncodeError> {
         .map_err(|error| EncodeError::new(frame, "PNG", error))?;
     Ok(bytes)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::decode::{DecodeLimits, decode};
+
+    #[test]
+    fn colors_of_images_of_any_size_are_kept() {
+        for (width, height) in [(1, 1), (16, 17), (37, 21), (40, 32)] {
+            for color in [[200, 40, 90], [0, 0, 255], [255, 0, 0], [255, 255, 255]] {
+                let pixels = color.repeat((width * height) as usize);
+                let frame = Frame::new(width, height, pixels).unwrap();
+                let jpeg = encode_jpeg(&frame, 95).unwrap();
+                let decoded = decode(&jpeg, &DecodeLimits::default()).unwrap().frame;
+                for pixel in decoded.pixels().as_chunks::<3>().0 {
+                    let differences = [0, 1, 2].map(|at: usize| pixel[at].abs_diff(color[at]));
+                    assert!(
+                        differences.iter().all(|one| *one < 8),
+                        "{color:?}: {pixel:?}"
+                    );
+                }
+            }
+        }
+    }
+}
