@@ -10,6 +10,7 @@ import { sketch } from "./marks.js";
 import { stepPlot } from "./plot.js";
 import { shown, withProgress } from "./progress.js";
 import { teaching } from "./reference_counts.js";
+import { crossingTeaching } from "./reference_crossings.js";
 import { ask } from "./server.js";
 import { showSuggestion } from "./suggestion.js";
 import { useFrame } from "./use_frame.js";
@@ -32,11 +33,12 @@ export function addCard(camera, { onchange, reread }) {
   const card = { camera, node, now, age, state, suggestion, day, strip, manage, onchange, reread, info: null, isSingle: false };
   Object.assign(card, { id: "0", history: [], reportedAt: 0, report: null, drawn: 0, image: null, bar: null, suggestedAt: 0, suggested: "", hasImage: true, isAsking: false, isTooLow: false, message: null });
   card.teaching = teaching(card);
+  card.crossings = crossingTeaching(card);
   const use = (section) => shown(() => withProgress(strip, "Reading the frame", () => useFrame(card, section)));
   const tools = TOOLS.map((name) => element("button", { type: "button", onclick: use(name.toLowerCase()) }, name));
   const group = element("div", { class: "use-frame", role: "group", "aria-label": `Use this frame of ${camera}` }, element("span", { class: "muted", "aria-hidden": "true" }, "Use this frame:"), ...tools);
   card.remedy = element("button", { type: "button", class: "quiet", hidden: true, onclick: chooseAutomatically(card) }, "Set Rate and Profile to automatic");
-  node.append(element("header", {}, element("h2", {}, link), age), now, addViews(card), state, card.remedy, suggestion, card.teaching.node, day, element("footer", {}, group, manage, strip));
+  node.append(element("header", {}, element("h2", {}, link), age), now, addViews(card), state, card.remedy, suggestion, card.teaching.node, day, card.crossings.node, element("footer", {}, group, manage, strip));
   return card;
 }
 

@@ -16,10 +16,11 @@ export async function showDay(card) {
   card.dayAt = Date.now();
   const { has_counts: hasCounts } = await options();
   if (!hasCounts) return;
-  const query = new URLSearchParams({ from: "today", step: "1h" });
-  card.dayCounts = await askJson(`counts/${encodeURIComponent(card.camera)}?${query}`).catch(() => null);
-  card.today = card.dayCounts ? crossingsOf(card.dayCounts.steps) : null;
+  const today = (step) => askJson(`counts/${encodeURIComponent(card.camera)}?${new URLSearchParams({ from: "today", step })}`).catch(() => null);
+  card.dayCounts = await today("1h");
+  card.today = (await today("168h"))?.steps[0];
   drawDay(card);
+  await card.crossings.refresh();
 }
 
 /** Draws the day. Its most persons are those of the plot as well, which has newer numbers. */
@@ -35,21 +36,8 @@ function drawn({ from, steps }, history) {
   return [element("h2", {}, text), bars(Date.parse(from), steps, most)];
 }
 
-/** The crossings of the day by line and direction. */
-export function crossingsOf(steps) {
-  const lines = new Map();
-  for (const { lines: counted = {} } of steps) {
-    for (const [line, directions] of Object.entries(counted)) {
-      const sums = lines.get(line) ?? new Map();
-      for (const [direction, count] of Object.entries(directions)) sums.set(direction, (sums.get(direction) ?? 0) + (count ?? 0));
-      lines.set(line, sums);
-    }
-  }
-  return lines;
-}
-
 /** The hour of a time by the clock. A day on which the clock changes has 23 or 25 hours, two of them with one number. */
-function hourOf(time, midnight) {
+export function hourOf(time, midnight) {
   const isOwnZone = new Date(midnight).getHours() === 0;
   return isOwnZone ? new Date(time).getHours() : Math.min(23, (time - midnight) / HOUR);
 }

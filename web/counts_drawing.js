@@ -55,11 +55,14 @@ function drawnTrack({ id, frame_px: [x, y], tail_px: tail }, unit) {
   );
 }
 
-/** The rows of lines with their crossings, also those of `today` by line and direction, and of zones with their persons. */
+/** The rows of lines with their crossings, also those of `today`, with their error bars, and of zones with their persons. */
 export function countRows({ lines = [], zones = [] }, today = null) {
   const ofLine = ({ line, directions, crossings, outline_px: outline }, index) => {
     const arrows = arrowsOf(outline);
-    const ofToday = (direction) => (today?.has(line) ? ` (today ${today.get(line).get(direction) ?? 0})` : "");
+    const ofToday = (direction) => {
+      const [count, low, high] = ["estimated", "low", "high"].map((end) => today?.[`lines_${end}`]?.[line]?.[direction]);
+      return Number.isInteger(count) ? ` (today ${count}, in 9 of 10 cases ${low} to ${high})` : "";
+    };
     const parts = directions.map((direction, side) => [number(crossings[direction]), ` ${arrows[side]} ${direction}${ofToday(direction)}${side === 0 ? ", " : ""}`]);
     return row(`line line-${index % LINE_COLORS}`, line, ...parts.flat());
   };

@@ -8,11 +8,18 @@ import { askJson } from "./server.js";
 import { change, shared, whenChanged } from "./shared.js";
 import { pointOut } from "./marks.js";
 
+/** The interval at which the newest report of a live camera is read. */
+const MILLIS = 1000;
+
 let isVisible = false;
+/** The newest report of the camera whose frame is used. */
+let live = null;
+let isAsking = false;
 let shownReport = null;
+let calibration = { revision: null, file: null };
 
 async function show() {
-  const { report } = shared;
+  const report = live ?? shared.report;
   const standing = report?.persons.filter((person) => person.floor) ?? [];
   const isKnown = standing.length > 0;
   find("#floor-empty").hidden = isKnown;
@@ -20,14 +27,29 @@ async function show() {
   find("#floor-reason").textContent = reason(report);
   if (!isVisible || !isKnown || report === shownReport) return;
   shownReport = report;
-  const path = `calibrations/${report.calibration.id}`;
-  const file = await withProgress(find("#floor-progress"), "Reading the calibration", () => askJson(path));
-  if (report === shared.report) draw(report, file);
+  const { id, revision } = report.calibration;
+  if (calibration.revision !== revision) {
+    const file = await withProgress(find("#floor-progress"), "Reading the calibration", () => askJson(`calibrations/${id}`));
+    calibration = { revision, file };
+  }
+  if (report === shownReport) draw(report, calibration.file);
+}
+
+/** Shows the newest report of the camera whose frame is used. */
+async function follow() {
+  const camera = shared.frame?.camera;
+  if (!isVisible || !camera || isAsking) return;
+  isAsking = true;
+  const report = await askJson(`results/${encodeURIComponent(camera)}/latest`).catch(() => null);
+  isAsking = false;
+  if (camera !== shared.frame?.camera) return;
+  live = report;
+  showShown();
 }
 
 function reason(report) {
   if (!report) return "Use the frame of a camera in Cameras, or pick one in Detect: its persons are shown here from above.";
-  if (!report.persons.length) return "This frame has no persons.";
+  if (!report.persons.length) return live ? "The camera sees no persons now." : "This frame has no persons.";
   return "The height of this camera above the floor is not known. Save a calibration with the height in Calibrate, and choose it in Detect.";
 }
 
@@ -75,6 +97,10 @@ export function visible(is) {
 
 export function start() {
   whenChanged(["report"], showShown);
+  whenChanged(["frame"], () => {
+    live = null;
+  });
+  setInterval(follow, MILLIS);
   whenChanged(["person"], () => {
     for (const id of ["#map", "#places"]) pointOut(find(id));
   });

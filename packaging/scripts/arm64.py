@@ -25,8 +25,9 @@ PROGRAM = ROOT / "target" / TARGET / "release" / "lookdown"
 RUSTC = Path("/usr/bin/rustc")
 """Of the package rustc-web; rustup's compiler cannot use Debian's library."""
 PACKAGES = ("rustc-web", "gcc-aarch64-linux-gnu", "libc6-dev-arm64-cross", "libstdc++6-arm64-cross", "qemu-user-static")
-EMULATOR = ("qemu-aarch64-static", "-E", "ORT_DISABLE_TELEMETRY=1", "-L", "/usr/aarch64-linux-gnu")
-"""The program would replace itself to set the variable, which the kernel cannot do with an emulated program."""
+VARIABLES = ("ORT_DISABLE_TELEMETRY=1", "MALLOC_MMAP_THRESHOLD_=131072")
+"""Those of src/main.rs: the program would replace itself to set them, which the kernel cannot do with an emulated one."""
+EMULATOR = ("qemu-aarch64-static", "-E", ",".join(VARIABLES), "-L", "/usr/aarch64-linux-gnu")
 HIDE_CPU = ("unshare", "--mount", "sh", "-c", 'mount -t tmpfs none /sys && exec "$@"', "sh")
 """Runs a command without /sys: in the emulator, ONNX Runtime ends with a segmentation fault while it reads there
 about the caches of the x86-64 processor. Needs root."""
@@ -86,11 +87,10 @@ def cargo(command: str, *arguments: str) -> None:
 
 
 def detect_in_samples() -> None:
-    """Finds in the emulator the persons of the samples that another processor found: boxes within 2 % of their
-    diagonal, scores within .03."""
+    """Finds in the emulator the recorded persons of the samples: boxes within 2 % of their diagonal, scores within .03."""
     environment = os.environ | {"LOOKDOWN__INFERENCE__LIBRARY_PATH": str(OWN / "runtime" / LIBRARY)}
     rows = json.loads(RECORD.read_text(encoding="utf-8"))
-    for row in (row for row in rows if row["processor"] == "AVX2"):
+    for row in (row for row in rows if row["processor"] == "arm64"):
         command = [*HIDE_CPU, *EMULATOR, PROGRAM, "detect", f"samples/{row['sample']}.jpg", *row["flags"]]
         report = subprocess.run(command, cwd=ROOT, env=environment, check=True, stdout=subprocess.PIPE).stdout
         found = [(list(person["box"].values()), person["score"]) for person in json.loads(report)["persons"]]

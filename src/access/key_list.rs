@@ -25,8 +25,13 @@ use parking_lot::{Mutex, RwLock};
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
 use subtle::{Choice, ConditionallySelectable, ConstantTimeEq};
+use toml::{Spanned, Value};
 
 use super::scope::{Scope, Scopes};
+
+/// The problem of a line of another form.
+const NOT_A_KEY: &str = "a key is a line of the form name = { scopes = [\"detect\"], sha256 = \
+                         \"64 hexadecimal digits\" }, as `lookdown key new` prints it";
 
 /// Most keys: every request is compared with all of them.
 const MAX_KEYS: usize = 1000;
@@ -76,7 +81,11 @@ pub struct Holder {
 
 /// Keys by their digests.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct KeyList(Vec<(KeyDigest, Holder)>);
+pub struct KeyList {
+    keys: Vec<(KeyDigest, Holder)>,
+    /// The reasons why lines of the file are not keys. The other lines are.
+    pub problems: Vec<String>,
+}
 
 /// A key in a file, stored under its name.
 #[derive(Deserialize)]
@@ -89,55 +98,58 @@ struct Row {
 
 impl KeyList {
     /// Parses the keys of a TOML file: a line `name = { scopes = ["detect"], sha256 = "…" }` for
-    /// each, with `highest_priority = 1` to 9 if that is not 5.
+    /// each, with `highest_priority = 1` to 9 if that is not 5. A line that is not a key gets a
+    /// problem.
     ///
     /// # Errors
-    /// With the line or the key that cannot be used.
+    /// If the text is not TOML, or has lines of which none is a key.
     pub fn from_toml(text: &str) -> anyhow::Result<Self> {
-        let rows: BTreeMap<String, Row> = toml::from_str(text).map_err(|error| {
-            // The message of the TOML library would quote the line.
-            let before = error.span().and_then(|span| text.get(..span.start));
-            let line = 1 + before.map_or(0, |before| before.matches('\n').count());
-            anyhow!(
-                "line {line}: a key is a line of the form name = {{ scopes = [\"detect\"], sha256 = \
-                 \"64 hexadecimal digits\" }}, as `lookdown key new` prints it"
-            )
+        let line_at = |start| 1 + text.get(..start).unwrap_or_default().matches('\n').count();
+        // The message of the TOML library would quote the line.
+        let rows: BTreeMap<String, Spanned<Value>> = toml::from_str(text).map_err(|error| {
+            let start = error.span().map_or(0, |span| span.start);
+            anyhow!("line {}: {NOT_A_KEY}", line_at(start))
         })?;
         let mut list = Self::default();
         for (name, row) in rows {
-            let scopes: Vec<_> = row.scopes.iter().map(String::as_str).collect();
-            let position = list.0.len() + 1;
-            let level = row.highest_priority.map(PriorityLevel::new);
-            let level = level.map(|level| level.with_context(|| wrong_priority(position)));
-            list.add(&name, &scopes, &row.sha256, level.transpose()?)?;
+            let line = line_at(row.span().start);
+            if let Err(problem) = list.add_row(&name, row.into_inner()) {
+                list.problems.push(format!("line {line}: {problem}"));
+            }
         }
-        Ok(list)
+        match list.problems.first() {
+            Some(problem) if list.is_empty() => Err(anyhow!("{problem}")),
+            _ => Ok(list),
+        }
     }
 
-    /// Merges two lists.
-    ///
-    /// # Errors
-    /// If they share a name, or have too many keys together.
-    pub fn with(mut self, other: &Self) -> anyhow::Result<Self> {
-        for (digest, holder) in &other.0 {
-            self.push(digest.clone(), holder.clone())?;
+    /// Adds the keys of another list. A key whose name this list has, or for which it has no room,
+    /// gets a problem.
+    #[must_use]
+    pub fn with(mut self, other: Self) -> Self {
+        self.problems.extend(other.problems);
+        for (digest, holder) in other.keys {
+            let name = holder.name.clone();
+            if let Err(problem) = self.push(digest, holder) {
+                self.problems.push(format!("{name}: {problem}"));
+            }
         }
-        Ok(self)
+        self
     }
 
     /// The number of keys.
     pub fn len(&self) -> usize {
-        self.0.len()
+        self.keys.len()
     }
 
     /// Returns true if there is no key.
     pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
+        self.keys.is_empty()
     }
 
     /// The names and scopes of all keys.
     pub fn holders(&self) -> impl Iterator<Item = &Holder> {
-        self.0.iter().map(|(_, holder)| holder)
+        self.keys.iter().map(|(_, holder)| holder)
     }
 
     /// Returns the holder of this key, or `None` if the key is unknown. The time depends only on
@@ -145,12 +157,34 @@ impl KeyList {
     pub fn holder_of(&self, key: &[u8]) -> Option<&Holder> {
         let digest = KeyDigest::new(key);
         let mut found = 0_u64;
-        for (position, (known, _)) in (1_u64..).zip(&self.0) {
+        for (position, (known, _)) in (1_u64..).zip(&self.keys) {
             let same: Choice = known.equals(&digest);
             found.conditional_assign(&position, same);
         }
         let index = usize::try_from(found.checked_sub(1)?).ok()?;
-        self.0.get(index).map(|(_, holder)| holder)
+        self.keys.get(index).map(|(_, holder)| holder)
+    }
+
+    fn add_row(&mut self, name: &str, row: Value) -> anyhow::Result<()> {
+        let row = Row::deserialize(row).map_err(|_| anyhow!(NOT_A_KEY))?;
+        let scopes: Vec<_> = row.scopes.iter().map(String::as_str).collect();
+        let level = row.highest_priority.map(PriorityLevel::new);
+        let level = level.map(|level| level.with_context(wrong_priority));
+        self.add(name, &scopes, &row.sha256, level.transpose()?)
+    }
+
+    fn add_entry(&mut self, entry: &str) -> anyhow::Result<()> {
+        let parts: Vec<_> = entry.split(':').collect();
+        let (name, scopes, sha256, level) = match parts[..] {
+            [name, scopes, sha256] => (name, scopes, sha256, None),
+            [name, scopes, sha256, level] => (name, scopes, sha256, Some(level)),
+            _ => bail!(
+                "it is not of the form name:scope+scope:sha256, as `lookdown key new` prints it"
+            ),
+        };
+        let level = level.map(str::parse::<PriorityLevel>).transpose();
+        let level = level.with_context(wrong_priority)?;
+        self.add(name, &scopes.split('+').collect::<Vec<_>>(), sha256, level)
     }
 
     fn add(
@@ -160,20 +194,15 @@ impl KeyList {
         sha256: &str,
         highest_priority: Option<PriorityLevel>,
     ) -> anyhow::Result<()> {
-        let position = self.0.len() + 1;
-        let name = name.parse::<KeyName>();
-        let name = name.map_err(|error| anyhow!("key {position}: {error}"))?;
+        let name = name.parse()?;
         let scopes: Result<Vec<Scope>, _> = scopes.iter().map(|scope| scope.parse()).collect();
         let scopes = scopes.ok().and_then(|scopes| Scopes::new(&scopes));
-        let scopes = scopes.with_context(|| {
-            format!("key {position}: give one or more of the scopes detect, read, view and admin")
-        })?;
-        let digest = KeyDigest::parse(sha256).with_context(|| {
-            format!(
-                "key {position}: sha256 must be the 64 hexadecimal digits that `lookdown key new` \
-                 prints, never the key itself"
-            )
-        })?;
+        let scopes =
+            scopes.context("give one or more of the scopes detect, read, view and admin")?;
+        let digest = KeyDigest::parse(sha256).context(
+            "sha256 must be the 64 hexadecimal digits that `lookdown key new` prints, never the key \
+             itself",
+        )?;
         let holder = Holder {
             name,
             scopes,
@@ -183,15 +212,16 @@ impl KeyList {
     }
 
     fn push(&mut self, digest: KeyDigest, holder: Holder) -> anyhow::Result<()> {
-        if self.0.iter().any(|(_, known)| known.name == holder.name) {
-            let position = self.0.len() + 1;
-            bail!("key {position}: its name is used twice: give each key its own name");
-        }
+        let is_known = self.keys.iter().any(|(_, known)| known.name == holder.name);
         ensure!(
-            self.0.len() < MAX_KEYS,
+            !is_known,
+            "its name is used twice: give each key its own name"
+        );
+        ensure!(
+            self.keys.len() < MAX_KEYS,
             "there are more than {MAX_KEYS} keys: remove unused ones"
         );
-        self.0.push((digest, holder));
+        self.keys.push((digest, holder));
         Ok(())
     }
 }
@@ -205,27 +235,17 @@ impl FromStr for KeyList {
         let mut list = Self::default();
         let entries = text.split(',').map(str::trim);
         for entry in entries.filter(|entry| !entry.is_empty()) {
-            let position = list.0.len() + 1;
-            let parts: Vec<_> = entry.split(':').collect();
-            let (name, scopes, sha256, level) = match parts[..] {
-                [name, scopes, sha256] => (name, scopes, sha256, None),
-                [name, scopes, sha256, level] => (name, scopes, sha256, Some(level)),
-                _ => bail!(
-                    "key {position} is not of the form name:scope+scope:sha256, as `lookdown key \
-                     new` prints it"
-                ),
-            };
-            let level = level.map(str::parse::<PriorityLevel>).transpose();
-            let level = level.with_context(|| wrong_priority(position))?;
-            list.add(name, &scopes.split('+').collect::<Vec<_>>(), sha256, level)?;
+            let position = list.len() + 1;
+            let added = list.add_entry(entry);
+            added.map_err(|problem| anyhow!("key {position}: {problem}"))?;
         }
         Ok(list)
     }
 }
 
-fn wrong_priority(position: usize) -> String {
+fn wrong_priority() -> String {
     format!(
-        "key {position}: highest_priority must be {} (highest) to {}; without it, it is {}",
+        "highest_priority must be {} (highest) to {}; without it, it is {}",
         PriorityLevel::HIGHEST,
         PriorityLevel::LOWEST,
         PriorityLevel::DEFAULT
@@ -325,6 +345,9 @@ impl AccessKeys {
                 problem_log.clear();
                 if *self.known() != list {
                     tracing::info!(keys = list.len(), "the keys have changed");
+                    for problem in &list.problems {
+                        tracing::error!("{}: {problem}; not a key", file.display());
+                    }
                     *self.known.write() = Arc::new(list);
                 }
             }
@@ -353,8 +376,9 @@ fn read(path: &Path, lasting: &KeyList) -> anyhow::Result<KeyList> {
     let text = files::read_text(path, MAX_SETTINGS_BYTES).map_err(|cause| {
         anyhow!("{key}: {file} cannot be read ({cause}): check its path and its permissions")
     })?;
-    let list = KeyList::from_toml(&text).and_then(|list| lasting.clone().with(&list));
-    list.map_err(|problem| anyhow!("{key}: {file} cannot be used: {problem}"))
+    let list = KeyList::from_toml(&text);
+    let list = list.map_err(|problem| anyhow!("{key}: {file} cannot be used: {problem}"))?;
+    Ok(lasting.clone().with(list))
 }
 
 #[cfg(test)]

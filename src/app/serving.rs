@@ -266,6 +266,9 @@ impl App {
                 let keys = keys.known();
                 let mut report =
                     format!("access: {address} needs an API key; {} known", keys.len());
+                for problem in &keys.problems {
+                    let _ = write!(report, "\n  access.keys_file: {problem}; not a key");
+                }
                 for holder in keys.holders() {
                     let scopes = holder.scopes.joined(", ");
                     let _ = write!(report, "\n  {}: {scopes}", holder.name);

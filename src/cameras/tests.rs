@@ -46,6 +46,21 @@ pub(crate) fn camera(url: &str) -> StoredCamera {
 }
 
 #[test]
+fn a_deleted_camera_leaves_no_password_of_an_unfinished_change() {
+    let folder = tempfile::tempdir().unwrap();
+    let cameras = cameras(folder.path());
+    let url = "rtsp://10.0.0.8/s2";
+    cameras.put("hall", camera(url), None).unwrap();
+    let left = ["hall", "hallnew~", "hallold~"].map(|name| cameras.folder.password(name));
+    for file in &left {
+        fs::create_dir_all(file.parent().unwrap()).unwrap();
+        fs::write(file, "geheim").unwrap();
+    }
+    assert!(cameras.delete("hall").unwrap());
+    assert!(left.iter().all(|file| !file.exists()), "{left:?}");
+}
+
+#[test]
 fn a_camera_is_stored_with_its_password_in_a_private_file() {
     let folder = tempfile::tempdir().unwrap();
     let password = Secret::from("geheim");

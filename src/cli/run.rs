@@ -150,8 +150,7 @@ fn own_key(settings: &mut Settings) -> anyhow::Result<Option<Secret>> {
     let key = new_key().context("the operating system gives no random numbers")?;
     let digest = KeyDigest::new(key.as_bytes()).hexadecimal();
     let own: KeyList = format!("{OWN_KEY}:detect+read:{digest}:1").parse()?;
-    let keys = std::mem::take(&mut settings.access.keys).with(&own);
-    settings.access.keys = keys.context("access.keys")?;
+    settings.access.keys = own.with(std::mem::take(&mut settings.access.keys));
     Ok(Some(key.into()))
 }
 

@@ -20,8 +20,8 @@ settings! {
         /// page needs one. Without keys, the server starts only on a loopback address or with
         /// `access.open`. Leave it out for none: an empty value is refused.
         keys_file: Option<PathBuf> = None => given_path("/etc/lookdown/keys.toml");
-        /// The interval in seconds at which that file is checked for changes. 0: never. An invalid
-        /// new version leaves the old keys in use and shows in the log.
+        /// The interval in seconds at which that file is checked for changes. 0: never. A line that
+        /// is not a key is left out; an unreadable file changes nothing; the log says so.
         poll_seconds: Option<NonZeroU64> = NonZeroU64::new(2) => poll_seconds();
         /// Keys in addition to those of the file, each as `name:scope+scope:sha256`, with
         /// `:highest_priority` behind it where that is not 5.

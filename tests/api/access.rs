@@ -241,6 +241,25 @@ async fn an_invalid_keys_file_keeps_the_keys_and_is_logged_once() {
     assert!(AccessKeys::open("".parse().unwrap(), Some(&file)).is_err());
 }
 
+#[tokio::test]
+async fn a_broken_line_of_a_key_takes_no_access_of_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("keys.toml");
+    write_keys(&file);
+    let keys = Arc::new(AccessKeys::open("".parse().unwrap(), Some(&file)).unwrap());
+    let service = service_with(&keys);
+    let digest = KeyDigest::new(b"other").hexadecimal();
+    let other = format!("other = {{ scopes = [\"read\"], sha256 = \"{digest}\" }}\n");
+    fs::write(&file, format!("{other}reader = {{ scopes = [] }}\n")).unwrap();
+    let log = Log::start();
+    keys.refresh();
+    keys.refresh();
+    let log = log.text();
+    assert_eq!(log.matches("line 2:").count(), 1, "{log}");
+    assert_eq!(reads_with(&service, READER).await, 401);
+    assert_eq!(reads_with(&service, "other").await, 200);
+}
+
 #[test]
 fn debug_output_reveals_no_keys() {
     let digest = KeyDigest::new(b"secret").hexadecimal();

@@ -14,9 +14,10 @@ use crate::{
 
 const METHODS: [&str; 5] = ["GET", "POST", "PUT", "DELETE", "PATCH"];
 /// The values of the parameters in paths.
-const PARAMETERS: [(&str, &str); 10] = [
+const PARAMETERS: [(&str, &str); 11] = [
     ("{calibration}", "lobby"),
     ("{camera}", "lobby"),
+    ("{from}", "2026-11-22T09:00:00Z"),
     ("{id}", "lobby"),
     ("{person}", "1"),
     ("{report}", "1"),

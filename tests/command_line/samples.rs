@@ -95,7 +95,7 @@ fn the_office_persons_are_found_exactly_without_a_calibration() {
     assert_eq!(persons(&report).len(), expected.len());
 }
 
-/// `tests/fixtures/make_sample_persons.py` recorded the persons on CPUs with AVX2 and with AVX-512.
+/// `tests/fixtures/make_sample_persons.py` recorded the persons with AVX2, AVX-512 and on arm64.
 /// Others sum in the order of one of them (docs/models.md), so all persons are as in one record.
 #[test]
 fn every_cpu_finds_the_recorded_persons() {

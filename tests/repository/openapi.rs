@@ -210,7 +210,9 @@ fn counts_need_the_scope_read_and_decisions_admin() {
                 "confirm_furniture"
                 | "take_back_furniture"
                 | "delete_camera_counts"
-                | "acknowledge_floor_alert",
+                | "acknowledge_floor_alert"
+                | "put_reference_crossings"
+                | "delete_reference_crossings",
             ) => key("admin"),
             _ => key("read"),
         };

@@ -26,6 +26,14 @@ impl ConfigError {
     }
 }
 
+/// Names in the settings of other programs, and ours.
+const OTHER_NAMES: [(&str, &str); 4] = [
+    ("`fps`", "every, the time between two frames, such as 200ms"),
+    ("`interval`", "every, such as 200ms"),
+    ("`username`", "user"),
+    ("`password`", "password_file"),
+];
+
 /// Parses a settings file in TOML. `whole` names the file in errors, and `page` documents it.
 ///
 /// # Errors
@@ -41,7 +49,11 @@ pub fn parse_toml<T: DeserializeOwned>(
             before.matches('\n').count() + 1
         });
         let message = error.message().trim();
-        let problem = format!("{message} (line {line}): correct the file as {page} describes");
+        let given = message.strip_prefix("unknown field ").unwrap_or_default();
+        let known = OTHER_NAMES.iter().find(|(name, _)| given.starts_with(name));
+        let hint = known.map_or(String::new(), |(_, own)| format!("; use {own}"));
+        let problem =
+            format!("{message} (line {line}){hint}: correct the file as {page} describes");
         ConfigError::problem(field, &problem)
     };
     let deserializer = toml::Deserializer::parse(text).map_err(|error| malformed(whole, &error))?;

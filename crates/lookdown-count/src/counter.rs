@@ -225,6 +225,7 @@ impl Counter {
             at_ms: report.at_ms(is_on_site),
             longest_gap_ms: self.options.longest_gap_ms,
             floor_alert_after_ms: self.options.floor_alert_after_ms,
+            bar: self.bars.get(&report.camera).copied(),
             now: now.instant,
         };
         let (scene, index) = self.scene_at(&owner, &report.camera)?;

@@ -4,6 +4,7 @@ mod counts;
 mod floor;
 mod furniture;
 mod heat_map;
+mod reference_crossings;
 mod shared;
 mod suggested_area;
 mod time;
@@ -57,6 +58,11 @@ fn routes() -> OpenApiRouter<Shared> {
         .routes(routes!(floor::acknowledge))
         .routes(routes!(furniture::list))
         .routes(routes!(furniture::confirm, furniture::take_back))
+        .routes(routes!(reference_crossings::list))
+        .routes(routes!(
+            reference_crossings::put,
+            reference_crossings::delete
+        ))
         .routes(routes!(heat_map::json_of_camera))
         .routes(routes!(heat_map::png_of_camera))
         .routes(routes!(heat_map::png_of_frame))

@@ -35,9 +35,7 @@ impl Presence {
         if let Some(known) = self.known(time) {
             for (minute, length_ms) in known.minutes() {
                 let sum = sums.presence.entry((owner.clone(), minute)).or_default();
-                sum.known_ms += length_ms;
-                sum.person_ms += length_ms * self.persons;
-                sum.most = sum.most.max(self.persons);
+                sum.add_time(length_ms, self.persons, time.bar);
             }
         }
         let at_ms = time.at_ms;

@@ -199,6 +199,8 @@ impl Scene {
         let owner = Owner::Camera(reporting.name.clone());
         reporting.presence.advance(&owner, time, own, sums);
         if is_site {
+            // No server knows the bar of a site.
+            let time = ReportTime { bar: None, ..time };
             self.presence.advance(&self.owner, time, tracked, sums);
         }
         Ok(crossings)

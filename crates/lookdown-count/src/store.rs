@@ -20,7 +20,7 @@ use lookdown_common::StoredFile;
 use parking_lot::Mutex;
 use rusqlite::Connection;
 
-pub(crate) use read::{Span, Step, StoredCalibrations};
+pub(crate) use read::{HOUR_MINUTES, ReferenceHour, Span, Step, StoredCalibrations};
 
 /// First byte of the stored state of a scene.
 const STATE_VERSION: u8 = StoredFile::Tracks.version();
@@ -159,9 +159,15 @@ CREATE TABLE IF NOT EXISTS calibrations (
 CREATE TABLE IF NOT EXISTS presence (
   owner TEXT, minute INTEGER, known_ms INTEGER NOT NULL, person_ms INTEGER NOT NULL, most INTEGER NOT NULL,
   PRIMARY KEY (owner, minute)) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS bars (
+  owner TEXT, minute INTEGER, known_ms INTEGER NOT NULL, low_ms INTEGER NOT NULL, high_ms INTEGER NOT NULL,
+  PRIMARY KEY (owner, minute)) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS slow (
   camera TEXT, minute INTEGER, slow_ms INTEGER NOT NULL, PRIMARY KEY (camera, minute)) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS crossings (
+  camera TEXT, line TEXT, direction TEXT, minute INTEGER, crossings INTEGER NOT NULL,
+  PRIMARY KEY (camera, minute, line, direction)) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS reference_crossings (
   camera TEXT, line TEXT, direction TEXT, minute INTEGER, crossings INTEGER NOT NULL,
   PRIMARY KEY (camera, minute, line, direction)) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS zones (

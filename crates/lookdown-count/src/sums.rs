@@ -72,6 +72,35 @@ pub(crate) struct PresenceSum {
     pub(crate) person_ms: u64,
     /// Most persons at once.
     pub(crate) most: u64,
+    /// The ends of the bar times milliseconds; `None` where it is unknown for a part.
+    pub(crate) bar_ms: Option<[u64; 2]>,
+}
+
+impl PresenceSum {
+    /// Adds a time with this number of persons.
+    pub(crate) fn add_time(&mut self, length_ms: u64, persons: u64, bar: Option<[u64; 2]>) {
+        let of_time = bar.map(|[low, high]| [low.min(persons), high.max(persons)]);
+        self.add(&Self {
+            known_ms: length_ms,
+            person_ms: length_ms * persons,
+            most: persons,
+            bar_ms: of_time.map(|ends| ends.map(|end| end * length_ms)),
+        });
+    }
+
+    /// Adds another sum.
+    pub(crate) fn add(&mut self, other: &Self) {
+        let is_new = self.known_ms == 0;
+        self.bar_ms = match (self.bar_ms, other.bar_ms) {
+            (bar, _) if other.known_ms == 0 => bar,
+            (_, bar) if is_new => bar,
+            (Some([low, high]), Some(more)) => Some([low + more[0], high + more[1]]),
+            _ => None,
+        };
+        self.known_ms += other.known_ms;
+        self.person_ms += other.person_ms;
+        self.most = self.most.max(other.most);
+    }
 }
 
 /// The persons in a zone in a time.
@@ -138,10 +167,7 @@ impl Sums {
     /// Adds other sums.
     pub(crate) fn add(&mut self, other: Self) {
         for (key, sum) in other.presence {
-            let own = self.presence.entry(key).or_default();
-            own.known_ms += sum.known_ms;
-            own.person_ms += sum.person_ms;
-            own.most = own.most.max(sum.most);
+            self.presence.entry(key).or_default().add(&sum);
         }
         for (key, milliseconds) in other.slow {
             *self.slow.entry(key).or_default() += milliseconds;

@@ -191,11 +191,13 @@ async fn steps_add_up_and_a_gap_is_unknown() {
         assert_eq!(
             lines.next().unwrap(),
             "from,to,known_seconds,slow_seconds,persons_mean,persons_mean_low,\
-             persons_mean_high,persons_max,line.door.in,line.door.out,zone.middle.entries,zone.middle.mean,zone.middle.max,zone.middle.visits,\
+             persons_mean_high,persons_max,line.door.in,line.door.in.estimated,line.door.in.low,line.door.in.high,\
+             line.door.out,line.door.out.estimated,line.door.out.low,line.door.out.high,\
+             zone.middle.entries,zone.middle.mean,zone.middle.max,zone.middle.visits,\
              zone.middle.dwell_seconds"
         );
         let third = lines.nth(2).unwrap();
-        assert!(third.ends_with(",0,,,,,,,,,,,"), "{third}");
+        assert!(third.ends_with(&format!(",0{}", ",".repeat(17))), "{third}");
         assert_eq!(lines.count(), 2);
 
         let map = companion
@@ -216,6 +218,70 @@ async fn steps_add_up_and_a_gap_is_unknown() {
             status == 404 && problem.contains("2 m² of floor"),
             "{problem}"
         );
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn crossings_that_a_person_counted_give_a_ratio_with_a_bar() {
+    let folder = tempfile::tempdir().unwrap();
+    let walks = walks("hall", 3600, 0..0);
+    let reports = walks.len();
+    let server = Server::start(walks, Duration::ZERO, CALIBRATION).await;
+    with_companion(&server, quick(), folder.path(), async |companion| {
+        companion.until_counted(reports).await;
+        sleep(Duration::from_millis(400)).await;
+        let begin = jiff::Timestamp::from_millisecond(START_MS).unwrap();
+        let hour = format!("/counts/hall/reference-crossings/{begin}");
+        let change = async |method: &str, path: &str| {
+            let url = format!("{}{path}", companion.url).parse().unwrap();
+            let request = match method {
+                "PUT" => companion.client.put(url),
+                _ => companion.client.delete(url),
+            };
+            let response = companion.client.send(request).await.unwrap();
+            (response.status().as_u16(), response.text().await.unwrap())
+        };
+        let put = async |path: &str, line: &str, crossings: u64| {
+            let given = format!("?line={line}&direction=in&crossings={crossings}");
+            change("PUT", &format!("{path}{given}")).await
+        };
+        let bar = async || {
+            let counts = format!("/counts/hall?{}", minutes(60, "1h"));
+            let step = companion.json(&counts).await["steps"][0].clone();
+            ["lines", "lines_estimated", "lines_low", "lines_high"]
+                .map(|of| step[of]["door"]["in"].as_u64().unwrap())
+        };
+        let [counted, untaught, low, high] = bar().await;
+        assert!(counted > 200 && untaught == counted);
+        // A person counted half as many again.
+        let given = counted * 3 / 2;
+        assert_eq!(put(&hour, "door", given).await, (204, String::new()));
+        let [again, estimated, taught_low, taught_high] = bar().await;
+        assert!(again == counted && estimated.abs_diff(given) < 10);
+        assert!(taught_low < given && given < taught_high);
+        assert!(taught_high - taught_low < high - low);
+        let listed = companion.json("/counts/hall/reference-crossings").await;
+        let row = json!({"from": begin.to_string(), "line": "door", "direction": "in",
+            "crossings": given, "counted": counted});
+        assert_eq!(listed["crossings"], json!([row]));
+        assert!((1.4..1.5).contains(&listed["ratios"]["door"].as_f64().unwrap()));
+
+        let later = "/counts/hall/reference-crossings/2020-01-01T00:00:00Z";
+        for ((status, problem), reason) in [
+            (put(&hour, "gate", 1).await, "line: hall has no line gate"),
+            (put(&hour, "door", 10_001).await, "crossings: 10001 is more"),
+            (put(later, "door", 1).await, "was not counted for nine"),
+            (
+                put(&hour.replace(":00Z", ":01Z"), "door", 1).await,
+                "whole minute",
+            ),
+        ] {
+            assert!(status == 422 && problem.contains(reason), "{problem}");
+        }
+        assert_eq!(change("DELETE", &hour).await.0, 204);
+        assert_eq!(change("DELETE", &hour).await.0, 404);
+        assert_eq!(bar().await, [counted, untaught, low, high]);
     })
     .await;
 }

@@ -24,6 +24,7 @@ mod relative_pose;
 mod settings;
 mod site;
 pub mod taught;
+pub mod taught_crossings;
 #[cfg(test)]
 mod test_walks;
 mod track;

@@ -46,12 +46,12 @@ pub struct ReferenceFrame {
     pub scores: Vec<f32>,
 }
 
-/// A number of persons with its bar.
+/// A number of persons, in a frame or who crossed a line, with its bar.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NumberWithBar {
     /// The number.
     pub persons: usize,
-    /// In 90 % of frames, the true number is at least this one …
+    /// In 90 % of frames or times, the true number is at least this one …
     pub low: usize,
     /// … and at most this one. Both include the number.
     pub high: usize,
@@ -65,7 +65,7 @@ impl NumberWithBar {
     }
 
     /// Rounds the number, and the bar to the whole numbers within half a person of it.
-    fn new(number: f64, low: f64, high: f64) -> Self {
+    pub(crate) fn new(number: f64, low: f64, high: f64) -> Self {
         let persons = to_usize(number.round());
         Self {
             persons,

@@ -63,6 +63,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "furniture.js",
         "ignore_place.js",
         "reference_counts.js",
+        "reference_crossings.js",
         "main.js",
         "dom.js",
         "server.js",

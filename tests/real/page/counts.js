@@ -137,6 +137,48 @@ pageTest(
 );
 
 pageTest(
+  "the floor shows the newest report of the camera whose frame is used",
+  "#cameras",
+  async (page) => {
+    let count = 1;
+    await page.route("**/results/hall/latest", async (route) => {
+      const report = await (await route.fetch()).json();
+      report.persons = Array.from({ length: count }, () => ({ ...report.persons[0], floor: { x_m: 1, y_m: count } }));
+      await route.fulfill({ json: report });
+    });
+    const card = page.getByRole("article", { name: "Camera hall" });
+    await card.getByRole("button", { name: "Floor" }).click();
+    const places = page.getByRole("table", { name: "Positions on the floor" });
+    await places.getByRole("row", { name: "1 1.00 m 1.00 m 1.41 m" }).waitFor();
+    count = 2;
+    await places.getByRole("row", { name: "2 1.00 m 2.00 m 2.24 m" }).waitFor();
+  },
+  { server: COUNTED },
+);
+
+pageTest(
+  "crossings that a person counted are sent, and an hour without frames is refused",
+  "#camera/hall",
+  async (page) => {
+    await page.route(/counts\/hall\?.*step=1h/, async (route) => {
+      const counts = await (await route.fetch()).json();
+      for (const step of counts.steps) step.known_seconds = 3600;
+      await route.fulfill({ json: counts });
+    });
+    const section = page.getByRole("region", { name: "Crossings of hall" });
+    await section.getByRole("button", { name: "Count the crossings of an hour" }).click();
+    for (const field of await section.getByRole("spinbutton").all()) await field.fill("3");
+    await page.setViewportSize(PHONE);
+    await assertFits(page);
+    await assertAccessible(page);
+    await section.getByRole("button", { name: "Save" }).click();
+    await section.getByText("the camera was not counted for nine tenths of this hour").waitFor();
+    assert.deepEqual((await (await fetch(`${COUNTED}/counts/hall/reference-crossings`)).json()).crossings, []);
+  },
+  { server: COUNTED, expected: /status of 422/ },
+);
+
+pageTest(
   "counts that cannot be reached are one sentence, and the cards stay",
   "#cameras",
   async (page) => {

@@ -6,6 +6,7 @@ import { corners, holds, roundStep } from "../../../web/geometry.js";
 import { replacedIn } from "../../../web/calibration_sources.js";
 import { valuesOf } from "../../../web/calibration_values.js";
 import { assumedCircle, calibrationOf, circleOf, pixelOfFloor, rimOf, withFound } from "../../../web/lens.js";
+import { hourOf } from "../../../web/camera_day.js";
 import { countedNumbers, steps } from "../../../web/plot.js";
 import { turned, zoomed } from "../../../web/live_view.js";
 import { parseEvent } from "../../../web/server.js";
@@ -249,4 +250,19 @@ test("a dragged view turns with the pointer, and a panorama keeps its height", (
   assert.deepEqual(turned({ kind: "panorama", azimuth_deg: 0 }, 0.5, 1), { kind: "panorama", azimuth_deg: 180 });
   near(zoomed(view, 1).field_of_view_deg, 80 / 1.1);
   assert.equal(zoomed(view, -20).field_of_view_deg, 150);
+});
+
+test("hours of a day of 25 are those of the clock, at most 24", () => {
+  const zone = process.env.TZ;
+  process.env.TZ = "Europe/Berlin";
+  try {
+    const midnight = Date.parse("2026-10-25T00:00:00+02:00");
+    const hours = Array.from({ length: 25 }, (_, hour) => hourOf(midnight + hour * 3_600_000, midnight));
+    assert.deepEqual(hours, [0, 1, 2, 2, ...Array.from({ length: 21 }, (_, hour) => hour + 3)]);
+    const elsewhere = Date.parse("2026-10-25T00:00:00+09:00");
+    assert.equal(hourOf(elsewhere + 24.5 * 3_600_000, elsewhere), 23);
+  } finally {
+    if (zone === undefined) delete process.env.TZ;
+    else process.env.TZ = zone;
+  }
 });

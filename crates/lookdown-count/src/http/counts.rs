@@ -17,12 +17,12 @@ use axum::{
 };
 use jiff::Timestamp;
 use lookdown_calibration::revision::revision_of;
-use lookdown_common::text::{one_line, shortened, with_causes};
+use lookdown_common::text::shortened;
 use lookdown_http::{
     entity_tags::{entity_tag, is_unmodified},
     problem::Problem,
 };
-use lookdown_tracking::taught::default_bar;
+use lookdown_tracking::{taught::default_bar, taught_crossings::CrossingRatio};
 use serde::{Deserialize, Serialize};
 use utoipa::{
     IntoParams, ToSchema,
@@ -30,7 +30,8 @@ use utoipa::{
 };
 
 use super::{
-    shared::{Shared, blocking, check_known, query, stored},
+    reference_crossings::{Ratios, ratios},
+    shared::{Shared, blocking, check_known, query, stored, unusable_query},
     time::TimeParameters,
 };
 use crate::{
@@ -44,6 +45,9 @@ use crate::{
 /// Most values of an answer: steps times directions of lines and zones. An answer has 12 MB at
 /// most.
 pub(crate) const MAX_VALUES: usize = 100_000;
+
+/// Crossings by line and direction; `None` for unknown ones.
+type Lines = BTreeMap<String, BTreeMap<String, Option<u64>>>;
 
 /// The lines with their directions, and the zones.
 type Names = (BTreeSet<(String, String)>, BTreeSet<String>);
@@ -122,7 +126,11 @@ async fn answer(
     let store = api.store.clone();
     let response = blocking(move || {
         let sums = stored(store.steps(&owner, span, MAX_VALUES))?.ok_or_else(too_large)?;
-        let counts = counts(owner, span, &sums, names).ok_or_else(too_large)?;
+        let ratios = match &owner {
+            Owner::Camera(camera) => ratios(&stored(store.reference_crossings(camera))?),
+            Owner::Site(_) => Ratios::default(),
+        };
+        let counts = counts(owner, span, &sums, (names, &ratios)).ok_or_else(too_large)?;
         if !is_csv {
             return Ok(Json(counts).into_response());
         }
@@ -149,17 +157,6 @@ fn too_large() -> Problem {
         "step",
         "the steps of this time have too many values: give a longer step, or a shorter time",
     )
-}
-
-/// Returns the problem of a query with an unknown or repeated parameter.
-pub(super) fn unusable_query(refused: &QueryRejection) -> Problem {
-    let cause = with_causes(refused);
-    let cause = cause.rsplit(": ").next().unwrap_or_default();
-    let fault = format!(
-        "{}: give each parameter of docs/count.md once",
-        one_line(cause)
-    );
-    Problem::for_parameter("query", &fault)
 }
 
 /// Returns the lines and zones that are counted now: a step without any has the count 0.
@@ -190,19 +187,24 @@ pub(crate) fn table(
     sums: &BTreeMap<i64, Step>,
     definition: Option<&CameraDefinition>,
 ) -> Option<String> {
-    Some(csv(&counts(owner, span, sums, names(definition))?))
+    let about = (names(definition), &Ratios::default());
+    Some(csv(&counts(owner, span, sums, about)?))
 }
 
 /// Returns the counts, or `None` if there are too many.
-fn counts(owner: Owner, span: Span, sums: &BTreeMap<i64, Step>, names: Names) -> Option<Counts> {
-    let (mut lines, mut zones) = names;
+fn counts(
+    owner: Owner,
+    span: Span,
+    sums: &BTreeMap<i64, Step>,
+    ((mut lines, mut zones), ratios): (Names, &Ratios),
+) -> Option<Counts> {
     for step in sums.values() {
         lines.extend(step.crossings.keys().cloned());
         zones.extend(step.zones.keys().cloned());
     }
     let (time, step_ms) = (span.time(), span.step_minutes * MINUTE_MS);
     let count = (time.to_ms - time.from_ms + step_ms - 1) / step_ms;
-    let columns = 1 + lines.len() + zones.len();
+    let columns = 1 + 4 * lines.len() + zones.len();
     let values = usize::try_from(count).ok()?.saturating_mul(columns);
     if values > MAX_VALUES {
         return None;
@@ -213,7 +215,7 @@ fn counts(owner: Owner, span: Span, sums: &BTreeMap<i64, Step>, names: Names) ->
         let to_ms = (from_ms + step_ms).min(time.to_ms);
         let time = TimeSpan { from_ms, to_ms };
         let step = sums.get(&number).unwrap_or(&nothing);
-        step_counts(step, time, (&lines, &zones), &owner)
+        step_counts(step, time, (&lines, &zones, ratios), &owner)
     });
     Some(Counts {
         from: time_of(time.from_ms),
@@ -234,21 +236,33 @@ fn counts(owner: Owner, span: Span, sums: &BTreeMap<i64, Step>, names: Names) ->
 fn step_counts(
     step: &Step,
     time: TimeSpan,
-    (lines, zones): (&BTreeSet<(String, String)>, &BTreeSet<String>),
+    (lines, zones, ratios): (&BTreeSet<(String, String)>, &BTreeSet<String>, &Ratios),
     owner: &Owner,
 ) -> StepCounts {
     let known_ms = step.presence.known_ms;
     let is_known = known_ms > 0;
     let mean = ratio(step.presence.person_ms, known_ms);
-    let [mean_low, mean_high] = default_bar(mean);
+    let [mean_low, mean_high] = match step.presence.bar_ms {
+        Some(bar_ms) => bar_ms.map(|end_ms| ratio(end_ms, known_ms)),
+        None => default_bar(mean),
+    };
     let is_camera = matches!(owner, Owner::Camera(_));
-    let mut line_counts = BTreeMap::<String, BTreeMap<String, Option<u64>>>::new();
-    for of in lines {
-        let crossings = step.crossings.get(of).copied();
-        let crossings = crossings.or(is_known.then_some(0));
-        let directions = line_counts.entry(of.0.clone()).or_default();
-        directions.insert(of.1.clone(), crossings);
+    let untaught = CrossingRatio::new(&[]);
+    let mut counted = [const { Lines::new() }; 4];
+    for (line, direction) in lines {
+        let crossings = step.crossings.get(&(line.clone(), direction.clone()));
+        let crossings = crossings.copied().or(is_known.then_some(0));
+        let number = crossings.map(|count| ratios.get(line).unwrap_or(&untaught).number(count));
+        let estimated = number.map(|number| [number.persons, number.low, number.high]);
+        let [number, low, high] =
+            estimated.map_or([None; 3], |ends| ends.map(|end| Some(end as u64)));
+        for (lines, count) in counted.iter_mut().zip([crossings, number, low, high]) {
+            let directions = lines.entry(line.clone()).or_default();
+            directions.insert(direction.clone(), count);
+        }
     }
+    let [lines, lines_estimated, lines_low, lines_high] =
+        counted.map(|lines| is_camera.then_some(lines));
     let zone_counts = zones.iter().map(|zone| {
         let sum = step.zones.get(zone).copied();
         let sum = sum.or(is_known.then(Default::default));
@@ -274,7 +288,10 @@ fn step_counts(
             max: step.presence.most,
         }),
         zones: is_camera.then(|| zone_counts.collect()),
-        lines: is_camera.then_some(line_counts),
+        lines,
+        lines_estimated,
+        lines_low,
+        lines_high,
     }
 }
 
@@ -323,7 +340,20 @@ struct StepCounts {
     /// Crossings by line and direction; absent for a site.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
-    pub(super) lines: Option<BTreeMap<String, BTreeMap<String, Option<u64>>>>,
+    pub(super) lines: Option<Lines>,
+    /// The true crossings, estimated with those that people counted in some hours; absent for a
+    /// site.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    lines_estimated: Option<Lines>,
+    /// In 90 % of steps, there were at least so many true crossings; absent for a site.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    lines_low: Option<Lines>,
+    /// In 90 % of steps, there were at most so many; absent for a site.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    lines_high: Option<Lines>,
     /// Counts by zone; absent for a site.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(schema_with = zones_schema)]
@@ -370,7 +400,9 @@ fn csv(counts: &Counts) -> String {
     let lines = first.and_then(|step| step.lines.as_ref());
     for (line, directions) in lines.into_iter().flatten() {
         for direction in directions.keys() {
-            let _ = write!(text, ",line.{line}.{direction}");
+            for column in ["", ".estimated", ".low", ".high"] {
+                let _ = write!(text, ",line.{line}.{direction}{column}");
+            }
         }
     }
     let zones = first.and_then(|step| step.zones.as_ref());
@@ -388,9 +420,14 @@ fn csv(counts: &Counts) -> String {
         cell(&mut text, persons.map(|persons| persons.mean_low));
         cell(&mut text, persons.map(|persons| persons.mean_high));
         cell(&mut text, persons.map(|persons| persons.max));
-        for directions in step.lines.iter().flat_map(BTreeMap::values) {
-            for crossings in directions.values() {
+        let [estimated, low, high] = [&step.lines_estimated, &step.lines_low, &step.lines_high];
+        for (line, directions) in step.lines.iter().flatten() {
+            for (direction, crossings) in directions {
                 cell(&mut text, *crossings);
+                for lines in [estimated, low, high] {
+                    let count = lines.as_ref().and_then(|lines| lines[line][direction]);
+                    cell(&mut text, count);
+                }
             }
         }
         for zone in step.zones.iter().flat_map(BTreeMap::values) {

@@ -16,8 +16,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::{
-    counts::unusable_query,
-    shared::{Shared, blocking, check_known, not_found, query},
+    shared::{Shared, blocking, check_known, not_found, query, unusable_query},
     time::TimeParameters,
 };
 use crate::{

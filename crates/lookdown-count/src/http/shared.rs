@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
+use axum::extract::rejection::QueryRejection;
 use jiff::Timestamp;
-use lookdown_common::text::one_line;
+use lookdown_common::text::{one_line, with_causes};
 use lookdown_http::problem::{Kind, Problem};
 use parking_lot::Mutex;
 use tokio::sync::Semaphore;
@@ -86,6 +87,17 @@ pub(super) async fn check_known(api: &Shared, owner: &Owner) -> Result<(), Probl
             one_line(site)
         )),
     })
+}
+
+/// Returns the problem of a query with an unknown or repeated parameter.
+pub(super) fn unusable_query(refused: &QueryRejection) -> Problem {
+    let cause = with_causes(refused);
+    let cause = cause.rsplit(": ").next().unwrap_or_default();
+    let fault = format!(
+        "{}: give each parameter of docs/count.md once",
+        one_line(cause)
+    );
+    Problem::for_parameter("query", &fault)
 }
 
 /// Returns a place in meters or pixels with three decimals.

@@ -127,7 +127,8 @@ impl Day {
     }
 }
 
-fn timestamp(name: &str, text: Option<&str>) -> Result<Option<i64>, Problem> {
+/// Parses a time, milliseconds since the Unix epoch.
+pub(super) fn timestamp(name: &str, text: Option<&str>) -> Result<Option<i64>, Problem> {
     let Some(text) = text else { return Ok(None) };
     let time: Timestamp = text.parse().map_err(|_| {
         let remedy = "a time: write it like 2026-11-22T10:00:00Z, with + as %2B; `from` may be \

@@ -55,6 +55,7 @@ fn time(at_ms: i64) -> ReportTime {
         at_ms,
         longest_gap_ms: 10_000,
         floor_alert_after_ms: None,
+        bar: None,
         now: *START + Duration::from_millis(at_ms.unsigned_abs()),
     }
 }

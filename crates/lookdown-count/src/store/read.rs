@@ -2,12 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use jiff::Timestamp;
 use lookdown_tracking::heat_map::Cell;
 use rusqlite::{Connection, OptionalExtension, params};
 
 use super::{STATE_VERSION, Store, StoreError};
 use crate::{
     message::{HeldCondition, Message},
+    now::time_of,
     scene::SceneState,
     sums::{
         DAY_MS, LineDirection, MINUTE_MS, Owner, PresenceSum, Totals, ZoneOf, ZoneSum, ZoneTotal,
@@ -27,6 +29,9 @@ pub(crate) struct Resumed {
 
 /// The calibrations by ID: the revision, and the content if the server has one.
 pub(crate) type StoredCalibrations = BTreeMap<String, (String, Option<Vec<u8>>)>;
+
+/// The minutes of an hour.
+pub(crate) const HOUR_MINUTES: i64 = 60;
 
 /// A time in whole minutes, in steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,6 +62,18 @@ pub(crate) struct Step {
     pub(crate) crossings: BTreeMap<(String, String), u64>,
     /// Sums per zone.
     pub(crate) zones: BTreeMap<String, ZoneSum>,
+}
+
+/// The crossings of a line in a direction in an hour.
+pub(crate) struct ReferenceHour {
+    /// The begin of the hour.
+    pub(crate) from: Timestamp,
+    pub(crate) line: String,
+    pub(crate) direction: String,
+    /// The crossings that a person counted.
+    pub(crate) crossings: u64,
+    /// The crossings that the camera counted.
+    pub(crate) counted: u64,
 }
 
 impl Store {
@@ -93,7 +110,9 @@ impl Store {
         } = span;
         let mut steps = BTreeMap::<i64, Step>::new();
         let mut statement = connection.prepare_cached(
-            "SELECT (minute - ?2) / ?4, sum(known_ms), sum(person_ms), max(most) FROM presence
+            "SELECT (minute - ?2) / ?4, sum(p.known_ms), sum(person_ms), max(most),
+             CASE sum(b.known_ms) WHEN sum(p.known_ms) THEN sum(low_ms) END, sum(high_ms)
+             FROM presence p LEFT JOIN bars b USING (owner, minute)
              WHERE owner = ?1 AND minute >= ?2 AND minute < ?3 GROUP BY 1",
         )?;
         let mut rows = statement.query(params![owner.key(), from, to, step])?;
@@ -102,6 +121,10 @@ impl Store {
                 known_ms: row.get(1)?,
                 person_ms: row.get(2)?,
                 most: row.get(3)?,
+                bar_ms: match row.get(4)? {
+                    Some(low_ms) => Some([low_ms, row.get(5)?]),
+                    None => None,
+                },
             };
         }
         let Owner::Camera(camera) = owner else {
@@ -149,6 +172,30 @@ impl Store {
             zones.insert(row.get(1)?, sum);
         }
         Ok(Some(steps))
+    }
+
+    /// Returns the hours whose crossings a person counted, oldest first. Blocks.
+    pub(crate) fn reference_crossings(
+        &self,
+        camera: &str,
+    ) -> Result<Vec<ReferenceHour>, StoreError> {
+        let connection = self.reader.lock();
+        let mut statement = connection.prepare_cached(
+            "SELECT minute, line, direction, crossings, coalesce((SELECT sum(crossings) FROM crossings c
+             WHERE c.camera = r.camera AND c.line = r.line AND c.direction = r.direction
+             AND c.minute >= r.minute AND c.minute < r.minute + ?2), 0)
+             FROM reference_crossings r WHERE camera = ?1 ORDER BY 1, 2, 3",
+        )?;
+        let rows = statement.query_map(params![camera, HOUR_MINUTES], |row| {
+            Ok(ReferenceHour {
+                from: time_of(row.get::<_, i64>(0)? * MINUTE_MS),
+                line: row.get(1)?,
+                direction: row.get(2)?,
+                crossings: row.get(3)?,
+                counted: row.get(4)?,
+            })
+        })?;
+        Ok(rows.collect::<Result<_, _>>()?)
     }
 
     /// Returns the milliseconds of presence per cell in whole days. Blocks.

@@ -8,6 +8,14 @@ use crate::{
     time_span::TimeSpan,
 };
 
+fn door() -> LineDirection {
+    LineDirection {
+        camera: "hall".to_owned(),
+        line: "door".to_owned(),
+        direction: "in".to_owned(),
+    }
+}
+
 fn batch(minute: i64, last_event: u64) -> Batch {
     let mut batch = Batch::empty(last_event, Totals::default());
     let hall = Owner::Camera("hall".to_owned());
@@ -15,11 +23,7 @@ fn batch(minute: i64, last_event: u64) -> Batch {
         known_ms: 30_000,
         person_ms: 60_000,
         most: 3,
-    };
-    let door = LineDirection {
-        camera: "hall".to_owned(),
-        line: "door".to_owned(),
-        direction: "in".to_owned(),
+        bar_ms: Some([30_000, 90_000]),
     };
     let till = ZoneOf {
         camera: "hall".to_owned(),
@@ -36,7 +40,7 @@ fn batch(minute: i64, last_event: u64) -> Batch {
     batch.sums = Sums {
         presence: [((hall.clone(), minute), presence)].into(),
         slow: [(("hall".to_owned(), minute), 5_000)].into(),
-        crossings: [((door, minute), 2)].into(),
+        crossings: [((door(), minute), 2)].into(),
         zones: [((till, minute), zone)].into(),
         cells: [((hall, 0, cell), 500)].into(),
     };
@@ -48,12 +52,15 @@ fn removed_camera_has_no_sums() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(&folder.path().join("counts.sqlite")).unwrap();
     store.commit(&batch(0, 7), &[], None).unwrap();
+    store.put_reference_crossings(&door(), 0, 3).unwrap();
     let hall = Owner::Camera("hall".to_owned());
     store.remove("gate").unwrap();
     assert!(store.has(&hall).unwrap());
     store.remove("hall").unwrap();
     assert!(!store.has(&hall).unwrap());
     let tables = [
+        "bars",
+        "reference_crossings",
         "cells",
         "slow",
         "crossings",
@@ -91,6 +98,7 @@ fn sums_of_batches_add_up_over_steps() {
         (whole.presence.person_ms, whole.presence.most),
         (240_000, 3)
     );
+    assert_eq!(whole.presence.bar_ms, Some([120_000, 360_000]));
     let door = ("door".to_owned(), "in".to_owned());
     assert_eq!(whole.crossings[&door], 8);
     assert_eq!(
@@ -114,6 +122,43 @@ fn sums_of_batches_add_up_over_steps() {
             .collect::<Vec<_>>(),
         [8]
     );
+}
+
+#[test]
+fn a_bar_is_unknown_where_a_part_has_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(&folder.path().join("counts.sqlite")).unwrap();
+    store.commit(&batch(0, 7), &[], None).unwrap();
+    let mut without = batch(1, 8);
+    for sum in without.sums.presence.values_mut() {
+        sum.bar_ms = None;
+    }
+    store.commit(&without, &[], None).unwrap();
+    let bar = |step_minutes| {
+        let span = Span {
+            from_minute: 0,
+            to_minute: 2,
+            step_minutes,
+        };
+        let hall = Owner::Camera("hall".to_owned());
+        store.steps(&hall, span, 100).unwrap().unwrap()[&0]
+            .presence
+            .bar_ms
+    };
+    assert_eq!((bar(1), bar(2)), (Some([30_000, 90_000]), None));
+}
+
+#[test]
+fn the_oldest_hours_with_reference_crossings_make_room() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(&folder.path().join("counts.sqlite")).unwrap();
+    for hour in 0..70 {
+        store
+            .put_reference_crossings(&door(), hour * 60, 3)
+            .unwrap();
+    }
+    let kept = store.reference_crossings("hall").unwrap();
+    assert_eq!((kept.len(), kept[0].from.as_second()), (60, 600 * 60));
 }
 
 #[test]

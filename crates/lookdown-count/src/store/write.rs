@@ -8,8 +8,11 @@ use super::{STATE_VERSION, Store, StoreError};
 use crate::{
     batch::Batch,
     message::{HeldCondition, Message},
-    sums::{DAY_MS, MINUTE_MS, Owner, Sums, ZoneSum},
+    sums::{DAY_MS, LineDirection, MINUTE_MS, Owner, Sums, ZoneSum},
 };
+
+/// Most hours with reference crossings of a camera.
+const MAX_REFERENCE_HOURS: usize = 60;
 
 impl Owner {
     /// Returns the key of the store.
@@ -101,6 +104,40 @@ impl Store {
         Ok(())
     }
 
+    /// Stores the crossings of an hour that a person counted; the oldest hours make room. Blocks.
+    pub(crate) fn put_reference_crossings(
+        &self,
+        of: &LineDirection,
+        minute: i64,
+        crossings: u64,
+    ) -> Result<(), StoreError> {
+        let mut connection = self.writer.lock();
+        let transaction = connection.transaction()?;
+        transaction.execute(
+            "INSERT OR REPLACE INTO reference_crossings VALUES (?, ?, ?, ?, ?)",
+            params![of.camera, of.line, of.direction, minute, crossings],
+        )?;
+        transaction.execute(
+            "DELETE FROM reference_crossings WHERE camera = ?1 AND minute NOT IN (SELECT DISTINCT
+             minute FROM reference_crossings WHERE camera = ?1 ORDER BY minute DESC LIMIT ?2)",
+            params![of.camera, MAX_REFERENCE_HOURS],
+        )?;
+        Ok(transaction.commit()?)
+    }
+
+    /// Removes the reference crossings of an hour. Returns false if it has none. Blocks.
+    pub(crate) fn remove_reference_crossings(
+        &self,
+        camera: &str,
+        minute: i64,
+    ) -> Result<bool, StoreError> {
+        let removed = self.writer.lock().execute(
+            "DELETE FROM reference_crossings WHERE camera = ? AND minute = ?",
+            params![camera, minute],
+        )?;
+        Ok(removed > 0)
+    }
+
     /// Removes all sums of a camera. Blocks.
     pub(crate) fn remove(&self, camera: &str) -> Result<(), StoreError> {
         let owner = Owner::Camera(camera.to_owned()).key();
@@ -108,9 +145,11 @@ impl Store {
         let transaction = connection.transaction()?;
         for (table, column, of) in [
             ("presence", "owner", owner.as_str()),
+            ("bars", "owner", &owner),
             ("cells", "owner", &owner),
             ("slow", "camera", camera),
             ("crossings", "camera", camera),
+            ("reference_crossings", "camera", camera),
             ("zones", "camera", camera),
             ("line_totals", "camera", camera),
             ("zone_totals", "camera", camera),
@@ -131,8 +170,10 @@ impl Store {
         let transaction = connection.transaction()?;
         for (table, column, before, at_most) in [
             ("presence", "minute", minute, MINUTES_OF_A_DAY),
+            ("bars", "minute", minute, MINUTES_OF_A_DAY),
             ("slow", "minute", minute, MINUTES_OF_A_DAY),
             ("crossings", "minute", minute, MINUTES_OF_A_DAY),
+            ("reference_crossings", "minute", minute, MINUTES_OF_A_DAY),
             ("zones", "minute", minute, MINUTES_OF_A_DAY),
             ("cells", "day", day, 1),
         ] {
@@ -152,7 +193,15 @@ fn add(transaction: &Transaction<'_>, sums: &Sums) -> rusqlite::Result<()> {
          known_ms = known_ms + excluded.known_ms, person_ms = person_ms + excluded.person_ms,
          most = max(most, excluded.most)",
     )?;
+    let mut bars = transaction.prepare_cached(
+        "INSERT INTO bars VALUES (?, ?, ?, ?, ?) ON CONFLICT DO UPDATE SET
+         known_ms = known_ms + excluded.known_ms, low_ms = low_ms + excluded.low_ms,
+         high_ms = high_ms + excluded.high_ms",
+    )?;
     for ((owner, minute), sum) in &sums.presence {
+        if let Some([low_ms, high_ms]) = sum.bar_ms {
+            bars.execute(params![owner.key(), minute, sum.known_ms, low_ms, high_ms])?;
+        }
         presence.execute(params![
             owner.key(),
             minute,

@@ -12,7 +12,9 @@ fn steps_times_columns_are_bounded() {
         let zones = (0..zones).map(|number| format!("zone {number}"));
         (BTreeSet::new(), zones.collect())
     };
-    let found = |steps, zones| counts(owner(), span(steps), &BTreeMap::new(), names(zones));
+    let ratios = Ratios::default();
+    let about = |zones| (names(zones), &ratios);
+    let found = |steps, zones| counts(owner(), span(steps), &BTreeMap::new(), about(zones));
     assert!(found(10_000, 9).is_some());
     assert!(found(10_000, 10).is_none());
     assert!(found(1, MAX_VALUES).is_none());
@@ -23,5 +25,5 @@ fn steps_times_columns_are_bounded() {
         step.crossings.insert(direction, 1);
     }
     let sums = BTreeMap::from([(0, step)]);
-    assert!(counts(owner(), span(10_000), &sums, names(0)).is_none());
+    assert!(counts(owner(), span(10_000), &sums, about(0)).is_none());
 }

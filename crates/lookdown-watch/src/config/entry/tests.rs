@@ -127,7 +127,9 @@ fn unknown_keys_are_refused_with_their_line() {
     let error = error_of("[[cameras]]\nname='a'\nurl='http://c/'\nwidht='1s'");
     assert!(error.starts_with("cameras[0]"), "{error}");
     assert!(error.contains("unknown field `widht`"), "{error}");
-    assert!(error.contains("(line 4)"), "{error}");
+    assert!(error.contains("(line 4): correct"), "{error}");
+    let error = error_of("[[cameras]]\nname='a'\nurl='http://c/'\nfps=5");
+    assert!(error.contains("; use every, the time between"), "{error}");
 }
 
 #[test]
