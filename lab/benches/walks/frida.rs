@@ -69,6 +69,7 @@ impl Site {
             number,
             frames_per_s,
             crossings: [0; 3],
+            halves: Vec::new(),
         })
     }
 

@@ -5,6 +5,7 @@ use crate::{data::Sequence, view::View};
 use lookdown_tracking::{
     Plane,
     lines::{Direction, Line},
+    taught_crossings::ReferenceCrossings,
 };
 use std::collections::BTreeMap;
 
@@ -94,6 +95,20 @@ impl Crossings {
             }
         }
         Self { lines, truth }
+    }
+
+    /// Returns the crossings of both halves of the time for each line.
+    pub fn halves(&self, counted: &[Event], middle_s: f64) -> Vec<[ReferenceCrossings; 2]> {
+        let of = |line: usize, is_later: bool| {
+            let within = |event: &&Event| event.0 == line && (event.2 >= middle_s) == is_later;
+            ReferenceCrossings {
+                given: self.truth.iter().filter(within).count() as u64,
+                counted: counted.iter().filter(within).count() as u64,
+            }
+        };
+        (0..self.lines.len())
+            .map(|line| [of(line, false), of(line, true)])
+            .collect()
     }
 
     /// Returns how many of the counted crossings are right, each by another true one.

@@ -15,6 +15,7 @@ mod view;
 use std::{
     env,
     path::PathBuf,
+    slice,
     sync::{
         Mutex,
         atomic::{AtomicUsize, Ordering},
@@ -23,7 +24,11 @@ use std::{
 };
 
 use anyhow::{Context, Result, bail};
-use lookdown_tracking::{CameraPose, Observation, Tracker, TrackerSettings, lines::LineCounter};
+use lookdown_tracking::{
+    CameraPose, Observation, Tracker, TrackerSettings,
+    lines::LineCounter,
+    taught_crossings::{CrossingRatio, ReferenceCrossings},
+};
 use serde_json::{Value, json};
 
 use data::{Frame, Rectangle, Sequence};
@@ -54,6 +59,8 @@ pub struct Row {
     frames_per_s: f64,
     /// True, counted and right crossings of lines in the frame; none for FRIDA.
     crossings: [usize; 3],
+    /// The crossings of both halves of the time for each line.
+    halves: Vec<[ReferenceCrossings; 2]>,
 }
 
 /// The number of tracks beside that of people, frame by frame.
@@ -148,9 +155,7 @@ pub fn continued(
         let last = track.last_person;
         if track.seen_s == at_s && last.camera == camera {
             continued.push((
-                serde_json::to_value(track.id)?
-                    .as_i64()
-                    .unwrap_or_default(),
+                serde_json::to_value(track.id)?.as_i64().unwrap_or_default(),
                 boxes[last.person],
             ));
         }
@@ -195,6 +200,8 @@ fn follow(
         }
     }
     let right = crossings.matched(&counted, frames_per_s);
+    let frames = quotient(sequence.frames.len(), 1);
+    let middle_s = frames / (2.0 * circle.frames_per_s);
     Ok(Row {
         set,
         name: sequence.name.clone(),
@@ -203,6 +210,7 @@ fn follow(
         number,
         frames_per_s,
         crossings: [crossings.truth.len(), counted.len(), right],
+        halves: crossings.halves(&counted, middle_s),
     })
 }
 
@@ -313,6 +321,36 @@ fn print_sums(rows: &[Row]) {
     }
 }
 
+/// The numbers of crossings in one half of the time with their bars, untaught and taught by the other
+/// half.
+fn print_taught(rows: &[Row]) {
+    for teaches in [false, true] {
+        let (mut lines, mut off, mut held, mut width) = (0, 0.0, 0, 0);
+        for [first, second] in rows.iter().flat_map(|row| &row.halves) {
+            for [told, asked] in [[first, second], [second, first]] {
+                let times = if teaches { slice::from_ref(told) } else { &[] };
+                let number = CrossingRatio::new(times).number(asked.counted);
+                lines += 1;
+                off += (number.persons as f64 - asked.given as f64).abs();
+                held +=
+                    usize::from((number.low as u64..=number.high as u64).contains(&asked.given));
+                width += number.high - number.low;
+            }
+        }
+        let taught = if teaches {
+            "taught by the other half"
+        } else {
+            "untaught"
+        };
+        println!(
+            "crossings of {lines} halves of lines, {taught}: {:.2} off, {:.1} % in the bar, {:.1} wide",
+            off / quotient(lines, 1),
+            100.0 * quotient(held, lines),
+            quotient(width, lines)
+        );
+    }
+}
+
 fn main() -> Result<()> {
     let options = options()?;
     let is_named = |name: &str| {
@@ -348,7 +386,7 @@ fn main() -> Result<()> {
     for segment in &segments {
         jobs.push(Box::new(|| site.follow(segment, options.settings)));
     }
-    let rows = all(&jobs)?;
+    let mut rows = all(&jobs)?;
     if options.is_json {
         for row in &rows {
             println!("{}", row.figures());
@@ -361,6 +399,8 @@ fn main() -> Result<()> {
     println!("{}", "|---".repeat(13) + "|");
     rows.iter().for_each(Row::print);
     print_sums(&rows);
+    rows.retain(|row| row.rate == json!("own"));
+    print_taught(&rows);
     Ok(())
 }
 
