@@ -321,8 +321,8 @@ fn print_sums(rows: &[Row]) {
     }
 }
 
-/// The numbers of crossings in one half of the time with their bars, untaught and taught by the other
-/// half.
+/// The numbers of crossings in one half of the time with their bars, untaught and taught by the
+/// other half.
 fn print_taught(rows: &[Row]) {
     for teaches in [false, true] {
         let (mut lines, mut off, mut held, mut width) = (0, 0.0, 0, 0);
