@@ -96,7 +96,10 @@ pub(super) fn run(arguments: &Arguments, commit: Option<&str>) -> anyhow::Result
     if arguments.check {
         return run_async(THREADS, async {
             let watched = cameras(&source_of_settings, camera, None).load().await?;
-            counting(&source_of_settings, None).load().await?;
+            let counting = counting(&source_of_settings, None).load().await?;
+            if let Some(problem) = counting.options.webhook_problems.first() {
+                bail!("{problem}");
+            }
             serve::check(settings).await?;
             let count = watched.cameras.len();
             writeln!(io::stdout(), "cameras of the settings: {count}").context(UNWRITABLE)

@@ -75,6 +75,8 @@ pub struct CountOptions {
     pub entry: CountEntry,
     /// Receivers of messages.
     pub(crate) webhooks: Vec<Webhook>,
+    /// The reasons why other receivers get none.
+    pub webhook_problems: Vec<String>,
 }
 
 impl CountEntry {
@@ -95,11 +97,18 @@ impl CountEntry {
             return Err(ConfigError::value("counts.listen", &listen, remedy));
         }
         let webhooks = std::mem::take(&mut self.webhooks).into_iter().enumerate();
-        let webhooks = webhooks.map(|(index, entry)| entry.check(&format!("webhooks[{index}].")));
+        let (mut checked, mut webhook_problems) = (Vec::new(), Vec::new());
+        for (index, entry) in webhooks {
+            match entry.check(&format!("webhooks[{index}].")) {
+                Ok(webhook) => checked.push(webhook),
+                Err(problem) => webhook_problems.push(problem.to_string()),
+            }
+        }
         Ok(CountOptions {
             server: self.server.check()?,
             api_key,
-            webhooks: webhooks.collect::<Result<_, _>>()?,
+            webhooks: checked,
+            webhook_problems,
             entry: self,
         })
     }

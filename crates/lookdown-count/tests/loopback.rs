@@ -14,7 +14,8 @@ use events::{CALIBRATION, START_MS, Server, event, person, walks};
 use lookdown_calibration::Calibration;
 use lookdown_common::{HttpClient, ServerClient, ServerEntry};
 use lookdown_count::{
-    CountEntry, PersonsByCamera, Recording, Snapshot, WebhookEntry, count, read_persons,
+    CountEntry, CountOptions, PersonsByCamera, Recording, Snapshot, WebhookEntry, count,
+    read_persons,
 };
 use reqwest::RequestBuilder;
 use serde_json::{Value, json};
@@ -26,6 +27,9 @@ use tokio::{
 
 /// Longest wait for a condition.
 const PATIENCE: Duration = Duration::from_secs(20);
+
+/// The key of a webhook.
+const SECRET: &str = "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw\n";
 
 /// A running companion.
 struct Companion {
@@ -554,7 +558,7 @@ async fn receiver(statuses: &'static [u16]) -> (String, Arc<Mutex<Vec<String>>>)
 async fn crossings_reach_webhooks_signed_and_repeated() {
     let folder = tempfile::tempdir().unwrap();
     let secret = folder.path().join("secret");
-    std::fs::write(&secret, "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw\n").unwrap();
+    std::fs::write(&secret, SECRET).unwrap();
     let (url, requests) = receiver(&[500]).await;
     let walks = walks("hall", 12, 0..0);
     let server = Server::start(walks, Duration::ZERO, CALIBRATION).await;
@@ -601,7 +605,7 @@ async fn crossings_reach_webhooks_signed_and_repeated() {
 async fn condition_that_holds_is_not_repeated_by_a_restart() {
     let folder = tempfile::tempdir().unwrap();
     let secret = folder.path().join("secret");
-    std::fs::write(&secret, "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw\n").unwrap();
+    std::fs::write(&secret, SECRET).unwrap();
     let (url, requests) = receiver(&[]).await;
     // A person stands in the hall for 10 s and is gone for 10 s. The restart is after 5 s.
     let reports = |seconds: i64| {
@@ -674,20 +678,29 @@ fn invalid_settings_name_field_value_and_remedy() {
         },
         ..CountEntry::default()
     };
-    let of_webhook = webhook("http://x", Path::new("/nowhere"), "crossing");
-    for (entry, expected) in [
-        (
-            of_server,
-            "upstream.url: \"ftp://x\" is not a URL of a server",
-        ),
-        (
-            of_webhook,
-            "webhooks[0].secret_file: /nowhere cannot be read",
-        ),
-    ] {
-        let error = entry.check().unwrap_err().to_string();
-        assert!(error.starts_with(expected), "{error}");
-    }
+    let error = of_server.check().unwrap_err().to_string();
+    let expected = "upstream.url: \"ftp://x\" is not a URL of a server";
+    assert!(error.starts_with(expected), "{error}");
+}
+
+#[test]
+fn a_bad_webhook_takes_no_other_one_with_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let secret = folder.path().join("hook.secret");
+    std::fs::write(&secret, SECRET).unwrap();
+    let mut entry = webhook("http://x", Path::new("/nowhere"), "crossing");
+    let good = webhook("http://x", &secret, "crossing");
+    entry.webhooks.extend(good.webhooks.clone());
+    let (both, alone) = (entry.check().unwrap(), good.check().unwrap());
+    let [problem] = &both.webhook_problems[..] else {
+        panic!("{:?}", both.webhook_problems)
+    };
+    assert!(problem.starts_with("webhooks[0].secret_file: /nowhere cannot be read"));
+    let used = CountOptions {
+        webhook_problems: Vec::new(),
+        ..both
+    };
+    assert_eq!(used, alone);
 }
 
 #[test]
