@@ -104,15 +104,7 @@ pub async fn count(
     });
     let (store, resumed) = opened.await.map_err(CountError::StoreTask)??;
     let calibrations = Calibrations::resumed(resumed.calibrations);
-    let in_process = options.server.in_process.as_ref();
-    let milliseconds = |time: Duration| i64::try_from(time.as_millis()).unwrap_or(i64::MAX);
-    let counting = CountingOptions {
-        longest_gap_ms: milliseconds(options.entry.longest_gap),
-        max_cameras: options.entry.max_cameras,
-        floor_alert_after_ms: options.entry.floor_alert_after.map(milliseconds),
-        own: in_process.map_or_else(OwnCameras::default, |server| server.own_cameras.clone()),
-    };
-    let mut counter = Counter::new(counting, resumed.last_event, resumed.totals);
+    let mut counter = Counter::new(limits(options), resumed.last_event, resumed.totals);
     for state in resumed.scenes {
         counter.resume(state, |key| calibrations.definition(key));
     }
@@ -187,6 +179,17 @@ pub async fn count(
         following.abort();
     }
     Ok(())
+}
+
+fn limits(options: &CountOptions) -> CountingOptions {
+    let milliseconds = |time: Duration| i64::try_from(time.as_millis()).unwrap_or(i64::MAX);
+    let in_process = options.server.in_process.as_ref();
+    CountingOptions {
+        longest_gap_ms: milliseconds(options.entry.longest_gap),
+        max_cameras: options.entry.max_cameras,
+        floor_alert_after_ms: options.entry.floor_alert_after.map(milliseconds),
+        own: in_process.map_or_else(OwnCameras::default, |server| server.own_cameras.clone()),
+    }
 }
 
 /// Serves the routes on an address of their own, with the metrics and probes.
