@@ -47,7 +47,7 @@ pub(super) struct Arguments {
 /// The settings of the counts.
 #[derive(Clone, PartialEq)]
 pub(super) struct Counting {
-    options: CountOptions,
+    pub(super) options: CountOptions,
     /// The broker.
     mqtt: Option<CountsOptions>,
 }
