@@ -9,7 +9,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use parking_lot::{Mutex, MutexGuard};
+use parking_lot::Mutex;
 use tokio::sync::oneshot;
 use tokio_util::sync::CancellationToken;
 
@@ -57,6 +57,7 @@ struct Shared {
     queue: FrameQueue<Entry>,
     budget: SharedBudget,
     in_flight: Arc<InFlight>,
+    // The rate holds plain numbers only, so a panic cannot leave it inconsistent.
     rate: Mutex<ServiceRate>,
     metrics: Arc<DetectMetrics>,
 }
@@ -153,7 +154,7 @@ impl WorkerPool {
         let guard = self.shared.in_flight.add(&ticket, permits, Instant::now());
         let _withdrawal = ticket.withdrawn.clone().drop_guard();
         let (answer, waiting) = oneshot::channel();
-        self.shared.rate().began(Instant::now());
+        self.shared.rate.lock().began(Instant::now());
         let entry = Entry {
             ticket: ticket.clone(),
             job: Box::new(|engine| {
@@ -220,7 +221,7 @@ impl WorkerPool {
 
     fn refusal(&self, error: BudgetError, client: &Client) -> PipelineError {
         let capacity = self.shared.budget.total();
-        let retry_after = self.shared.rate().time_for(self.pending());
+        let retry_after = self.shared.rate.lock().time_for(self.pending());
         match error {
             BudgetError::Full => PipelineError::Overloaded {
                 capacity,
@@ -251,14 +252,14 @@ impl Shared {
                 self.metrics.withdrawn_frames.inc();
                 drop(job);
                 guard.end(Instant::now());
-                self.rate().given_up(self.pending());
+                self.rate.lock().given_up(self.pending());
                 continue;
             }
             guard.begin(Instant::now());
             let done = job(&self.engine);
             // A client that sends the next frame after this answer must find the permit free.
             guard.end(Instant::now());
-            self.rate().ended(Instant::now(), self.pending());
+            self.rate.lock().ended(Instant::now(), self.pending());
             if done.withdrawn {
                 self.metrics.withdrawn_frames.inc();
             }
@@ -268,11 +269,6 @@ impl Shared {
 
     fn pending(&self) -> usize {
         self.in_flight.count()
-    }
-
-    fn rate(&self) -> MutexGuard<'_, ServiceRate> {
-        // The rate holds plain numbers only, so a panic cannot leave it inconsistent.
-        self.rate.lock()
     }
 }
 

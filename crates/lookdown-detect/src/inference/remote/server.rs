@@ -14,7 +14,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use parking_lot::{Mutex, MutexGuard};
+use parking_lot::Mutex;
 
 use super::{
     connection::{Connection, Reply},
@@ -251,17 +251,17 @@ struct State {
 
 impl Breaker {
     fn is_open(&self) -> bool {
-        self.state().is_open
+        self.0.lock().is_open
     }
 
     /// Records a response.
     fn succeeded(&self) {
-        self.state().failures = 0;
+        self.0.lock().failures = 0;
     }
 
     /// Records a failure. Returns true if that opens the breaker.
     fn failed(&self) -> bool {
-        let mut state = self.state();
+        let mut state = self.0.lock();
         state.failures = state.failures.saturating_add(1);
         let opens = !state.is_open && state.failures >= FAILURES;
         state.is_open |= opens;
@@ -270,18 +270,13 @@ impl Breaker {
 
     /// Records that the server is ready. Returns true if that closes the breaker.
     fn close(&self) -> bool {
-        let mut state = self.state();
+        let mut state = self.0.lock();
         let closes = state.is_open;
         if closes {
             state.is_open = false;
             state.failures = FAILURES - 1;
         }
         closes
-    }
-
-    fn state(&self) -> MutexGuard<'_, State> {
-        // The state contains only numbers, so a panic cannot leave it inconsistent.
-        self.0.lock()
     }
 }
 
