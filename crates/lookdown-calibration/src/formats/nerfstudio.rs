@@ -36,13 +36,9 @@ const INTRINSICS: [&str; 12] = [
 
 /// The different cameras of the frames, in their order.
 pub(super) fn read(fields: &Fields<'_>) -> Vec<FileCamera> {
-    let frames = fields.map().get("frames").and_then(Value::as_array);
     let mut seen: Vec<Vec<Option<&Value>>> = Vec::new();
     let mut cameras = Vec::new();
-    for index in 0..frames.map_or(0, Vec::len) {
-        let Ok(frame) = fields.entry("frames", index) else {
-            continue;
-        };
+    for frame in fields.entries("frames").flatten() {
         let values = INTRINSICS
             .map(|key| fields.map().get(key).or(frame.map().get(key)))
             .to_vec();
