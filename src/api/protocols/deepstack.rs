@@ -179,7 +179,7 @@ fn status_of(kind: ProblemKind) -> StatusCode {
     match kind {
         ProblemKind::ImageTooLarge => StatusCode::BAD_REQUEST,
         ProblemKind::Timeout => StatusCode::INTERNAL_SERVER_ERROR,
-        kind => match kind.status() {
+        kind => match kind.entry().status {
             StatusCode::UNSUPPORTED_MEDIA_TYPE | StatusCode::UNPROCESSABLE_ENTITY => {
                 StatusCode::BAD_REQUEST
             }
