@@ -16,7 +16,7 @@ mod routes;
 mod state;
 
 use axum::{
-    Extension, Router,
+    Router,
     http::HeaderName,
     middleware::{from_fn, from_fn_with_state, map_response},
     routing::get,
@@ -44,11 +44,7 @@ use self::{
     },
     protocols::{deepstack, open_inference},
     routes::{
-        counts, health,
-        openapi::{self as document, DocumentSource},
-        problems,
-        results::events::LAST_EVENT_ID,
-        web_page,
+        counts, health, openapi as document, problems, results::events::LAST_EVENT_ID, web_page,
     },
 };
 
@@ -154,9 +150,8 @@ fn limited_router(state: ApiState, limiter: Option<RateLimiter>) -> Router {
         .layer(option_layer(csrf))
         .layer(option_layer(limiter));
     // Some clients ask for the metadata with a slash at the end.
-    let description = Router::from(description())
-        .route("/v2/", get(open_inference::describe::server))
-        .layer(Extension(DocumentSource(openapi_document)));
+    let description =
+        Router::from(description()).route("/v2/", get(open_inference::describe::server));
     let clients = Router::from(client_routes()).merge(counts::router());
     let clients = clients.route_layer(guards.clone());
     let deepstack = Router::from(deepstack_routes()).route_layer(guards);

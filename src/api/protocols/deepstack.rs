@@ -231,7 +231,7 @@ impl FromRequest<ApiState> for DeepStackUpload {
         let mut budget = &state.uploads;
         if !is_form || access::shows_key(headers) {
             let context = RequestContext::from_extensions(request.extensions())?;
-            known.check(headers, &context.identity, Scope::Detect)?;
+            known.check(headers, context.holder.as_ref(), None, Scope::Detect)?;
         } else if known.needs_keys() {
             budget = &state.unauthenticated_uploads;
         }
@@ -251,12 +251,8 @@ impl FromRequest<ApiState> for DeepStackUpload {
         }
         drop(keys);
         let key = key.as_ref().map(|(_, key)| key.as_str());
-        let holder = known.check_with(
-            &upload.headers,
-            &upload.context.identity,
-            key,
-            Scope::Detect,
-        )?;
+        let holder = upload.context.holder.as_ref();
+        let holder = known.check(&upload.headers, holder, key, Scope::Detect)?;
         upload.caller = upload.caller.with_holder(known, holder.as_ref());
         Ok(Self { upload, query })
     }

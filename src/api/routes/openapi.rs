@@ -1,16 +1,8 @@
 //! The OpenAPI document of the server.
 
-use axum::{Extension, Json, extract::State};
+use axum::{Json, extract::State};
 
-use utoipa::openapi::OpenApi;
-
-use crate::api::{ApiState, http::problem::Problem, openapi::Document};
-
-/// Builds the OpenAPI document of all routes, with those of the counts if their document is given.
-#[derive(Clone, Copy)]
-pub(in crate::api) struct DocumentSource(
-    pub(in crate::api) fn(Option<OpenApi>) -> serde_json::Result<Document>,
-);
+use crate::api::{ApiState, http::problem::Problem, openapi::Document, openapi_document};
 
 /// Get the OpenAPI document
 ///
@@ -21,9 +13,7 @@ pub(in crate::api) struct DocumentSource(
 )]
 pub(in crate::api) async fn openapi_json(
     State(state): State<ApiState>,
-    Extension(DocumentSource(document)): Extension<DocumentSource>,
 ) -> Result<Json<Document>, Problem> {
-    document(state.options.companions.counts_document())
-        .map(Json)
-        .map_err(Problem::internal)
+    let document = openapi_document(state.options.companions.counts_document());
+    document.map(Json).map_err(Problem::internal)
 }
