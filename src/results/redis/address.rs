@@ -6,13 +6,13 @@ use std::{fmt, io, str::FromStr, time::Duration};
 
 use redis::{
     AsyncConnectionConfig, Client, ConnectionAddr, ProtocolVersion, RedisResult,
-    aio::{AsyncStream, MultiplexedConnection},
+    aio::MultiplexedConnection,
 };
-use tokio::{net::TcpStream, spawn, time::timeout};
+use tokio::{spawn, time::timeout};
 use url::Url;
 
 use super::pushes::{self, Pushes};
-use crate::tls::ClientTls;
+use crate::tls::{ClientTls, Stream, connect};
 
 /// The address and the credentials of a Redis. It is displayed without the credentials.
 #[derive(Clone)]
@@ -138,19 +138,14 @@ impl Connector {
         Ok(connection)
     }
 
-    async fn stream(&self) -> io::Result<Box<dyn AsyncStream + Send + Unpin>> {
+    async fn stream(&self) -> io::Result<Box<dyn Stream>> {
         let (ConnectionAddr::Tcp(host, port) | ConnectionAddr::TcpTls { host, port, .. }) =
             self.address.client().get_connection_info().addr()
         else {
             // No address of this kind can be configured.
             return Err(io::ErrorKind::Unsupported.into());
         };
-        let stream = TcpStream::connect((host.as_str(), *port)).await?;
-        stream.set_nodelay(true)?;
-        Ok(match &self.tls {
-            Some(tls) => Box::new(tls.connect(host, stream).await?),
-            None => Box::new(stream),
-        })
+        connect(host, *port, self.tls.as_ref()).await
     }
 }
 
