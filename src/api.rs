@@ -16,7 +16,8 @@ mod routes;
 mod state;
 
 use axum::{
-    Router,
+    Json, Router,
+    extract::State,
     http::HeaderName,
     middleware::{from_fn, from_fn_with_state, map_response},
     routing::get,
@@ -40,12 +41,11 @@ use self::{
         cors,
         drain_body::{self, BodyLimits},
         envelope::{self, Envelope},
+        problem::Problem,
         rate_limit::{self, RateLimiter},
     },
     protocols::{deepstack, open_inference},
-    routes::{
-        counts, health, openapi as document, problems, results::events::LAST_EVENT_ID, web_page,
-    },
+    routes::{counts, health, problems, results::events::LAST_EVENT_ID, web_page},
 };
 
 pub use self::{
@@ -83,6 +83,18 @@ pub fn openapi_document(counts: Option<OpenApi>) -> serde_json::Result<Document>
     Document::from_document(&openapi::complete(document))
 }
 
+/// Get the OpenAPI document
+///
+/// It has the routes of the counts if this server has counts.
+#[utoipa::path(
+    get, path = "/openapi.json", tag = "operation", operation_id = "get_openapi",
+    responses((status = OK, description = "OpenAPI 3.1.", body = Object))
+)]
+async fn openapi_json(State(state): State<ApiState>) -> Result<Json<Document>, Problem> {
+    let document = openapi_document(state.options.companions.counts_document());
+    document.map(Json).map_err(Problem::internal)
+}
+
 /// The routes of the native API and of the Open Inference Protocol.
 fn client_routes() -> OpenApiRouter<ApiState> {
     OpenApiRouter::with_openapi(<openapi::Common as utoipa::OpenApi>::openapi())
@@ -105,7 +117,7 @@ fn deepstack_routes() -> OpenApiRouter<ApiState> {
 
 fn description() -> OpenApiRouter<ApiState> {
     OpenApiRouter::new()
-        .routes(routes!(document::openapi_json))
+        .routes(routes!(openapi_json))
         .routes(routes!(problems::list_problems))
         .routes(routes!(problems::get_problem))
         .routes(routes!(open_inference::describe::server))

@@ -88,7 +88,7 @@ impl RedisResults {
         question: impl for<'a> AsyncFnOnce(Reader<'a>) -> RedisResult<T>,
     ) -> Result<T, Unreachable> {
         let line = self.shared.link.line()?;
-        let reader = self.shared.reader(&line.connection);
+        let reader = Reader::new(&line.connection, &self.shared.keys);
         let outcome = timeout(TIMEOUT, question(reader)).await;
         let outcome =
             outcome.unwrap_or_else(|_| Err(io::Error::from(io::ErrorKind::TimedOut).into()));

@@ -27,11 +27,18 @@ type Place = (ReportId, String);
 
 /// A connection to Redis, and its keys.
 pub(super) struct Reader<'a> {
-    pub(super) connection: MultiplexedConnection,
-    pub(super) keys: &'a Keys,
+    connection: MultiplexedConnection,
+    keys: &'a Keys,
 }
 
-impl Reader<'_> {
+impl<'a> Reader<'a> {
+    pub(super) fn new(connection: &MultiplexedConnection, keys: &'a Keys) -> Self {
+        Self {
+            connection: connection.clone(),
+            keys,
+        }
+    }
+
     pub(super) async fn latest(&mut self, camera: &str) -> RedisResult<Option<Arc<StoredReport>>> {
         let mut last = cmd("XREVRANGE");
         last.arg(self.keys.camera(camera));

@@ -13,7 +13,7 @@ use lookdown_common::{Backoff, LogOnce, text::one_line};
 use redis::{PushInfo, PushKind, RedisError, RedisResult, Value, aio::MultiplexedConnection, pipe};
 use tokio::time::{Instant, MissedTickBehavior, interval, sleep};
 
-use super::{Shared, message, pushes::Pushes};
+use super::{Shared, message, pushes::Pushes, reading::Reader};
 use crate::results::{Cameras, ReportId};
 
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
@@ -77,7 +77,7 @@ pub(super) async fn keep(shared: Arc<Shared>) {
 async fn open(shared: &Shared) -> RedisResult<Session> {
     let commands = shared.connector.connect().await?;
     Ok(Session {
-        newest: shared.reader(&commands).newest().await?,
+        newest: Reader::new(&commands, &shared.keys).newest().await?,
         news: shared.connector.connect_for_pushes().await?,
         commands,
     })
@@ -181,7 +181,9 @@ impl News<'_> {
             commands.cmd("SSUBSCRIBE").arg(channel).ignore();
         }
         let () = commands.query_async(&mut self.connection).await?;
-        let newest = self.shared.reader(&self.connection).newest().await?;
+        let newest = Reader::new(&self.connection, &self.shared.keys)
+            .newest()
+            .await?;
         for (channel, cameras) in missing {
             self.catch_up(&cameras, newest).await?;
             self.channels.insert(channel, cameras.clone());
@@ -200,7 +202,7 @@ impl News<'_> {
         // A Redis that has lost its data may have a lower ID than this position.
         *position = newest.min(*position);
         let page = NonZeroUsize::new(PAGE).unwrap_or(NonZeroUsize::MIN);
-        let mut reader = self.shared.reader(&self.connection);
+        let mut reader = Reader::new(&self.connection, &self.shared.keys);
         while *position < newest {
             let missed = reader.since(cameras, *position, page).await?;
             for report in &missed {
@@ -217,7 +219,9 @@ impl News<'_> {
     /// Checks that Redis answers, and unsubscribes from channels without listeners. They are kept
     /// until then, as a client that polls comes back soon.
     async fn check(&mut self) -> RedisResult<()> {
-        self.shared.reader(&self.connection).newest().await?;
+        Reader::new(&self.connection, &self.shared.keys)
+            .newest()
+            .await?;
         self.unsubscribe().await?;
         self.subscribe().await
     }

@@ -13,7 +13,7 @@ use lookdown_common::text::one_line;
 use redis::{RedisError, RetryMethod, aio::MultiplexedConnection};
 use tokio::sync::watch;
 
-use super::{RedisAddress, address::Connector, outbox::Outbox, reading::Reader};
+use super::{RedisAddress, address::Connector, outbox::Outbox};
 use crate::{
     metrics::{IntCounter, IntGauge},
     results::{Cameras, Listeners, ResultLimits, Unreachable},
@@ -39,15 +39,6 @@ pub(super) struct Shared {
     pub(super) outbox: Outbox,
     pub(super) listeners: Arc<Listeners>,
     pub(super) stored: IntCounter,
-}
-
-impl Shared {
-    pub(super) fn reader(&self, connection: &MultiplexedConnection) -> Reader<'_> {
-        Reader {
-            connection: connection.clone(),
-            keys: &self.keys,
-        }
-    }
 }
 
 /// The followed channels, by their cameras.
