@@ -202,8 +202,8 @@ impl Camera {
     /// The time of the next change without a report.
     pub(super) fn next_change(&self) -> Option<Instant> {
         let expiry = self.expires_at.filter(|_| self.is_available);
-        let zones = self.zones.iter().filter_map(|zone| zone.occupancy.off_at());
-        let others = expiry.into_iter().chain(self.occupancy.off_at());
+        let zones = self.zones.iter().filter_map(|zone| zone.occupancy.off_at);
+        let others = expiry.into_iter().chain(self.occupancy.off_at);
         zones.chain(others).min()
     }
 

@@ -79,7 +79,7 @@ impl RequestContext {
 
     /// Adds the upload to the trace: the time until the whole body was in memory.
     pub(in crate::api) fn note_upload(&self, arrived: Instant) {
-        let began = self.deadline.began().into_std();
+        let began = self.deadline.began.into_std();
         self.trace.stage("upload", began, arrived);
     }
 }

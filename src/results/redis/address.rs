@@ -18,7 +18,7 @@ use crate::tls::{ClientTls, Stream, connect};
 #[derive(Clone)]
 pub struct RedisAddress {
     url: Url,
-    client: Client,
+    pub(super) client: Client,
 }
 
 /// The text is not an address of a Redis. The text is not repeated, as it may hold a password.
@@ -30,10 +30,6 @@ pub struct RedisAddress {
 pub struct RedisAddressError;
 
 impl RedisAddress {
-    pub(super) fn client(&self) -> &Client {
-        &self.client
-    }
-
     /// The number of the database.
     pub(super) fn database(&self) -> i64 {
         self.client.get_connection_info().redis_settings().db()
@@ -95,7 +91,7 @@ impl Connector {
     /// # Errors
     /// If TLS cannot be used.
     pub(super) fn new(address: RedisAddress) -> anyhow::Result<Self> {
-        let tls = match address.client().get_connection_info().addr() {
+        let tls = match address.client.get_connection_info().addr() {
             ConnectionAddr::TcpTls { .. } => Some(ClientTls::new("results.url", None)?),
             _ => None,
         };
@@ -124,7 +120,7 @@ impl Connector {
         let config = config
             .set_response_timeout(Some(TIMEOUT))
             .set_concurrency_limit(MAX_QUERIES);
-        let login = self.address.client().get_connection_info().redis_settings();
+        let login = self.address.client.get_connection_info().redis_settings();
         let login = login.clone().set_protocol(protocol);
         let opened = async {
             let stream = self.stream().await?;
@@ -140,7 +136,7 @@ impl Connector {
 
     async fn stream(&self) -> io::Result<Box<dyn Stream>> {
         let (ConnectionAddr::Tcp(host, port) | ConnectionAddr::TcpTls { host, port, .. }) =
-            self.address.client().get_connection_info().addr()
+            self.address.client.get_connection_info().addr()
         else {
             // No address of this kind can be configured.
             return Err(io::ErrorKind::Unsupported.into());

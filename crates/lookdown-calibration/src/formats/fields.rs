@@ -10,7 +10,8 @@ use crate::native::NativeImage;
 #[derive(Debug, Clone)]
 pub(super) struct Fields<'a> {
     name: String,
-    map: &'a Map<String, Value>,
+    /// The map of keys to values.
+    pub(super) map: &'a Map<String, Value>,
 }
 
 impl<'a> Fields<'a> {
@@ -37,11 +38,6 @@ impl<'a> Fields<'a> {
     /// A refusal of one field.
     pub(super) fn invalid(&self, key: &str, problem: impl Into<String>) -> FormatError {
         FormatError::invalid(self.name_of(key), problem)
-    }
-
-    /// The map of keys to values.
-    pub(super) fn map(&self) -> &'a Map<String, Value> {
-        self.map
     }
 
     pub(super) fn has(&self, key: &str) -> bool {

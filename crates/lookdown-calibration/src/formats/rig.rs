@@ -15,7 +15,7 @@ const LIST: &str = "cameras";
 
 /// Returns true for a list whose entries have a distortion of their own.
 pub(super) fn is_rig(fields: &Fields<'_>) -> bool {
-    let first = fields.map().get(LIST).and_then(|list| list.get(0));
+    let first = fields.map.get(LIST).and_then(|list| list.get(0));
     let has = |key: &str| first.is_some_and(|entry| entry.get(key).is_some());
     has("distortion_type") || has("camera")
 }

@@ -34,7 +34,8 @@ use super::{
 /// A model in an ONNX file, with the output head of its manifest.
 pub struct OnnxDetector {
     session: Session,
-    description: ModelDescription,
+    /// Description of the model, from its manifest and its ONNX file.
+    pub description: ModelDescription,
     staging: Staging,
     options: OnnxOptions,
 }
@@ -127,11 +128,6 @@ impl OnnxDetector {
         onnx_file::check(&bytes).map_err(unusable(file))?;
         let session = open(environment, library, options, file, &bytes)?;
         Ok(description::tensors(&session))
-    }
-
-    /// Description of the model, from its manifest and its ONNX file.
-    pub fn description(&self) -> &ModelDescription {
-        &self.description
     }
 }
 

@@ -63,7 +63,7 @@ impl PlannedView {
     pub fn grid(&self, lens: &Lens, cells: u32) -> Vec<Option<Pixel>> {
         let place =
             |index: u32, side: u32| f64::from(index) / f64::from(cells) * f64::from(side) - 0.5;
-        let (width, height) = (self.view.width(), self.view.height());
+        let (width, height) = (self.view.width, self.view.height);
         let nodes = (0..=cells).flat_map(|row| (0..=cells).map(move |column| (column, row)));
         let nodes = nodes.map(|(column, row)| {
             let pixel = Pixel::new(place(column, width), place(row, height));
@@ -163,7 +163,7 @@ fn sees(view: &VirtualView, lens: &Lens, counts: impl Fn(Pixel) -> bool) -> bool
         |index: u32, side: u32| f64::from(index) / f64::from(SIGHT_STEPS) * f64::from(side) - 0.5;
     (0..=SIGHT_STEPS).any(|row| {
         (0..=SIGHT_STEPS).any(|column| {
-            let pixel = Pixel::new(place(column, view.width()), place(row, view.height()));
+            let pixel = Pixel::new(place(column, view.width), place(row, view.height));
             let seen = lens.project(&view.ray_in_camera(&pixel));
             seen.is_some_and(&counts)
         })

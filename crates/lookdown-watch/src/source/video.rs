@@ -34,11 +34,11 @@ pub(super) async fn run_stream(
     sink: &Sink<'_>,
 ) -> Result<Infallible, SourceError> {
     loop {
-        let has_viewers = sink.metrics().has_viewers();
+        let has_viewers = sink.metrics.has_viewers();
         let every = (!has_viewers).then(|| camera.every());
         tokio::select! {
             ended = read_stream(camera, url, every, login, sink) => return ended,
-            () = sink.metrics().viewers_changed(has_viewers) => login.restart(),
+            () = sink.metrics.viewers_changed(has_viewers) => login.restart(),
         }
     }
 }
@@ -114,7 +114,7 @@ pub(super) async fn run_file(
     arguments.push("-re".into());
     arguments.extend(file_input(path));
     // A file cannot continue with another rate.
-    if !sink.metrics().has_viewers() {
+    if !sink.metrics.has_viewers() {
         arguments.extend(["-vf", &first_of_each(camera.every())].map(OsString::from));
     }
     arguments.extend(["-fps_mode", "passthrough"].map(OsString::from));
