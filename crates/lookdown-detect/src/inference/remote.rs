@@ -28,7 +28,7 @@ use crate::open_inference::{
     metadata::{ModelMetadata, ServerMetadata, TensorMetadata},
 };
 
-use exchange::{Answer, Question};
+use exchange::Question;
 use server::refusal;
 
 pub use options::{BearerToken, InvalidToken, RemoteOptions};
@@ -113,7 +113,7 @@ fn run(
         outputs: &understood.outputs,
         as_bytes: understood.as_bytes,
     };
-    let Answer { outputs } = server.infer(&understood.name_there, &question)?;
+    let outputs = server.infer(&understood.name_there, &question)?;
     let tensors: Vec<_> = outputs
         .iter()
         .map(|output| TensorView {

@@ -180,7 +180,7 @@ impl ModelRepository {
             text: (self.options.explain)(&cause),
             cause,
         };
-        let model = (self.loader)(path).map_err(refused)?;
+        let mut model = (self.loader)(path).map_err(refused)?;
         if model.name != name {
             return Err(RepositoryError::OtherName {
                 name: name.to_owned(),
@@ -188,7 +188,7 @@ impl ModelRepository {
                 path: path.to_owned(),
             });
         }
-        let model = model.with_files(ModelFiles {
+        model.files = Some(ModelFiles {
             path: path.to_owned(),
             stamp: stamp.clone(),
         });

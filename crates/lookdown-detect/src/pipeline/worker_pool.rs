@@ -98,22 +98,14 @@ impl WorkerPool {
         &self.shared.engine
     }
 
-    /// Queues a frame and waits for its report. Dropping the future withdraws the frame: work that
-    /// has not begun is skipped.
+    /// Queues a frame, waits for its report, and calls `finish` with the result on the worker
+    /// thread, before the permit is released. Slow work such as drawing is thus bounded as well.
+    /// Dropping the future withdraws the frame: work that has not begun is skipped.
     ///
     /// # Errors
     /// [`PipelineError::Overloaded`] at once when the queue is full, [`PipelineError::ShareUsed`]
     /// when the client has too many frames in it, [`PipelineError::ShuttingDown`] after
     /// [`WorkerPool::shut_down`], otherwise the error of the engine.
-    pub async fn detect(&self, job: DetectJob) -> Result<DetectedFrame, PipelineError> {
-        self.detect_and(job, |detected| detected).await
-    }
-
-    /// Detects like [`WorkerPool::detect`], then calls `finish` with the result on the worker
-    /// thread, before the permit is released. Slow work such as drawing is thus bounded as well.
-    ///
-    /// # Errors
-    /// The same as [`WorkerPool::detect`].
     pub async fn detect_and<T: Send + 'static>(
         &self,
         job: DetectJob,
@@ -131,7 +123,7 @@ impl WorkerPool {
     /// the token passed to the work so that long work can stop.
     ///
     /// # Errors
-    /// The same as [`WorkerPool::detect`].
+    /// The same as [`WorkerPool::detect_and`].
     pub async fn run<T: Send + 'static>(
         &self,
         ticket: Ticket,
@@ -189,7 +181,7 @@ impl WorkerPool {
 
     /// Returns the number of frames queued or in progress.
     pub fn pending(&self) -> usize {
-        self.shared.pending()
+        self.shared.in_flight.count()
     }
 
     /// Returns the stall of the pool: there is work, and for at least `limit` none has progressed.
@@ -252,23 +244,21 @@ impl Shared {
                 self.metrics.withdrawn_frames.inc();
                 drop(job);
                 guard.end(Instant::now());
-                self.rate.lock().given_up(self.pending());
+                self.rate.lock().given_up(self.in_flight.count());
                 continue;
             }
             guard.begin(Instant::now());
             let done = job(&self.engine);
             // A client that sends the next frame after this answer must find the permit free.
             guard.end(Instant::now());
-            self.rate.lock().ended(Instant::now(), self.pending());
+            self.rate
+                .lock()
+                .ended(Instant::now(), self.in_flight.count());
             if done.withdrawn {
                 self.metrics.withdrawn_frames.inc();
             }
             (done.deliver)();
         }
-    }
-
-    fn pending(&self) -> usize {
-        self.in_flight.count()
     }
 }
 

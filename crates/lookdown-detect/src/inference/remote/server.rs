@@ -18,7 +18,7 @@ use parking_lot::Mutex;
 
 use super::{
     connection::{Connection, Reply},
-    exchange::{Answer, Question},
+    exchange::{Output, Question},
     options::RemoteOptions,
 };
 use crate::{
@@ -122,7 +122,7 @@ impl RemoteServer {
         &self,
         model: &str,
         question: &Question<'_>,
-    ) -> Result<Answer, InferenceError> {
+    ) -> Result<Vec<Output>, InferenceError> {
         if self.breaker.is_open() {
             self.count("not_sent");
             return Err(self.unavailable(
@@ -140,7 +140,7 @@ impl RemoteServer {
         self.in_flight.fetch_sub(1, Ordering::Relaxed);
         let wait = |reply: &Reply| reply.retry_after.unwrap_or(RETRY_AFTER);
         let answer = reply.and_then(|reply| match reply.status {
-            200 => Answer::read(&reply.into_message()).map(Ok),
+            200 => Output::all(&reply.into_message()).map(Ok),
             429 => Ok(Err(wait(&reply))),
             503 if self.ready().is_ok() => Ok(Err(wait(&reply))),
             _ => Err(refusal(&reply)),
