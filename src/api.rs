@@ -23,11 +23,7 @@ use axum::{
     routing::get,
 };
 use lookdown_detect::open_inference::HEAD_LENGTH;
-use lookdown_http::{
-    csrf,
-    header_limits::{self, HeaderLimits},
-    host, page_headers,
-};
+use lookdown_http::{csrf, header_limits, host, page_headers};
 use tower::{ServiceBuilder, util::option_layer};
 use tower_http::catch_panic::CatchPanicLayer;
 use utoipa::openapi::OpenApi;
@@ -211,10 +207,6 @@ fn with_common_layers(router: Router<ApiState>, state: ApiState) -> Router {
         max_body_bytes: settings.server.max_body_bytes,
         min_upload_bytes_per_second: settings.limits.min_upload_bytes_per_second,
     };
-    let header_limits = HeaderLimits {
-        max_headers: settings.connections.max_headers,
-        max_header_bytes: settings.connections.max_header_bytes,
-    };
     let head_length = HeaderName::from_static(HEAD_LENGTH);
     let sent = [LAST_EVENT_ID, head_length.clone()];
     let read = [SERVER_TIMING, PERSON_COUNT, head_length];
@@ -231,7 +223,7 @@ fn with_common_layers(router: Router<ApiState>, state: ApiState) -> Router {
         .layer(CatchPanicLayer::custom(envelope::panic_response))
         .layer(from_fn_with_state(body_limits, drain_body::discard))
         .layer(from_fn_with_state(
-            header_limits,
+            settings.connections.clone(),
             header_limits::within_bounds,
         ))
         .layer(from_fn(host::require))
