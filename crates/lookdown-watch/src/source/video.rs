@@ -134,7 +134,7 @@ fn first_of_each(every: Duration) -> String {
 
 /// The playlist with the URL of the relay and its options (`ffmpeg-formats`, concat).
 fn script(camera: &Camera, url: &str) -> String {
-    let transport = camera.video.transport.name();
+    let transport: &str = camera.video.transport.into();
     let mut script =
         format!("ffconcat version 1.0\nfile '{url}'\noption rtsp_transport {transport}\n");
     // Microseconds.
