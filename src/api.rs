@@ -16,17 +16,14 @@ mod routes;
 mod state;
 
 use axum::{
-    Extension, Router,
+    Json, Router,
+    extract::State,
     http::HeaderName,
     middleware::{from_fn, from_fn_with_state, map_response},
     routing::get,
 };
 use lookdown_detect::open_inference::HEAD_LENGTH;
-use lookdown_http::{
-    csrf,
-    header_limits::{self, HeaderLimits},
-    host, page_headers,
-};
+use lookdown_http::{csrf, header_limits, host, page_headers};
 use tower::{ServiceBuilder, util::option_layer};
 use tower_http::catch_panic::CatchPanicLayer;
 use utoipa::openapi::OpenApi;
@@ -40,16 +37,11 @@ use self::{
         cors,
         drain_body::{self, BodyLimits},
         envelope::{self, Envelope},
+        problem::Problem,
         rate_limit::{self, RateLimiter},
     },
     protocols::{deepstack, open_inference},
-    routes::{
-        counts, health,
-        openapi::{self as document, DocumentSource},
-        problems,
-        results::events::LAST_EVENT_ID,
-        web_page,
-    },
+    routes::{counts, health, problems, results::events::LAST_EVENT_ID, web_page},
 };
 
 pub use self::{
@@ -87,6 +79,18 @@ pub fn openapi_document(counts: Option<OpenApi>) -> serde_json::Result<Document>
     Document::from_document(&openapi::complete(document))
 }
 
+/// Get the OpenAPI document
+///
+/// It has the routes of the counts if this server has counts.
+#[utoipa::path(
+    get, path = "/openapi.json", tag = "operation", operation_id = "get_openapi",
+    responses((status = OK, description = "OpenAPI 3.1.", body = Object))
+)]
+async fn openapi_json(State(state): State<ApiState>) -> Result<Json<Document>, Problem> {
+    let document = openapi_document(state.options.companions.counts_document());
+    document.map(Json).map_err(Problem::internal)
+}
+
 /// The routes of the native API and of the Open Inference Protocol.
 fn client_routes() -> OpenApiRouter<ApiState> {
     OpenApiRouter::with_openapi(<openapi::Common as utoipa::OpenApi>::openapi())
@@ -109,7 +113,7 @@ fn deepstack_routes() -> OpenApiRouter<ApiState> {
 
 fn description() -> OpenApiRouter<ApiState> {
     OpenApiRouter::new()
-        .routes(routes!(document::openapi_json))
+        .routes(routes!(openapi_json))
         .routes(routes!(problems::list_problems))
         .routes(routes!(problems::get_problem))
         .routes(routes!(open_inference::describe::server))
@@ -154,9 +158,8 @@ fn limited_router(state: ApiState, limiter: Option<RateLimiter>) -> Router {
         .layer(option_layer(csrf))
         .layer(option_layer(limiter));
     // Some clients ask for the metadata with a slash at the end.
-    let description = Router::from(description())
-        .route("/v2/", get(open_inference::describe::server))
-        .layer(Extension(DocumentSource(openapi_document)));
+    let description =
+        Router::from(description()).route("/v2/", get(open_inference::describe::server));
     let clients = Router::from(client_routes()).merge(counts::router());
     let clients = clients.route_layer(guards.clone());
     let deepstack = Router::from(deepstack_routes()).route_layer(guards);
@@ -204,10 +207,6 @@ fn with_common_layers(router: Router<ApiState>, state: ApiState) -> Router {
         max_body_bytes: settings.server.max_body_bytes,
         min_upload_bytes_per_second: settings.limits.min_upload_bytes_per_second,
     };
-    let header_limits = HeaderLimits {
-        max_headers: settings.connections.max_headers,
-        max_header_bytes: settings.connections.max_header_bytes,
-    };
     let head_length = HeaderName::from_static(HEAD_LENGTH);
     let sent = [LAST_EVENT_ID, head_length.clone()];
     let read = [SERVER_TIMING, PERSON_COUNT, head_length];
@@ -224,7 +223,7 @@ fn with_common_layers(router: Router<ApiState>, state: ApiState) -> Router {
         .layer(CatchPanicLayer::custom(envelope::panic_response))
         .layer(from_fn_with_state(body_limits, drain_body::discard))
         .layer(from_fn_with_state(
-            header_limits,
+            settings.connections.clone(),
             header_limits::within_bounds,
         ))
         .layer(from_fn(host::require))

@@ -24,7 +24,7 @@ use crate::metrics::Metrics;
 use files::TlsFiles;
 use identity::Identity;
 
-pub use client::ClientTls;
+pub use client::{ClientTls, Stream, connect};
 pub use files::TlsOptions;
 
 /// The current certificate and private key.

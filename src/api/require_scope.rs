@@ -12,7 +12,7 @@ use lookdown_http::keys::basic_password;
 
 use super::{
     ApiState,
-    http::{access::Identity, context::RequestContext, problem::Problem},
+    http::{context::RequestContext, problem::Problem},
 };
 use crate::access::{Holder, Scope};
 
@@ -33,63 +33,53 @@ pub(super) type RequireView = RequireScope<View>;
 pub(super) trait RequiredScope {
     /// The scope of the key.
     const SCOPE: Scope;
-    /// `true` if a server without keys allows the request on its own machine only.
-    const OWN_MACHINE_ONLY: bool;
 }
 
-/// Declares the required scopes: a name, its [`Scope`] and `OWN_MACHINE_ONLY`.
+/// Declares the required scopes.
 macro_rules! required_scopes {
-    ($($name:ident = $scope:ident, $own_machine_only:literal;)+) => {$(
+    ($($name:ident)+) => {$(
         #[doc = concat!("The marker of [`Require", stringify!($name), "`].")]
         pub(super) struct $name;
 
         impl RequiredScope for $name {
-            const SCOPE: Scope = Scope::$scope;
-            const OWN_MACHINE_ONLY: bool = $own_machine_only;
+            const SCOPE: Scope = Scope::$name;
         }
     )+};
 }
 
-required_scopes! {
-    Detect = Detect, false;
-    Read = Read, false;
-    Admin = Admin, true;
-    View = View, false;
-}
+required_scopes! { Detect Read Admin View }
 
 impl<S: RequiredScope> RequireScope<S> {
-    fn check(state: &ApiState, headers: &HeaderMap, identity: &Identity) -> Result<Self, Problem> {
+    fn check(
+        state: &ApiState,
+        headers: &HeaderMap,
+        holder: Option<&Holder>,
+    ) -> Result<Self, Problem> {
         let access = &state.options.access;
-        if S::OWN_MACHINE_ONLY {
-            access.check_of_its_own(headers, identity, S::SCOPE)?;
-        } else {
-            access.check(headers, identity, S::SCOPE)?;
-        }
+        access.check(headers, holder, None, S::SCOPE)?;
         Ok(Self(PhantomData))
     }
 
     /// Checks the scope of a request whose key may also be the password of Basic authentication, or
-    /// `in_query`. Returns the holder of such a key.
+    /// `in_query`, but for the scope `admin`. Returns the holder of such a key.
     pub(super) fn with_key(
         state: &ApiState,
         headers: &HeaderMap,
         in_query: Option<&str>,
     ) -> Result<(Self, Option<Holder>), Problem> {
         let access = &state.options.access;
-        let identity = access.identify(headers);
+        let holder = access.identify(headers);
         let password = basic_password(headers);
-        if S::OWN_MACHINE_ONLY {
-            access.check_of_its_own(headers, &identity, S::SCOPE)?;
-            return Ok((Self(PhantomData), None));
-        }
         let elsewhere = in_query.or(password.as_deref());
-        let holder = access.check_with(headers, &identity, elsewhere, S::SCOPE)?;
+        let elsewhere = elsewhere.filter(|_| S::SCOPE != Scope::Admin);
+        let holder = access.check(headers, holder.as_ref(), elsewhere, S::SCOPE)?;
         Ok((Self(PhantomData), holder))
     }
 
     /// Checks the scope of a stream again: its key may have been removed.
     pub(super) fn check_again(state: &ApiState, headers: &HeaderMap) -> Result<Self, Problem> {
-        Self::check(state, headers, &state.options.access.identify(headers))
+        let holder = state.options.access.identify(headers);
+        Self::check(state, headers, holder.as_ref())
     }
 }
 
@@ -98,6 +88,6 @@ impl<S: RequiredScope> FromRequestParts<ApiState> for RequireScope<S> {
 
     async fn from_request_parts(parts: &mut Parts, state: &ApiState) -> Result<Self, Problem> {
         let context = RequestContext::from_extensions(&parts.extensions)?;
-        Self::check(state, &parts.headers, &context.identity)
+        Self::check(state, &parts.headers, context.holder.as_ref())
     }
 }

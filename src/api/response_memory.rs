@@ -6,7 +6,7 @@ use axum::{
     body::{Body, HttpBody, to_bytes},
     extract::{Request, State},
     middleware::Next,
-    response::{IntoResponse, Response},
+    response::Response,
 };
 use lookdown_detect::fairness::{BudgetError, Client};
 
@@ -25,17 +25,18 @@ use super::{
 const SMALL: u64 = 64 << 10;
 
 /// Makes a large response take a share of the budget, or refuses it with 429.
-pub(super) async fn bound(State(state): State<ApiState>, request: Request, next: Next) -> Response {
-    let context = match RequestContext::from_extensions(request.extensions()) {
-        Ok(context) => context,
-        Err(problem) => return problem.into_response(),
-    };
+pub(super) async fn bound(
+    State(state): State<ApiState>,
+    request: Request,
+    next: Next,
+) -> Result<Response, Problem> {
+    let context = RequestContext::from_extensions(request.extensions())?;
     let caller = &context.caller;
     let response = next.run(request).await;
     let size = response.body().size_hint().exact();
     let Some(size) = size.filter(|size| *size > SMALL) else {
         // Streams hold at most a few reports each.
-        return response;
+        return Ok(response);
     };
     // A response larger than a share takes all of it.
     let size = usize::try_from(size).unwrap_or(usize::MAX);
@@ -44,18 +45,12 @@ pub(super) async fn bound(State(state): State<ApiState>, request: Request, next:
         _ => state.responses.share(),
     };
     let amount = size.min(largest);
-    let share = match state.responses.take(&caller.client, amount) {
-        Ok(share) => share,
-        Err(error) => return refusal(caller, error).into_response(),
-    };
+    let share = state.responses.take(&caller.client, amount);
+    let share = share.map_err(|error| refusal(caller, error))?;
     let (parts, body) = response.into_parts();
-    match to_bytes(body, size).await {
-        Ok(held) => {
-            let held = Held::new(held, share).into_bytes();
-            Response::from_parts(parts, Body::from(held))
-        }
-        Err(error) => Problem::internal(error).into_response(),
-    }
+    let held = to_bytes(body, size).await.map_err(Problem::internal)?;
+    let held = Held::new(held, share).into_bytes();
+    Ok(Response::from_parts(parts, Body::from(held)))
 }
 
 fn refusal(caller: &Caller, error: BudgetError) -> Problem {

@@ -6,7 +6,6 @@ pub(super) mod cameras;
 pub(super) mod counts;
 mod found_lens;
 pub(super) mod health;
-pub(super) mod openapi;
 pub(super) mod problems;
 pub(super) mod results;
 pub(super) mod web_page;

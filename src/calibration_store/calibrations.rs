@@ -22,7 +22,7 @@ use lookdown_detect::{
     metrics::start_at_zero,
     pipeline::{CalibrationLookup, UnusableCalibration},
 };
-use parking_lot::{Mutex, MutexGuard, RwLock};
+use parking_lot::{Mutex, RwLock};
 
 use super::{CalibrationStore, ListedFile, Replaces, StoreError};
 use crate::metrics::Metrics;
@@ -45,6 +45,7 @@ pub struct Calibrations {
     is_read: AtomicBool,
     now: RwLock<Arc<Snapshot>>,
     /// Held while the store is read or changed: one at a time.
+    // Guards no data that a panic could leave half changed.
     changing: Mutex<()>,
     metrics: Arc<Metrics>,
 }
@@ -62,7 +63,7 @@ impl Calibrations {
         metrics: Arc<Metrics>,
     ) -> Result<Self, StoreError> {
         let calibrations = Self::unread(store, writable, metrics);
-        calibrations.scan(&calibrations.lock())?;
+        calibrations.scan(&calibrations.changing.lock())?;
         calibrations.is_read.store(true, Ordering::Relaxed);
         Ok(calibrations)
     }
@@ -83,7 +84,7 @@ impl Calibrations {
         let (done, outcome) = sync_channel(0);
         let reading = Arc::clone(&calibrations);
         let read = move || {
-            let changing = reading.lock();
+            let changing = reading.changing.lock();
             let outcome = reading.scan(&changing);
             if let Err(Err(error)) = done.send(outcome).map_err(|unsent| unsent.0) {
                 reading.keep_all(&error);
@@ -151,11 +152,6 @@ impl Calibrations {
         *self.now.write() = Arc::new(snapshot);
     }
 
-    fn lock(&self) -> MutexGuard<'_, ()> {
-        // Guards no data that a panic could leave half changed.
-        self.changing.lock()
-    }
-
     /// Reads `content` as the calibration `id`, by the rules of [`Calibrations::put`]; nothing is
     /// stored.
     ///
@@ -187,7 +183,7 @@ impl Calibrations {
         }
         let name = written_name(id);
         let (entry, written) = import(id, &name, content, reading)?;
-        let changing = self.lock();
+        let changing = self.changing.lock();
         // What others have stored since the last look counts, too.
         self.scan(&changing)?;
         let before = self.now();
@@ -224,7 +220,7 @@ impl Calibrations {
         if !self.writable {
             return Err(ChangeError::NotWritable);
         }
-        let changing = self.lock();
+        let changing = self.changing.lock();
         self.scan(&changing)?;
         let before = self.now();
         let entry = before.entry(id);

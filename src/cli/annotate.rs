@@ -1,18 +1,55 @@
 //! `--annotate`: the persons of a report, drawn into their image.
 
-use std::{fs, path::Path};
+use std::{fs, path::Path, time::Duration};
 
 use anyhow::{Context, bail};
 use lookdown_detect::pipeline::DetectedFrame;
+use lookdown_watch::{VideoOptions, VideoWriter};
+use tokio::runtime::Runtime;
 
 use crate::annotated_image::{AnnotationOptions, ImageFormat, annotated_image};
 
-/// Draws the persons, and returns a JPEG.
-pub(super) fn jpeg(
-    detected: DetectedFrame,
-    options: &AnnotationOptions,
-) -> anyhow::Result<Vec<u8>> {
-    Ok(annotated_image(detected, ImageFormat::Jpeg, options)?)
+/// A video into which the persons are drawn.
+pub(super) struct AnnotatedVideo<'a> {
+    writer: VideoWriter,
+    path: &'a Path,
+}
+
+impl<'a> AnnotatedVideo<'a> {
+    /// Starts a video with an interval of its frames.
+    ///
+    /// # Errors
+    /// If `ffmpeg` is missing.
+    pub(super) fn create(path: &'a Path, every: Duration, on: &Runtime) -> anyhow::Result<Self> {
+        let _entered = on.enter();
+        let writer = VideoWriter::create(path, every, &VideoOptions::default());
+        let writer = writer.with_context(|| unwritable(path))?;
+        Ok(Self { writer, path })
+    }
+
+    /// Draws the persons of a frame and appends it.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub(super) fn append(
+        &mut self,
+        detected: DetectedFrame,
+        options: &AnnotationOptions,
+        on: &Runtime,
+    ) -> anyhow::Result<()> {
+        let jpeg = annotated_image(detected, ImageFormat::Jpeg, options)?;
+        let written = on.block_on(self.writer.write(&jpeg));
+        written.with_context(|| unwritable(self.path))
+    }
+
+    /// Completes the video.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub(super) fn finish(self, on: &Runtime) -> anyhow::Result<()> {
+        let finished = on.block_on(self.writer.finish());
+        finished.with_context(|| unwritable(self.path))
+    }
 }
 
 /// Returns the format that the name of an image file ends with.
@@ -38,6 +75,9 @@ pub(super) fn write(
     path: &Path,
 ) -> anyhow::Result<()> {
     let image = annotated_image(detected, format_of(path)?, options)?;
-    fs::write(path, image)
-        .with_context(|| format!("--annotate: {} cannot be written", path.display()))
+    fs::write(path, image).with_context(|| unwritable(path))
+}
+
+fn unwritable(path: &Path) -> String {
+    format!("--annotate: {} cannot be written", path.display())
 }

@@ -28,7 +28,8 @@ use lookdown_detect::{
 use strum::VariantArray;
 
 use super::{
-    SettingsFile, annotate,
+    SettingsFile,
+    annotate::{self, AnnotatedVideo},
     output::{UNWRITABLE, with_causes},
     parameters::{AnnotationFlags, ParameterFlags},
     progress::Progress,
@@ -164,7 +165,9 @@ fn run_stream(arguments: &Arguments, stream: &Stream) -> anyhow::Result<ExitCode
     let engine = engine_for(&settings, std::slice::from_ref(&parameters))?;
     let mut reader = StreamReader::open(stream, arguments.every)?;
     let mut video = match &arguments.annotate {
-        Some(path) if is_video => Some((reader.writer(path)?, path)),
+        Some(path) if is_video => {
+            Some(AnnotatedVideo::create(path, reader.every, &reader.runtime)?)
+        }
         _ => None,
     };
     let mut code = ExitCode::SUCCESS;
@@ -183,10 +186,7 @@ fn run_stream(arguments: &Arguments, stream: &Stream) -> anyhow::Result<ExitCode
             Ok(detected) => {
                 print(&detected)?;
                 match (&mut video, &arguments.annotate) {
-                    (Some((writer, path)), _) => {
-                        let jpeg = annotate::jpeg(detected, &options)?;
-                        reader.write(writer, path, &jpeg)?;
-                    }
+                    (Some(video), _) => video.append(detected, &options, &reader.runtime)?,
                     (None, Some(_)) if frames > 1 => {
                         bail!(
                             "--annotate: standard input has several images: give one, or a video"
@@ -208,8 +208,8 @@ fn run_stream(arguments: &Arguments, stream: &Stream) -> anyhow::Result<ExitCode
     if frames == 0 {
         bail!("there is no image: give a JPEG, PNG or WebP image, or a video");
     }
-    if let Some((writer, path)) = video {
-        reader.finish(writer, path)?;
+    if let Some(video) = video {
+        video.finish(&reader.runtime)?;
     }
     reader.end();
     Ok(code)

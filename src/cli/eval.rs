@@ -56,8 +56,8 @@ fn detect_groups(arguments: &Arguments, output: &mut Output) -> anyhow::Result<(
     let groups = parameter_groups(arguments)?;
     let settings = arguments.settings_file.load()?;
     let data_set = arguments.truth.open(&settings)?;
-    let engine = engine_for(&settings, &groups.concat())?;
-    let engine = engine.with_plan_turn(f64::from(arguments.turn_deg).to_radians());
+    let mut engine = engine_for(&settings, &groups.concat())?;
+    engine.plan_turn = f64::from(arguments.turn_deg).to_radians();
     for group in groups {
         let name = group.first().map_or("", |first| first.profile.name());
         let progress = Progress::start(name, data_set.images.len());

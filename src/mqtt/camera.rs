@@ -202,8 +202,8 @@ impl Camera {
     /// The time of the next change without a report.
     pub(super) fn next_change(&self) -> Option<Instant> {
         let expiry = self.expires_at.filter(|_| self.is_available);
-        let zones = self.zones.iter().filter_map(|zone| zone.occupancy.off_at());
-        let others = expiry.into_iter().chain(self.occupancy.off_at());
+        let zones = self.zones.iter().filter_map(|zone| zone.occupancy.off_at);
+        let others = expiry.into_iter().chain(self.occupancy.off_at);
         zones.chain(others).min()
     }
 
@@ -256,8 +256,11 @@ impl Camera {
         let camera = self.name.as_str();
         let count = |topic, persons: usize| Message::retained(topic, persons.to_string());
         let mut messages = vec![
-            count(topics.persons(camera), self.number.persons),
-            count(topics.frame_persons(camera), self.frame_persons),
+            count(topics.of_camera(camera, "persons"), self.number.persons),
+            count(
+                topics.of_camera(camera, "frame_persons"),
+                self.frame_persons,
+            ),
             self.occupancy_message(topics),
         ];
         for zone in &self.zones {
@@ -281,16 +284,22 @@ impl Camera {
             "calibration": calibration, "model": model, "profile": profile,
             "persons_low": low, "persons_high": high,
         });
-        Message::retained(topics.attributes(&self.name), attributes.to_string())
+        Message::retained(
+            topics.of_camera(&self.name, "attributes"),
+            attributes.to_string(),
+        )
     }
 
     pub(super) fn availability(&self, topics: &Topics) -> Message {
         let status = if self.is_available { ONLINE } else { OFFLINE };
-        Message::retained(topics.availability(&self.name), status)
+        Message::retained(topics.of_camera(&self.name, "availability"), status)
     }
 
     fn occupancy_message(&self, topics: &Topics) -> Message {
-        Message::retained(topics.occupancy(&self.name), self.occupancy.payload())
+        Message::retained(
+            topics.of_camera(&self.name, "occupancy"),
+            self.occupancy.payload(),
+        )
     }
 
     /// The messages that remove it from the broker and from Home Assistant.

@@ -16,7 +16,7 @@ use super::{
     images::CameraImage,
     retained::{RetainedTopics, part_withdrawal, withdrawal},
     session::Message,
-    topics::{CameraTopic, Topics, level},
+    topics::{Topics, is_part, level},
 };
 use crate::{results::StoredReport, views::Views};
 
@@ -111,7 +111,7 @@ impl Cameras {
         }
         messages.extend(camera.state(topics));
         let json = report.json.clone();
-        messages.push(Message::passing(topics.report(name), json));
+        messages.push(Message::passing(topics.of_camera(name, "report"), json));
         messages
     }
 
@@ -133,7 +133,7 @@ impl Cameras {
         let camera = &image.camera;
         let topic = match &image.view {
             Some(view) => self.topics.view_image(camera, view),
-            None => self.topics.image(camera),
+            None => self.topics.of_camera(camera, "image"),
         };
         let is_known = self.known.contains_key(&level(camera));
         is_known.then(|| Message::passing(topic, image.jpeg))
@@ -212,24 +212,27 @@ impl Cameras {
         payload: &[u8],
         is_retained: bool,
     ) -> Option<Message> {
-        let topic = self.topics.camera_topic(topic)?;
+        let (level, rest) = self.topics.camera_topic(topic)?;
         // The echo of a message that removes a topic.
         if payload.is_empty() {
             return None;
         }
-        let known = self.known.get(topic.camera());
+        let known = self.known.get(level);
         if is_retained {
             // Without a time, the withdrawal of this connection is over.
             self.withdraw_at?;
-            let is_new = self.retained.note(topic.camera(), topic.part());
-            let offline = || Message::retained(self.topics.availability(topic.camera()), OFFLINE);
+            let is_new = self
+                .retained
+                .note(level, Some(rest).filter(|rest| is_part(rest)));
+            let offline =
+                || Message::retained(self.topics.of_camera(level, "availability"), OFFLINE);
             return (is_new && known.is_none()).then(offline);
         }
-        match (topic, known) {
+        match (rest, known) {
             // Another server has this camera.
-            (CameraTopic::Persons { camera }, None) => self.retained.keep(camera),
+            ("persons", None) => self.retained.keep(level),
             // Another server does not have it.
-            (CameraTopic::Availability { .. }, Some(camera))
+            ("availability", Some(camera))
                 if camera.is_available && payload == OFFLINE.as_bytes() =>
             {
                 return Some(camera.availability(&self.topics));

@@ -48,9 +48,9 @@ impl Discovery {
         views: impl IntoIterator<Item = &'a str>,
     ) -> Vec<Message> {
         let of_camera = [
-            occupancy("Occupancy", None, &topics.occupancy(camera)),
-            persons("Persons", None, &topics.persons(camera)),
-            frame_persons(&topics.frame_persons(camera)),
+            occupancy("Occupancy", None, &topics.of_camera(camera, "occupancy")),
+            persons("Persons", None, &topics.of_camera(camera, "persons")),
+            frame_persons(&topics.of_camera(camera, "frame_persons")),
         ];
         let zones = zones.into_iter().flat_map(|zone| {
             let name = |what: &str| format!("{what} in {zone}");
@@ -67,7 +67,7 @@ impl Discovery {
         let all = of_camera.into_iter().chain(image).chain(zones);
         all.chain(views)
             .filter_map(|(component, entity, config)| {
-                let availability = [topics.status(), topics.availability(camera)];
+                let availability = [topics.status(), topics.of_camera(camera, "availability")];
                 let mut config = self.completed(config, topics, camera);
                 // Images have no such field.
                 let is_image = [IMAGE, CAMERA].contains(&component);
@@ -85,7 +85,7 @@ impl Discovery {
     pub(super) fn switch(&self, topics: &Topics, camera: &str) -> Option<Message> {
         let config = json!({
             "name": "Detection",
-            "state_topic": topics.detection(camera),
+            "state_topic": topics.of_camera(camera, "detection"),
             "command_topic": topics.detection_command(camera),
             "payload_on": ON,
             "payload_off": OFF,
@@ -105,7 +105,7 @@ impl Discovery {
 
     /// Adds the fields that all entities of a camera have in common.
     fn completed(&self, mut config: Value, topics: &Topics, camera: &str) -> Value {
-        config["json_attributes_topic"] = json!(topics.attributes(camera));
+        config["json_attributes_topic"] = json!(topics.of_camera(camera, "attributes"));
         config["device"]["model"] = json!("Ceiling fisheye camera");
         if let Some(url) = &self.configuration_url {
             config["device"]["configuration_url"] = json!(url.as_str());
@@ -187,7 +187,7 @@ fn frame_persons(state_topic: &str) -> Entity {
 fn image(topics: &Topics, camera: &str) -> Entity {
     let config = json!({
         "name": "Latest image",
-        "image_topic": topics.image(camera),
+        "image_topic": topics.of_camera(camera, "image"),
         "content_type": "image/jpeg",
     });
     (IMAGE, IMAGE.to_owned(), config)

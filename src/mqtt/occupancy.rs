@@ -14,7 +14,7 @@ pub(super) const OFF: &str = "OFF";
 pub(super) struct Occupancy {
     is_on: bool,
     /// The time at which it becomes off, unless a person is reported before.
-    off_at: Option<Instant>,
+    pub(super) off_at: Option<Instant>,
 }
 
 impl Occupancy {
@@ -37,11 +37,6 @@ impl Occupancy {
         is_over
     }
 
-    /// The time at which the hold ends.
-    pub(super) fn off_at(self) -> Option<Instant> {
-        self.off_at
-    }
-
     /// The payload of its topic.
     pub(super) fn payload(self) -> &'static str {
         if self.is_on { ON } else { OFF }
@@ -59,18 +54,18 @@ mod tests {
         let (begin, mut occupancy) = (Instant::now(), Occupancy::default());
         let after = |seconds| begin + Duration::from_secs(seconds);
         occupancy.update(0, begin, HOLD);
-        assert_eq!((occupancy.payload(), occupancy.off_at()), (OFF, None));
+        assert_eq!((occupancy.payload(), occupancy.off_at), (OFF, None));
         occupancy.update(2, after(1), HOLD);
         occupancy.update(0, after(2), HOLD);
         occupancy.update(0, after(4), HOLD);
         assert_eq!(occupancy.payload(), ON);
-        assert_eq!(occupancy.off_at(), Some(after(7)));
+        assert_eq!(occupancy.off_at, Some(after(7)));
         assert!(!occupancy.expire(after(6)));
         occupancy.update(1, after(6), HOLD);
-        assert_eq!((occupancy.payload(), occupancy.off_at()), (ON, None));
+        assert_eq!((occupancy.payload(), occupancy.off_at), (ON, None));
         occupancy.update(0, after(8), HOLD);
         assert!(occupancy.expire(after(13)));
-        assert_eq!((occupancy.payload(), occupancy.off_at()), (OFF, None));
+        assert_eq!((occupancy.payload(), occupancy.off_at), (OFF, None));
     }
 
     #[test]

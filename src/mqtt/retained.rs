@@ -54,13 +54,14 @@ pub(super) fn withdrawal(
     parts: impl IntoIterator<Item = String>,
 ) -> Vec<Message> {
     let of_camera = [
-        topics.persons(camera),
-        topics.frame_persons(camera),
-        topics.occupancy(camera),
-        topics.attributes(camera),
-        topics.availability(camera),
+        "persons",
+        "frame_persons",
+        "occupancy",
+        "attributes",
+        "availability",
     ];
     let mut messages = config_withdrawals(topics, camera, None);
+    let of_camera = of_camera.map(|topic| topics.of_camera(camera, topic));
     messages.extend(of_camera.map(Message::forget));
     for part in parts {
         messages.extend(part_withdrawal(topics, camera, &part));

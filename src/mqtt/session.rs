@@ -19,15 +19,11 @@ use rumqttc::{
     Codec, ConnAck, Connect, ConnectReturnCode, LastWill, Packet, Publish, QoS, Subscribe,
     SubscribeFilter,
 };
-use tokio::{
-    io::{AsyncRead, AsyncWrite},
-    net::TcpStream,
-    time::{Instant, Interval, MissedTickBehavior, interval, timeout},
-};
+use tokio::time::{Instant, Interval, MissedTickBehavior, interval, timeout};
 use tokio_util::codec::{Decoder, Encoder, Framed};
 
 use super::Broker;
-use crate::tls::ClientTls;
+use crate::tls::{ClientTls, Stream, connect};
 
 /// The keep-alive interval. After 1.5 times as long without a packet the broker regards the client
 /// as lost and publishes its will (MQTT 3.1.1, section 3.1.2.10). The client waits as long for a
@@ -82,7 +78,7 @@ impl Session {
             hello.set_login(user, password);
         }
         in_time(async {
-            let stream = connect(broker, tls).await?;
+            let stream = connect(&broker.host, broker.port, tls).await?;
             let mut packets = Framed::new(stream, PacketCodec::default());
             packets.send(Packet::Connect(hello)).await?;
             match packets.next().await {
@@ -207,25 +203,6 @@ impl Message {
     pub(super) fn forget(topic: String) -> Self {
         Self::retained(topic, Bytes::new())
     }
-}
-
-/// A byte stream that carries MQTT packets.
-pub(super) trait Stream: AsyncRead + AsyncWrite + Send + Unpin {}
-
-impl<T: AsyncRead + AsyncWrite + Send + Unpin> Stream for T {}
-
-/// Opens a connection. `tls` is given if the broker uses TLS.
-pub(super) async fn connect(
-    broker: &Broker,
-    tls: Option<&ClientTls>,
-) -> io::Result<Box<dyn Stream>> {
-    let stream = TcpStream::connect((broker.host.as_str(), broker.port)).await?;
-    // Counts are small and should arrive without delay.
-    stream.set_nodelay(true)?;
-    Ok(match tls {
-        Some(tls) => Box::new(tls.connect(&broker.host, stream).await?),
-        None => Box::new(stream),
-    })
 }
 
 /// Most bytes of an incoming packet: only statuses are expected.

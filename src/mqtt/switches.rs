@@ -19,7 +19,7 @@ use super::{
     occupancy::{OFF, ON},
     retained::RetainedTopics,
     session::Message,
-    topics::{SwitchTopic, Topics, level},
+    topics::{Topics, level},
 };
 use crate::cameras::{CameraError, Cameras};
 
@@ -85,29 +85,24 @@ impl Switches {
     /// is ignored: it would override what was chosen in the web page. The cameras of the settings
     /// are known some seconds after the start, so commands of unknown cameras wait.
     pub(super) fn note(&mut self, message: &Publish) -> bool {
-        let Some(topic) = self.topics.switch_topic(&message.topic) else {
+        let Some((camera, is_command)) = self.topics.switch_topic(&message.topic) else {
             return false;
         };
-        match topic {
-            SwitchTopic::Command { camera } if !message.retain => {
-                let is_known = self.published.keys().any(|name| level(name) == camera);
-                let may_wait = self.withdraw_at.is_some() && self.commands.len() < MAX_COMMANDS;
-                let wanted = [(ON, true), (OFF, false)]
-                    .into_iter()
-                    .find_map(|(payload, is_on)| (message.payload == payload).then_some(is_on));
-                if let (true, Some(is_on)) = (is_known || may_wait, wanted) {
-                    self.commands.insert(camera.to_owned(), is_on);
-                }
+        let is_retained = message.retain && !message.payload.is_empty();
+        if is_command && !message.retain {
+            let is_known = self.published.keys().any(|name| level(name) == camera);
+            let may_wait = self.withdraw_at.is_some() && self.commands.len() < MAX_COMMANDS;
+            let wanted = [(ON, true), (OFF, false)]
+                .into_iter()
+                .find_map(|(payload, is_on)| (message.payload == payload).then_some(is_on));
+            if let (true, Some(is_on)) = (is_known || may_wait, wanted) {
+                self.commands.insert(camera.to_owned(), is_on);
             }
-            SwitchTopic::State { camera } if message.payload.is_empty() => {
-                self.retained.keep(camera);
-            }
-            SwitchTopic::State { camera } if message.retain => {
-                self.retained.note(camera, None);
-            }
-            // Another server has this camera, or it is an echo.
-            SwitchTopic::State { camera } => self.retained.keep(camera),
-            SwitchTopic::Command { .. } => {}
+        } else if !is_command && is_retained {
+            self.retained.note(camera, None);
+        } else if !is_command {
+            // It was removed, another server has this camera, or it is an echo.
+            self.retained.keep(camera);
         }
         true
     }
@@ -196,7 +191,7 @@ impl Switches {
                 messages.extend(self.discovery.switch(&self.topics, name));
             }
             if before != Some(is_on) {
-                let topic = self.topics.detection(name);
+                let topic = self.topics.of_camera(name, "detection");
                 messages.push(Message::retained(topic, payload(*is_on)));
             }
         }
@@ -204,7 +199,7 @@ impl Switches {
     }
 
     fn withdrawal(&self, camera: &str) -> Vec<Message> {
-        let mut messages = vec![Message::forget(self.topics.detection(camera))];
+        let mut messages = vec![Message::forget(self.topics.of_camera(camera, "detection"))];
         messages.extend(Discovery::switch_withdrawal(&self.topics, camera));
         messages
     }

@@ -39,24 +39,9 @@ impl Topics {
         rest.strip_prefix("/counts/")
     }
 
-    /// The topic of the number of persons in the latest frame of a camera.
-    pub(super) fn frame_persons(&self, camera: &str) -> String {
-        format!("{}/frame_persons", self.camera(camera))
-    }
-
-    /// The topic of the number of persons that a camera sees now.
-    pub(super) fn persons(&self, camera: &str) -> String {
-        format!("{}/persons", self.camera(camera))
-    }
-
     /// The topic of the number of persons in a zone.
     pub(super) fn zone(&self, camera: &str, zone: &str) -> String {
-        format!("{}/zones/{}", self.camera(camera), level(zone))
-    }
-
-    /// The topic of a camera's occupancy.
-    pub(super) fn occupancy(&self, camera: &str) -> String {
-        format!("{}/occupancy", self.camera(camera))
+        self.of_camera(camera, &format!("zones/{}", level(zone)))
     }
 
     /// The topic of a zone's occupancy.
@@ -64,24 +49,9 @@ impl Topics {
         format!("{}/occupancy", self.zone(camera, zone))
     }
 
-    /// The topic of a camera's availability.
-    pub(super) fn availability(&self, camera: &str) -> String {
-        format!("{}/availability", self.camera(camera))
-    }
-
-    /// The topic of the attributes of a camera's entities.
-    pub(super) fn attributes(&self, camera: &str) -> String {
-        format!("{}/attributes", self.camera(camera))
-    }
-
-    /// The topic of a camera's latest image.
-    pub(super) fn image(&self, camera: &str) -> String {
-        format!("{}/image", self.camera(camera))
-    }
-
     /// The topic of a straight view of a camera.
     pub(super) fn view(&self, camera: &str, view: &str) -> String {
-        format!("{}/views/{}", self.camera(camera), level(view))
+        self.of_camera(camera, &format!("views/{}", level(view)))
     }
 
     /// The topic of the newest image of a straight view.
@@ -89,14 +59,9 @@ impl Topics {
         format!("{}/image", self.view(camera, view))
     }
 
-    /// The topic of the state of a camera's switch for detection.
-    pub(super) fn detection(&self, camera: &str) -> String {
-        format!("{}/detection", self.camera(camera))
-    }
-
     /// The topic of the commands of a camera's switch for detection.
     pub(super) fn detection_command(&self, camera: &str) -> String {
-        format!("{}/set", self.detection(camera))
+        self.of_camera(camera, "detection/set")
     }
 
     /// Filters for the topics that [`Topics::switch_topic`] recognizes.
@@ -104,12 +69,12 @@ impl Topics {
         ["+/detection", "+/detection/set"].map(|rest| format!("{}/cameras/{rest}", self.prefix))
     }
 
-    /// Recognizes a topic of a camera's switch.
-    pub(super) fn switch_topic<'a>(&self, topic: &'a str) -> Option<SwitchTopic<'a>> {
+    /// Recognizes a topic of a camera's switch: returns the level of its name, and true for commands.
+    pub(super) fn switch_topic<'a>(&self, topic: &'a str) -> Option<(&'a str, bool)> {
         let (camera, rest) = self.below_cameras(topic)?;
         match rest {
-            "detection" => Some(SwitchTopic::State { camera }),
-            "detection/set" => Some(SwitchTopic::Command { camera }),
+            "detection" => Some((camera, false)),
+            "detection/set" => Some((camera, true)),
             _ => None,
         }
     }
@@ -128,27 +93,19 @@ impl Topics {
             .map(|rest| format!("{}/cameras/{rest}", self.prefix))
     }
 
-    /// Recognizes a topic of a camera.
-    pub(super) fn camera_topic<'a>(&self, topic: &'a str) -> Option<CameraTopic<'a>> {
+    /// Recognizes `persons`, `availability`, and `zones/` or `views/` with the level of a name: returns
+    /// the level of the camera, and the rest of the topic.
+    pub(super) fn camera_topic<'a>(&self, topic: &'a str) -> Option<(&'a str, &'a str)> {
         let (camera, rest) = self.below_cameras(topic)?;
-        match rest {
-            "persons" => Some(CameraTopic::Persons { camera }),
-            "availability" => Some(CameraTopic::Availability { camera }),
-            _ => {
-                let is_part = rest.starts_with("zones/") || rest.starts_with("views/");
-                let is_part = is_part && rest.matches('/').count() == 1;
-                is_part.then_some(CameraTopic::Part { camera, part: rest })
-            }
-        }
+        let is_known = ["persons", "availability"].contains(&rest) || is_part(rest);
+        is_known.then_some((camera, rest))
     }
 
-    /// The topic of a camera's reports.
-    pub(super) fn report(&self, camera: &str) -> String {
-        format!("{}/report", self.camera(camera))
-    }
-
-    fn camera(&self, camera: &str) -> String {
-        format!("{}/cameras/{}", self.prefix, level(camera))
+    /// A topic of a camera: `frame_persons` of its latest frame, `persons` that it sees now,
+    /// `occupancy`, `availability`, `attributes` of its entities, its latest `image`, `detection` for
+    /// the state of its switch, or `report`.
+    pub(super) fn of_camera(&self, camera: &str, topic: &str) -> String {
+        format!("{}/cameras/{}/{topic}", self.prefix, level(camera))
     }
 
     /// The topic on which Home Assistant announces its start.
@@ -170,41 +127,10 @@ impl Topics {
     }
 }
 
-/// A topic of a camera, by the levels of its name and of a zone's.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum CameraTopic<'a> {
-    /// The number of persons.
-    Persons { camera: &'a str },
-    /// The availability.
-    Availability { camera: &'a str },
-    /// A part of the camera: `zones/`, with the number of persons, or `views/`, and its level.
-    Part { camera: &'a str, part: &'a str },
-}
-
-/// A topic of a camera's switch, by the level of its name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum SwitchTopic<'a> {
-    /// The state.
-    State { camera: &'a str },
-    /// A command.
-    Command { camera: &'a str },
-}
-
-impl<'a> CameraTopic<'a> {
-    pub(super) fn camera(&self) -> &'a str {
-        match self {
-            Self::Persons { camera }
-            | Self::Availability { camera }
-            | Self::Part { camera, .. } => camera,
-        }
-    }
-
-    pub(super) fn part(&self) -> Option<&'a str> {
-        match self {
-            Self::Part { part, .. } => Some(part),
-            Self::Persons { .. } | Self::Availability { .. } => None,
-        }
-    }
+/// Returns true for a topic of a zone or a view, below that of its camera.
+pub(super) fn is_part(rest: &str) -> bool {
+    let has_parts = rest.starts_with("zones/") || rest.starts_with("views/");
+    has_parts && rest.matches('/').count() == 1
 }
 
 /// Returns a name as one level of a topic, in the alphabet of Home Assistant's IDs
@@ -230,12 +156,18 @@ mod tests {
     #[test]
     fn plain_names_are_used_unchanged() {
         let topics = Topics::new("lookdown", Some("homeassistant"));
-        assert_eq!(topics.persons("lobby"), "lookdown/cameras/lobby/persons");
+        assert_eq!(
+            topics.of_camera("lobby", "persons"),
+            "lookdown/cameras/lobby/persons"
+        );
         assert_eq!(
             topics.zone("Lobby-2", "till"),
             "lookdown/cameras/Lobby-2/zones/till"
         );
-        assert_eq!(topics.report("lobby"), "lookdown/cameras/lobby/report");
+        assert_eq!(
+            topics.of_camera("lobby", "report"),
+            "lookdown/cameras/lobby/report"
+        );
         assert_eq!(topics.birth().unwrap(), "homeassistant/status");
         let id = topics.device_id("lobby");
         assert_eq!(id, "lookdown_lobby");
@@ -254,22 +186,18 @@ mod tests {
     fn topics_of_cameras_are_recognized() {
         let topics = Topics::new("home/lookdown", None);
         let camera = "lobby";
-        let part = |part| CameraTopic::Part { camera, part };
         for (topic, expected) in [
-            (topics.persons(camera), CameraTopic::Persons { camera }),
-            (
-                topics.availability(camera),
-                CameraTopic::Availability { camera },
-            ),
-            (topics.zone(camera, "till"), part("zones/till")),
-            (topics.view(camera, "door"), part("views/door")),
+            (topics.of_camera(camera, "persons"), "persons"),
+            (topics.of_camera(camera, "availability"), "availability"),
+            (topics.zone(camera, "till"), "zones/till"),
+            (topics.view(camera, "door"), "views/door"),
         ] {
-            assert_eq!(topics.camera_topic(&topic), Some(expected));
+            assert_eq!(topics.camera_topic(&topic), Some((camera, expected)));
         }
         for other in [
             topics.status(),
-            topics.report(camera),
-            topics.attributes(camera),
+            topics.of_camera(camera, "report"),
+            topics.of_camera(camera, "attributes"),
             topics.zone_occupancy(camera, "till"),
             topics.view_image(camera, "door"),
             "lookdown/cameras/lobby/persons".to_owned(),
@@ -283,16 +211,16 @@ mod tests {
         let topics = Topics::new("home/lookdown", None);
         let camera = "lobby";
         for (topic, expected) in [
-            (topics.detection(camera), SwitchTopic::State { camera }),
-            (
-                topics.detection_command(camera),
-                SwitchTopic::Command { camera },
-            ),
+            (topics.of_camera(camera, "detection"), (camera, false)),
+            (topics.detection_command(camera), (camera, true)),
         ] {
             assert_eq!(topics.switch_topic(&topic), Some(expected));
             assert_eq!(topics.camera_topic(&topic), None);
         }
-        assert_eq!(topics.switch_topic(&topics.persons(camera)), None);
+        assert_eq!(
+            topics.switch_topic(&topics.of_camera(camera, "persons")),
+            None
+        );
     }
 
     #[test]

@@ -4,7 +4,7 @@
 use std::{collections::HashMap, num::NonZeroUsize, sync::Arc};
 
 use lookdown_detect::fairness::{BudgetError, BudgetShare, Client, SharedBudget};
-use parking_lot::{Mutex, MutexGuard};
+use parking_lot::Mutex;
 use tokio::sync::{mpsc, watch};
 
 use super::{Cameras, StoredReport};
@@ -53,6 +53,7 @@ pub struct Unreachable(pub String);
 pub struct Listeners {
     /// The permits, including those of dropped listeners that have not noticed yet.
     budget: SharedBudget,
+    // No change can panic before it is complete.
     group: Mutex<Group>,
     /// The number of times that cameras got their first listener.
     arrivals: watch::Sender<u64>,
@@ -91,7 +92,7 @@ impl Listeners {
         client: &Client,
         to: Cameras,
     ) -> Result<Listening, ListenError> {
-        let mut group = self.group();
+        let mut group = self.group.lock();
         if group.ended {
             return Err(ListenError::Ended);
         }
@@ -139,12 +140,12 @@ impl Listeners {
 
     /// The cameras that have listeners.
     pub(super) fn cameras(&self) -> Vec<Cameras> {
-        self.group().queues.keys().cloned().collect()
+        self.group.lock().queues.keys().cloned().collect()
     }
 
     /// Returns true if these cameras have a listener.
     pub(super) fn has_listener_for(&self, cameras: &Cameras) -> bool {
-        self.group().queues.contains_key(cameras)
+        self.group.lock().queues.contains_key(cameras)
     }
 
     /// Publishes a report to the listeners of its camera and to those of all cameras. Never waits.
@@ -156,7 +157,7 @@ impl Listeners {
 
     /// Publishes a report to the listeners to these cameras. Never waits.
     pub(super) fn publish_to(&self, to: &Cameras, report: &Arc<StoredReport>) {
-        let mut group = self.group();
+        let mut group = self.group.lock();
         if let Some(queues) = group.queues.get_mut(to) {
             let before = queues.len();
             queues.retain(|_, queue| queue.try_send(Arc::clone(report)).is_ok());
@@ -170,19 +171,14 @@ impl Listeners {
 
     /// Ends the stream of every listener.
     pub fn end(&self) {
-        let mut group = self.group();
+        let mut group = self.group.lock();
         group.ended = true;
         group.queues.clear();
     }
 
-    fn group(&self) -> MutexGuard<'_, Group> {
-        // No change can panic before it is complete.
-        self.group.lock()
-    }
-
     fn leave(&self, to: &Cameras, number: u64) {
         self.metrics.results_listeners.dec();
-        let mut group = self.group();
+        let mut group = self.group.lock();
         if let Some(queues) = group.queues.get_mut(to) {
             queues.remove(&number);
             if queues.is_empty() {

@@ -52,7 +52,7 @@ impl MemoryResults {
     pub fn store(&self, report: NewReport, image: Option<StoredFrame>) -> Arc<StoredReport> {
         // Published while the lock is held: listeners rely on the order.
         let mut kept = self.kept();
-        let before = kept.removed_cameras();
+        let before = kept.removed_cameras;
         let stored = kept.add(report, image, Timestamp::now());
         self.metrics.results_stored.inc();
         self.listeners.notify(&stored);
@@ -64,14 +64,14 @@ impl MemoryResults {
     fn kept(&self) -> MutexGuard<'_, BoundedReports> {
         // No change can panic before it is complete.
         let mut kept = self.kept.lock();
-        let before = kept.removed_cameras();
+        let before = kept.removed_cameras;
         kept.expire(Timestamp::now());
         self.note_removals(&kept, before);
         kept
     }
 
     fn note_removals(&self, kept: &BoundedReports, before: u64) {
-        if kept.removed_cameras() > before {
+        if kept.removed_cameras > before {
             self.listeners.note_removal();
         }
     }
@@ -88,11 +88,11 @@ impl ResultStore for MemoryResults {
     }
 
     async fn latest_of_all(&self) -> Result<Vec<Arc<StoredReport>>, Unreachable> {
-        Ok(self.kept().latest_of_all())
+        Ok(self.kept().latest.values().cloned().collect())
     }
 
     async fn cameras(&self) -> Result<Vec<String>, Unreachable> {
-        Ok(self.kept().cameras())
+        Ok(self.kept().cameras.keys().cloned().collect())
     }
 
     async fn delete(&self, camera: &str) -> Result<bool, Unreachable> {
@@ -104,7 +104,7 @@ impl ResultStore for MemoryResults {
     }
 
     async fn delete_image(&self, camera: &str) -> Result<(), Unreachable> {
-        self.kept().delete_image(camera);
+        self.kept().images.remove(camera);
         Ok(())
     }
 
@@ -122,7 +122,7 @@ impl ResultStore for MemoryResults {
     }
 
     async fn image(&self, camera: &str) -> Result<Option<Arc<StoredImage>>, Unreachable> {
-        Ok(self.kept().image(camera))
+        Ok(self.kept().images.get(camera).cloned())
     }
 
     async fn listen(&self, client: &Client, to: Cameras) -> Result<Listening, ListenError> {
@@ -157,7 +157,8 @@ struct BoundedReports {
     latest: BTreeMap<ReportId, Arc<StoredReport>>,
     /// All other reports.
     earlier: BTreeMap<ReportId, Arc<StoredReport>>,
-    images: Images,
+    /// The latest image of each camera that has one.
+    images: HashMap<String, Arc<StoredImage>>,
     bytes: usize,
     newest: ReportId,
     /// The number of cameras that were removed.
@@ -167,10 +168,10 @@ struct BoundedReports {
 impl BoundedReports {
     fn new(limits: ResultLimits) -> Self {
         Self {
-            images: Images::new(limits.max_images),
             limits,
             own: OwnCameras::default(),
             cameras: HashMap::new(),
+            images: HashMap::new(),
             latest: BTreeMap::new(),
             earlier: BTreeMap::new(),
             bytes: 0,
@@ -191,7 +192,7 @@ impl BoundedReports {
         self.newest = id;
         self.bytes += stored.report.bytes();
         let camera = &stored.report.camera;
-        self.images.replace(camera, id, image, &self.own);
+        self.replace_image(camera, id, image);
         let reports = self.cameras.entry(camera.clone()).or_default();
         if let Some(before) = reports.back() {
             self.latest.remove(&before.id);
@@ -204,6 +205,26 @@ impl BoundedReports {
         }
         self.keep_limits();
         stored
+    }
+
+    /// Replaces the camera's image by that of the report with this ID, or removes it if that report
+    /// has none. The camera that was silent for longest is evicted first, and those of this process
+    /// last.
+    fn replace_image(&mut self, camera: &str, id: ReportId, frame: Option<StoredFrame>) {
+        let Some(frame) = frame else {
+            self.images.remove(camera);
+            return;
+        };
+        let stored = Arc::new(StoredImage { id, frame });
+        self.images.insert(camera.to_owned(), stored);
+        while self.images.len() > self.limits.max_images.get() {
+            let images = self.images.iter();
+            let is_own = |camera: &str| self.own.contains(camera);
+            let oldest = images.min_by_key(|(camera, stored)| (is_own(camera), stored.id));
+            if let Some(camera) = oldest.map(|(camera, _)| camera.clone()) {
+                self.images.remove(&camera);
+            }
+        }
     }
 
     /// Removes the reports that are too old.
@@ -232,20 +253,6 @@ impl BoundedReports {
         let is_known = self.cameras.contains_key(camera);
         while self.forget_oldest_of(camera) {}
         is_known
-    }
-
-    fn delete_image(&mut self, camera: &str) {
-        self.images.forget(camera);
-    }
-
-    /// The names of the cameras.
-    fn cameras(&self) -> Vec<String> {
-        self.cameras.keys().cloned().collect()
-    }
-
-    /// The number of cameras that were removed since the start.
-    fn removed_cameras(&self) -> u64 {
-        self.removed_cameras
     }
 
     fn keep_limits(&mut self) {
@@ -286,7 +293,7 @@ impl BoundedReports {
         }
         if reports.is_empty() {
             self.cameras.remove(camera);
-            self.images.forget(camera);
+            self.images.remove(camera);
             self.removed_cameras += 1;
         }
         true
@@ -298,10 +305,6 @@ impl BoundedReports {
 
     fn latest(&self, camera: &str) -> Option<Arc<StoredReport>> {
         self.cameras.get(camera)?.back().cloned()
-    }
-
-    fn latest_of_all(&self) -> Vec<Arc<StoredReport>> {
-        self.latest.values().cloned().collect()
     }
 
     fn since(&self, cameras: &Cameras, after: ReportId, most: usize) -> Vec<Arc<StoredReport>> {
@@ -328,70 +331,13 @@ impl BoundedReports {
         }
     }
 
-    fn image(&self, camera: &str) -> Option<Arc<StoredImage>> {
-        self.images.for_camera(camera)
-    }
-
     fn usage(&self) -> ResultUse {
         ResultUse {
             cameras: self.cameras.len(),
             reports: self.count(),
             bytes: self.bytes,
-            images: self.images.count(),
+            images: self.images.len(),
         }
-    }
-}
-
-/// The images, at most `most`: the camera that was silent for longest is evicted first, and those
-/// of this process last.
-#[derive(Debug)]
-struct Images {
-    most: NonZeroUsize,
-    of_cameras: HashMap<String, Arc<StoredImage>>,
-}
-
-impl Images {
-    fn new(most: NonZeroUsize) -> Self {
-        Self {
-            most,
-            of_cameras: HashMap::new(),
-        }
-    }
-
-    /// Replaces the camera's image by that of the report with this ID, or removes it if that report
-    /// has none.
-    fn replace(
-        &mut self,
-        camera: &str,
-        id: ReportId,
-        frame: Option<StoredFrame>,
-        own: &OwnCameras,
-    ) {
-        let Some(frame) = frame else {
-            return self.forget(camera);
-        };
-        let stored = Arc::new(StoredImage { id, frame });
-        self.of_cameras.insert(camera.to_owned(), stored);
-        while self.of_cameras.len() > self.most.get() {
-            let images = self.of_cameras.iter();
-            let oldest = images.min_by_key(|(camera, stored)| (own.contains(camera), stored.id));
-            if let Some(camera) = oldest.map(|(camera, _)| camera.clone()) {
-                self.of_cameras.remove(&camera);
-            }
-        }
-    }
-
-    fn forget(&mut self, camera: &str) {
-        self.of_cameras.remove(camera);
-    }
-
-    fn for_camera(&self, camera: &str) -> Option<Arc<StoredImage>> {
-        self.of_cameras.get(camera).cloned()
-    }
-
-    /// The number of images.
-    fn count(&self) -> usize {
-        self.of_cameras.len()
     }
 }
 

@@ -88,10 +88,7 @@ impl RedisResults {
         question: impl for<'a> AsyncFnOnce(Reader<'a>) -> RedisResult<T>,
     ) -> Result<T, Unreachable> {
         let line = self.shared.link.line()?;
-        let reader = Reader {
-            connection: line.connection.clone(),
-            keys: &self.shared.keys,
-        };
+        let reader = Reader::new(&line.connection, &self.shared.keys);
         let outcome = timeout(TIMEOUT, question(reader)).await;
         let outcome =
             outcome.unwrap_or_else(|_| Err(io::Error::from(io::ErrorKind::TimedOut).into()));
@@ -267,7 +264,7 @@ impl Sender<'_> {
     ) -> RedisResult<()> {
         let (keys, limits) = (&self.shared.keys, &self.shared.limits);
         let mut call = self.script.prepare_invoke();
-        call.key(&keys.index()[..]).key(keys.senders());
+        call.key(&keys.index()[..]).key(keys.key("senders"));
         call.arg(keys.prefix_of_cameras());
         call.arg(keys.prefix_of_images()).arg(&report.camera);
         call.arg(keys.channel(&Cameras::One(report.camera.clone())));

@@ -259,8 +259,8 @@ impl Part {
     /// Width and height, pixels.
     pub(super) fn size(&self) -> [u32; 2] {
         match &self.projection {
-            Projection::Pinhole(view) => [view.width(), view.height()],
-            Projection::Panorama(panorama) => [panorama.width(), panorama.height()],
+            Projection::Pinhole(view) => [view.width, view.height],
+            Projection::Panorama(panorama) => [panorama.width, panorama.height],
         }
     }
 

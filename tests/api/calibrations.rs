@@ -155,7 +155,7 @@ async fn the_view_plan_has_every_view_of_the_model() {
             ViewPlan::paper(FieldOfViewReading::Horizontal),
         ),
     ] {
-        let views = plan.directions().len();
+        let views = plan.directions.len();
         let path = format!("{PATH}/views{query}");
         let plan = service.get(&path).await.json();
         let planned = plan["views"].as_array().unwrap();

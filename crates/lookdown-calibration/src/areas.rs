@@ -1,7 +1,5 @@
 //! The zones, lines, masks, areas and ignored places of a calibration, checked.
 
-mod area_name;
-
 use std::collections::BTreeSet;
 
 use lookdown_lens::geometry::{
@@ -14,9 +12,8 @@ use crate::{
     FormatError,
     formats::Camera,
     native::{NativeImage, NativeLine, NativeLying, NativePlace},
+    plain_field::check_name,
 };
-
-use area_name::check_name;
 
 /// Most zones of a calibration, most lines, most masks, most areas and most ignored places.
 const MAX_AREAS: usize = 32;

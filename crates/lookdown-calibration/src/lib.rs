@@ -7,6 +7,7 @@ mod file;
 pub mod formats;
 mod id;
 pub mod native;
+mod plain_field;
 pub mod revision;
 mod site;
 pub mod warning;

@@ -1,8 +1,6 @@
 //! The place of a camera on a site, checked.
 
-use lookdown_common::plain_name::{MAX_CHARS, is_plain};
-
-use super::{FormatError, native::NativeMount};
+use super::{FormatError, native::NativeMount, plain_field::check_name};
 use lookdown_lens::geometry::SitePlacement;
 
 /// Farthest coordinate of a site, meters.
@@ -23,14 +21,7 @@ pub(super) fn site_placement(mount: &NativeMount) -> Result<Option<SitePlacement
             None => Ok(None),
         };
     };
-    if !is_plain(site) {
-        let shown: String = site.chars().take(MAX_CHARS).collect();
-        let problem = format!(
-            "it is {shown:?}: use 1 to {MAX_CHARS} of a-z, 0-9, _ and -, beginning with a letter \
-             or digit"
-        );
-        return Err(FormatError::invalid("mount.site", problem));
-    }
+    check_name("mount.site", site)?;
     if mount.height_m.is_none() {
         let problem = "a site needs positions on the floor: give mount.height_m as well";
         return Err(FormatError::invalid("mount.site", problem));

@@ -19,6 +19,18 @@ pub const MAX_SETTINGS_BYTES: u64 = 1 << 20;
 /// Most bytes of an image file that the command line reads.
 pub const MAX_IMAGE_BYTES: u64 = 256 << 20;
 
+/// Endings of images that can be read, in lower case.
+pub const IMAGE_ENDINGS: [&str; 4] = ["jpg", "jpeg", "png", "webp"];
+
+/// Returns `true` if the name of a file has one of the endings, in either case.
+pub fn has_ending(path: &Path, endings: &[&str]) -> bool {
+    path.extension().is_some_and(|actual| {
+        endings
+            .iter()
+            .any(|ending| actual.eq_ignore_ascii_case(ending))
+    })
+}
+
 /// A file or folder that cannot be used. The message is one sentence with the remedy.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{path}: {problem}")]

@@ -39,15 +39,6 @@ pub struct ServerEntry {
 }
 
 impl ServerEntry {
-    /// Fills absent values with those of another entry.
-    pub fn or(self, other: &Self) -> Self {
-        Self {
-            url: self.url.or_else(|| other.url.clone()),
-            api_key_file: self.api_key_file.or_else(|| other.api_key_file.clone()),
-            authorities: self.authorities.or_else(|| other.authorities.clone()),
-        }
-    }
-
     /// Checks the entry and reads its files.
     ///
     /// # Errors

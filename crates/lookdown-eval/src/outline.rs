@@ -99,7 +99,8 @@ impl Region for Outline {
 }
 
 fn holds(bbox: &BBox<FramePixels>, [x, y]: [f64; 2]) -> bool {
-    (bbox.x_min()..=bbox.x_max()).contains(&x) && (bbox.y_min()..=bbox.y_max()).contains(&y)
+    let [x_min, y_min, x_max, y_max] = bbox.corners();
+    (x_min..=x_max).contains(&x) && (y_min..=y_max).contains(&y)
 }
 
 #[cfg(test)]

@@ -86,15 +86,16 @@ pub fn layer(
 }
 
 /// Refuses requests for public host names, and those that a proxy has forwarded.
+///
+/// # Errors
+/// The refusal.
 pub async fn require_host(
     State(origins): State<AllowedOrigins>,
     request: Request,
     next: Next,
-) -> Response {
-    match check(&request, &origins) {
-        Ok(()) => next.run(request).await,
-        Err(problem) => problem.into_response(),
-    }
+) -> Result<Response, Problem> {
+    check(&request, &origins)?;
+    Ok(next.run(request).await)
 }
 
 fn check(request: &Request, origins: &AllowedOrigins) -> Result<(), Problem> {

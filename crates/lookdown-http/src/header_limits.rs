@@ -4,29 +4,26 @@
 use axum::{
     extract::{Request, State},
     middleware::Next,
-    response::{IntoResponse, Response},
+    response::Response,
 };
 
-use crate::problem::{Kind, Problem};
+use crate::{
+    problem::{Kind, Problem},
+    server::ConnectionLimits,
+};
 
 /// Bytes of a header line besides name and value: `: ` and the line end.
 const SEPARATORS: usize = 4;
 
-/// The limits of request heads.
-#[derive(Debug, Clone, Copy)]
-pub struct HeaderLimits {
-    /// Largest number of headers.
-    pub max_headers: usize,
-    /// Largest head, bytes.
-    pub max_header_bytes: usize,
-}
-
 /// Refuses a request with too many headers or too large a head.
+///
+/// # Errors
+/// The refusal.
 pub async fn within_bounds(
-    State(limits): State<HeaderLimits>,
+    State(limits): State<ConnectionLimits>,
     request: Request,
     next: Next,
-) -> Response {
+) -> Result<Response, Problem> {
     let too_large = if request.headers().len() > limits.max_headers {
         Some(("headers", limits.max_headers))
     } else if bytes_of_head(&request) > limits.max_header_bytes {
@@ -36,9 +33,9 @@ pub async fn within_bounds(
     };
     if let Some((what, most)) = too_large {
         let detail = format!("the request has more than {most} {what}: send fewer");
-        return Problem::new(Kind::HeadersTooLarge, detail).into_response();
+        return Err(Problem::new(Kind::HeadersTooLarge, detail));
     }
-    next.run(request).await
+    Ok(next.run(request).await)
 }
 
 fn bytes_of_head(request: &Request) -> usize {

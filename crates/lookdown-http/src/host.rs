@@ -7,19 +7,22 @@ use axum::{
     extract::Request,
     http::{HeaderMap, Uri, Version, header::HOST, uri::Authority},
     middleware::Next,
-    response::{IntoResponse, Response},
+    response::Response,
 };
 
 use crate::problem::{Kind, Problem};
 
 /// Refuses HTTP/1.1 requests without exactly one valid `Host`.
-pub async fn require(request: Request, next: Next) -> Response {
+///
+/// # Errors
+/// The refusal.
+pub async fn require(request: Request, next: Next) -> Result<Response, Problem> {
     if request.version() == Version::HTTP_11 && only_host(request.headers()).is_none() {
         let detail = "an HTTP/1.1 request needs exactly one Host header with a valid host, such as \
                       localhost:8080 (RFC 9112, section 3.2)";
-        return Problem::new(Kind::MalformedRequest, detail).into_response();
+        return Err(Problem::new(Kind::MalformedRequest, detail));
     }
-    next.run(request).await
+    Ok(next.run(request).await)
 }
 
 /// Returns the host of the request: that of the request target, or else the only `Host` header.

@@ -1,6 +1,8 @@
 //! Failures as problem documents (RFC 9457): the document of all parts, and the failures that every
 //! listener has. The layer around the routes writes the document.
 
+mod kind;
+
 use std::collections::BTreeMap;
 
 use axum::{
@@ -22,103 +24,10 @@ use crate::{
     request_id::{self, RequestId, new_id},
 };
 
+pub use kind::Kind;
+
 /// The media type of the documents.
 pub const PROBLEM_JSON: HeaderValue = HeaderValue::from_static("application/problem+json");
-
-/// The kinds of failures that every listener has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
-    /// The request does not follow the format of its endpoint.
-    MalformedRequest,
-    /// The request has no key, or one that is not valid.
-    KeyRequired,
-    /// The client is not allowed to do this.
-    Forbidden,
-    /// The path has no resource.
-    NotFound,
-    /// The path does not support the method.
-    MethodNotAllowed,
-    /// A parameter has a value that cannot be used.
-    InvalidParameter,
-    /// Too much work or too many responses are in memory.
-    Overloaded,
-    /// The request has too many headers, or too long ones.
-    HeadersTooLarge,
-    /// The request failed for a reason that only the log has.
-    Internal,
-}
-
-impl Kind {
-    /// All kinds.
-    pub const ALL: [Self; 9] = [
-        Self::MalformedRequest,
-        Self::KeyRequired,
-        Self::Forbidden,
-        Self::NotFound,
-        Self::MethodNotAllowed,
-        Self::InvalidParameter,
-        Self::Overloaded,
-        Self::HeadersTooLarge,
-        Self::Internal,
-    ];
-
-    fn entry(self) -> (StatusCode, &'static str, &'static str) {
-        match self {
-            Self::MalformedRequest => (
-                StatusCode::BAD_REQUEST,
-                "malformed-request",
-                "Malformed request",
-            ),
-            Self::KeyRequired => (
-                StatusCode::UNAUTHORIZED,
-                "key-required",
-                "Authentication required",
-            ),
-            Self::Forbidden => (StatusCode::FORBIDDEN, "forbidden", "Permission denied"),
-            Self::NotFound => (StatusCode::NOT_FOUND, "not-found", "Not found"),
-            Self::MethodNotAllowed => (
-                StatusCode::METHOD_NOT_ALLOWED,
-                "method-not-allowed",
-                "Method not allowed",
-            ),
-            Self::InvalidParameter => (
-                StatusCode::UNPROCESSABLE_ENTITY,
-                "invalid-parameter",
-                "Invalid parameter",
-            ),
-            Self::Overloaded => (
-                StatusCode::TOO_MANY_REQUESTS,
-                "overloaded",
-                "Server overloaded",
-            ),
-            Self::HeadersTooLarge => (
-                StatusCode::REQUEST_HEADER_FIELDS_TOO_LARGE,
-                "headers-too-large",
-                "Request header fields too large",
-            ),
-            Self::Internal => (
-                StatusCode::INTERNAL_SERVER_ERROR,
-                "internal",
-                "Internal server error",
-            ),
-        }
-    }
-
-    /// The HTTP status.
-    pub fn status(self) -> StatusCode {
-        self.entry().0
-    }
-
-    /// The stable name: the end of `type`.
-    pub fn name(self) -> &'static str {
-        self.entry().1
-    }
-
-    /// The usual phrase for the kind.
-    pub fn title(self) -> &'static str {
-        self.entry().2
-    }
-}
 
 /// The reason why a request failed.
 #[derive(Debug, Clone)]
@@ -181,10 +90,11 @@ impl Problem {
     }
 
     fn body(self, request_id: &RequestId) -> ProblemBody {
+        let entry = self.kind.entry();
         ProblemBody {
-            r#type: format!("/problems/{}", self.kind.name()),
-            title: self.kind.title(),
-            status: self.kind.status().as_u16(),
+            r#type: self.kind.path(),
+            title: entry.title,
+            status: entry.status.as_u16(),
             error: self.detail.clone(),
             detail: self.detail,
             instance: new_id().urn().to_string(),
@@ -198,7 +108,7 @@ impl Problem {
 /// Status and headers; the layer around the routes writes the body.
 impl IntoResponse for Problem {
     fn into_response(self) -> Response {
-        let mut response = self.kind.status().into_response();
+        let mut response = self.kind.entry().status.into_response();
         let headers = response.headers_mut();
         match self.kind {
             Kind::KeyRequired => {
@@ -222,18 +132,23 @@ pub async fn write(mut request: Request, next: Next) -> Response {
     request.extensions_mut().insert(request_id.clone());
     let mut response = next.run(request).await;
     if let Some(problem) = Problem::take_from(&mut response, method.as_str(), &path) {
-        let status = problem.kind.status();
-        let body = Json(problem.body(&request_id)).into_response();
-        let (mut parts, _) = response.into_parts();
-        parts.status = status;
-        parts.headers.remove(CONTENT_LENGTH);
-        parts.headers.insert(CONTENT_TYPE, PROBLEM_JSON);
-        response = Response::from_parts(parts, body.into_body());
+        let status = problem.kind.entry().status;
+        response = with_document(response, status, problem.body(&request_id));
     }
     let headers = response.headers_mut();
     headers.insert(request_id::HEADER, request_id.header_value());
     page_headers::complete(headers);
     response
+}
+
+/// Writes a document as the body and keeps the headers of the response (`Allow`, `Retry-After` …).
+pub fn with_document(response: Response, status: StatusCode, document: ProblemBody) -> Response {
+    let body = Json(document).into_response();
+    let (mut parts, _) = response.into_parts();
+    parts.status = status;
+    parts.headers.remove(CONTENT_LENGTH);
+    parts.headers.insert(CONTENT_TYPE, PROBLEM_JSON);
+    Response::from_parts(parts, body.into_body())
 }
 
 /// The reason why a request failed (RFC 9457).

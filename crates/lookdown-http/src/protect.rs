@@ -17,8 +17,7 @@ use tower_http::catch_panic::CatchPanicLayer;
 use crate::{
     Shutdown,
     csrf::{self, AllowedOrigins, Remedies},
-    header_limits::{self, HeaderLimits},
-    host, keys,
+    header_limits, host, keys,
     problem::{self, Problem},
     server::{self, ConnectionLimits, Plain},
     unread_responses::{self, UnreadResponses},
@@ -101,10 +100,7 @@ pub async fn serve(
 
 /// Adds the layers of every route, the outermost first.
 fn surrounded(router: Router, limits: &ConnectionLimits) -> Router {
-    let limits = HeaderLimits {
-        max_headers: limits.max_headers,
-        max_header_bytes: limits.max_header_bytes,
-    };
+    let limits = limits.clone();
     let layers = ServiceBuilder::new()
         .layer(from_fn(problem::write))
         .layer(CatchPanicLayer::custom(panic_response))
@@ -118,9 +114,11 @@ fn panic_response(_: Box<dyn Any + Send>) -> Response {
     Problem::internal().into_response()
 }
 
-async fn check_key(State(key): State<Arc<SecretString>>, request: Request, next: Next) -> Response {
-    match keys::check(request.headers(), &key) {
-        Ok(()) => next.run(request).await,
-        Err(problem) => problem.into_response(),
-    }
+async fn check_key(
+    State(key): State<Arc<SecretString>>,
+    request: Request,
+    next: Next,
+) -> Result<Response, Problem> {
+    keys::check(request.headers(), &key)?;
+    Ok(next.run(request).await)
 }

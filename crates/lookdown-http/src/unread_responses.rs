@@ -6,7 +6,7 @@ use axum::{
     body::{Body, HttpBody, to_bytes},
     extract::{Request, State},
     middleware::Next,
-    response::{IntoResponse, Response},
+    response::Response,
 };
 use bytes::Bytes;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
@@ -39,33 +39,32 @@ pub(crate) async fn bound(
     State(budget): State<UnreadResponses>,
     request: Request,
     next: Next,
-) -> Response {
+) -> Result<Response, Problem> {
     let response = next.run(request).await;
     let size = response.body().size_hint().exact();
     let Some(size) = size.filter(|size| *size > SMALL_BYTES) else {
-        return response;
+        return Ok(response);
     };
     let units = u32::try_from(size.div_ceil(UNIT_BYTES)).unwrap_or(u32::MAX);
     let units = units.min(budget.units);
     let Ok(permit) = Arc::clone(&budget.free).try_acquire_many_owned(units) else {
         let detail = "too many responses that clients have not read are in memory: read responses \
                       faster, or ask for less";
-        return Problem::new(Kind::Overloaded, detail).into_response();
+        return Err(Problem::new(Kind::Overloaded, detail));
     };
     let (parts, body) = response.into_parts();
-    match to_bytes(body, usize::MAX).await {
-        Ok(content) => {
-            let held = Held {
-                content,
-                _permit: permit,
-            };
-            Response::from_parts(parts, Body::from(Bytes::from_owner(held)))
-        }
-        Err(error) => {
-            tracing::error!("a response cannot be written: {error}");
-            Problem::internal().into_response()
-        }
-    }
+    let content = to_bytes(body, usize::MAX).await.map_err(|error| {
+        tracing::error!("a response cannot be written: {error}");
+        Problem::internal()
+    })?;
+    let held = Held {
+        content,
+        _permit: permit,
+    };
+    Ok(Response::from_parts(
+        parts,
+        Body::from(Bytes::from_owner(held)),
+    ))
 }
 
 /// Bytes with their share of the budget.

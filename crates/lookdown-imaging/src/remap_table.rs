@@ -168,7 +168,7 @@ impl RemapTable {
     /// Returns true if a pixel of the view has a sample for which `counts` holds.
     fn has_sample(&self, counts: impl Fn(&Sample) -> bool) -> bool {
         let (width, height) = (self.frame_width as usize, self.frame_height as usize);
-        (0..self.grid.visibility().bands()).any(|index| {
+        (0..self.grid.visibility.bands()).any(|index| {
             let band = self.band(index);
             (0..band.patches()).any(|index| {
                 let patch = band.patch(index);
@@ -221,7 +221,7 @@ impl RemapTable {
             .skip(top as usize);
         // A band stays in the cache of the processor.
         let mut values = vec![0.0; 3 * LANES * width];
-        for index in 0..self.grid.visibility().bands() {
+        for index in 0..self.grid.visibility.bands() {
             let band = self.band(index);
             let plane_len = band.rows.len() * width;
             let (red, rest) = values.split_at_mut(plane_len);
@@ -272,7 +272,7 @@ impl RemapTable {
     }
 
     fn band(&self, index: usize) -> Band<'_> {
-        let visibility = self.grid.visibility();
+        let visibility = &self.grid.visibility;
         Band {
             above: self.grid.nodes(index),
             below: self.grid.nodes(index + 1),
@@ -326,7 +326,7 @@ impl WholePatches {
         };
         #[expect(clippy::cast_possible_truncation, reason = "a view's width is a u32")]
         let patches = grid.patches_across() as u32;
-        let visibility = grid.visibility();
+        let visibility = &grid.visibility;
         let band = |band: usize| {
             let rows = visibility.rows_of_band(band);
             let is_whole = |patch: u32| {

@@ -24,13 +24,13 @@ impl PyView {
     /// Width and height, pixels.
     #[getter]
     fn size(&self) -> (u32, u32) {
-        (self.planned.view.width(), self.planned.view.height())
+        (self.planned.view.width, self.planned.view.height)
     }
 
     /// Focal length, pixels.
     #[getter]
     fn focal(&self) -> f64 {
-        self.planned.view.focal()
+        self.planned.view.focal
     }
 
     /// Principal point, (x, y).
@@ -43,14 +43,14 @@ impl PyView {
     /// Rotation from the view frame to the camera frame, of shape (3, 3).
     #[getter]
     fn camera_from_view<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        let rotation = self.planned.view.camera_from_view().matrix();
+        let rotation = self.planned.view.camera_from_view.matrix();
         arr2(&[0, 1, 2].map(|row| [0, 1, 2].map(|column| rotation[(row, column)]))).into_pyarray(py)
     }
 
     /// Direction of the axis in the camera frame, of shape (3,).
     #[getter]
     fn axis<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        let rotation = self.planned.view.camera_from_view().matrix();
+        let rotation = self.planned.view.camera_from_view.matrix();
         arr1(&[0, 1, 2].map(|row| rotation[(row, 2)])).into_pyarray(py)
     }
 
@@ -71,7 +71,7 @@ impl PyView {
     fn maps<'py>(&self, py: Python<'py>) -> (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<f32>>) {
         let (view, lens) = (&self.planned.view, self.calibration.lens());
         let (x, y) = py.detach(|| {
-            let shape = (view.height() as usize, view.width() as usize);
+            let shape = (view.height as usize, view.width as usize);
             let (mut x, mut y) = (Array2::zeros(shape), Array2::zeros(shape));
             for (((row, column), x), y) in x.indexed_iter_mut().zip(&mut y) {
                 let pixel = Pixel::new(column as f64, row as f64);

@@ -63,22 +63,13 @@ impl Default for VideoOptions {
 }
 
 /// The transport of RTSP.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Deserialize, strum::IntoStaticStr)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum Transport {
     /// Over the connection of RTSP: works through firewalls, and loses no packets.
     #[default]
     Tcp,
     /// Separate datagrams.
     Udp,
-}
-
-impl Transport {
-    /// The name of the transport.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Tcp => "tcp",
-            Self::Udp => "udp",
-        }
-    }
 }

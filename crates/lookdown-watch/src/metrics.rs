@@ -8,11 +8,13 @@ use std::{
 use lookdown_common::{metric_set, metrics::text};
 use parking_lot::Mutex;
 use prometheus::{GaugeVec, IntCounter, IntCounterVec, IntGauge, Registry};
+use strum::{IntoStaticStr, VariantArray};
 
 use crate::{Frame, Viewers, operating_point::Choice, rate::Rate};
 
 /// The reason why a frame did not become a report.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "lowercase")]
 pub(crate) enum Failure {
     /// The camera sent a file that is not a whole image.
     Damaged,
@@ -22,24 +24,6 @@ pub(crate) enum Failure {
     Refused,
     /// The server could not be reached, or failed.
     Unreachable,
-}
-
-impl Failure {
-    const ALL: [Self; 4] = [
-        Self::Damaged,
-        Self::Overloaded,
-        Self::Refused,
-        Self::Unreachable,
-    ];
-
-    fn label(self) -> &'static str {
-        match self {
-            Self::Damaged => "damaged",
-            Self::Overloaded => "overloaded",
-            Self::Refused => "refused",
-            Self::Unreachable => "unreachable",
-        }
-    }
 }
 
 metric_set! {
@@ -81,7 +65,8 @@ pub(crate) struct CameraMetrics {
     /// Frames for which the server returned a report.
     pub(crate) sent: IntCounter,
     pub(crate) skipped: IntCounter,
-    failed: [IntCounter; Failure::ALL.len()],
+    /// Frames without a report, in the order of the reasons.
+    failed: Vec<IntCounter>,
     pub(crate) reconnects: IntCounter,
     /// The source, without credentials.
     source: String,
@@ -128,6 +113,8 @@ impl Metrics {
     pub(crate) fn add(&self, camera: &str, source: String) -> Arc<CameraMetrics> {
         let series = &self.series;
         let of = |counter: &IntCounterVec| counter.with_label_values(&[camera]);
+        let failed = Failure::VARIANTS.iter();
+        let failed = failed.map(|reason| series.failed.with_label_values(&[camera, reason.into()]));
         let metrics = Arc::new(CameraMetrics {
             camera: camera.to_owned(),
             viewers: Arc::clone(&self.viewers),
@@ -135,8 +122,7 @@ impl Metrics {
             received: of(&series.received),
             sent: of(&series.sent),
             skipped: of(&series.skipped),
-            failed: Failure::ALL
-                .map(|reason| series.failed.with_label_values(&[camera, reason.label()])),
+            failed: failed.collect(),
             reconnects: of(&series.reconnects),
             source,
             rate: Mutex::default(),
@@ -164,8 +150,8 @@ impl Metrics {
             let _ = counter.remove_label_values(&[camera]);
         }
         let _ = series.age.remove_label_values(&[camera]);
-        for reason in Failure::ALL {
-            let _ = series.failed.remove_label_values(&[camera, reason.label()]);
+        for reason in Failure::VARIANTS {
+            let _ = series.failed.remove_label_values(&[camera, reason.into()]);
         }
     }
 
@@ -226,7 +212,7 @@ impl CameraMetrics {
     }
 
     pub(crate) fn failed(&self, reason: Failure) {
-        let reasons = Failure::ALL.iter().zip(&self.failed);
+        let reasons = Failure::VARIANTS.iter().zip(&self.failed);
         for (_, counter) in reasons.filter(|(other, _)| **other == reason) {
             counter.inc();
         }

@@ -46,19 +46,6 @@ pub(in crate::api) struct Answered<T> {
     pub(in crate::api) answer: T,
 }
 
-/// The report as stored JSON, and the response of the writer.
-struct Written<T> {
-    json: Bytes,
-    answer: T,
-}
-
-/// The results of the work on a worker thread.
-struct Finished<T> {
-    report: DetectionReport,
-    image: Option<StoredFrame>,
-    written: Result<Written<T>, Problem>,
-}
-
 /// Detects the persons in a frame. `write` builds the response while the frame still holds its
 /// permit.
 pub(in crate::api) async fn run_detection<T: Send + 'static>(
@@ -84,17 +71,12 @@ pub(in crate::api) async fn run_detection<T: Send + 'static>(
         let report = detected.report.clone();
         let is_kept = is_stored && observer.keeps_image(&report.camera);
         let image = is_kept.then(|| new_image(&detected, concealment)).flatten();
-        Finished {
-            report,
-            image,
-            written: written(detected, write),
-        }
+        (report, image, written(detected, write))
     });
-    let finished = wait_for_workers(context, timeout, &timeline, work).await?;
-    let report = finished.report;
+    let (report, image, written) = wait_for_workers(context, timeout, &timeline, work).await?;
     describe(&context.trace, &report);
     record(&state.metrics, &report);
-    let Written { json, answer } = finished.written?;
+    let (json, answer) = written?;
     if is_stored {
         let kept = NewReport {
             camera: report.camera.clone(),
@@ -103,7 +85,7 @@ pub(in crate::api) async fn run_detection<T: Send + 'static>(
             scores: Some(report.scores.clone()),
             json,
         };
-        state.results.publish(kept, finished.image);
+        state.results.publish(kept, image);
         record_zones(state, &report);
     }
     Ok(Answered { report, answer })
@@ -150,11 +132,11 @@ pub(in crate::api) async fn wait_for_workers<T>(
     done
 }
 
-/// Serializes the report for the result store and the response.
+/// Returns the report as stored JSON, and the response of the writer.
 fn written<T>(
     detected: DetectedFrame,
     write: impl FnOnce(AnswerInput<'_>) -> Result<T, Problem>,
-) -> Result<Written<T>, Problem> {
+) -> Result<(Bytes, T), Problem> {
     let report = to_report(&detected.report);
     let json = serde_json::to_vec(&report).map_err(Problem::internal)?;
     let json = Bytes::from(json);
@@ -163,7 +145,7 @@ fn written<T>(
         report: &report,
         json: &json,
     })?;
-    Ok(Written { json, answer })
+    Ok((json, answer))
 }
 
 /// Returns the image to store with the report. A failure here does not fail the request.

@@ -73,7 +73,12 @@ impl Upload {
     ) -> Result<Self, Problem> {
         let context = RequestContext::from_extensions(request.extensions())?;
         let access = &state.options.access;
-        access.check(request.headers(), &context.identity, Scope::Detect)?;
+        access.check(
+            request.headers(),
+            context.holder.as_ref(),
+            None,
+            Scope::Detect,
+        )?;
         let uri = request.uri().clone();
         let mut upload = Self::receive(request, state, &state.uploads, use_of).await?;
         let mut parameters = query_parameters(&uri)?;
@@ -182,7 +187,12 @@ impl FromRequest<ApiState> for ReceivedRequest {
     async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
         let context = RequestContext::from_extensions(request.extensions())?;
         let access = &state.options.access;
-        access.check(request.headers(), &context.identity, Scope::Detect)?;
+        access.check(
+            request.headers(),
+            context.holder.as_ref(),
+            None,
+            Scope::Detect,
+        )?;
         Self::receive(request, state, &state.uploads).await
     }
 }

@@ -29,49 +29,37 @@ pub enum Access {
     Keys(Arc<AccessKeys>),
 }
 
-/// The holder of the only key in the headers of a request. `None` without a valid one.
-#[derive(Debug, Clone)]
-pub(in crate::api) struct Identity(Option<Holder>);
-
-impl Identity {
-    pub(in crate::api) fn holder(&self) -> Option<&Holder> {
-        self.0.as_ref()
-    }
-}
-
 impl Access {
     /// Compares the key in the headers with all known keys, if there is exactly one.
-    pub(in crate::api) fn identify(&self, headers: &HeaderMap) -> Identity {
-        let key = only_key(presented(headers)).ok();
-        Identity(key.and_then(|key| self.holder_of(key)))
+    pub(in crate::api) fn identify(&self, headers: &HeaderMap) -> Option<Holder> {
+        self.holder_of(only_key(presented(headers)).ok()?)
     }
 
-    /// Checks that the keys allow `wanted` to the request with these headers and this identity.
+    /// Checks that the keys allow `wanted` to the request with these headers, whose only key is that
+    /// of `holder`. Its key may also be `elsewhere`, as in a form. Returns the holder of its key, if
+    /// there are keys. Without keys, only a server that no other machine can reach allows changes.
     pub(in crate::api) fn check(
         &self,
         headers: &HeaderMap,
-        identity: &Identity,
-        wanted: Scope,
-    ) -> Result<(), Problem> {
-        self.check_with(headers, identity, None, wanted).map(drop)
-    }
-
-    /// Like [`Self::check`], for a request whose key may be in a form. Returns the holder of its
-    /// key, if there are keys.
-    pub(in crate::api) fn check_with(
-        &self,
-        headers: &HeaderMap,
-        identity: &Identity,
-        in_form: Option<&str>,
+        holder: Option<&Holder>,
+        elsewhere: Option<&str>,
         wanted: Scope,
     ) -> Result<Option<Holder>, Problem> {
-        if !self.needs_keys() {
-            return Ok(None);
+        match self {
+            Self::Open {
+                own_machine_only: false,
+            } if wanted == Scope::Admin => {
+                let detail = "without keys, clients of an open server (access.open) may only detect \
+                              and read: set access.keys_file and send a key with the scope admin";
+                return Err(Problem::new(ProblemKind::Forbidden, detail));
+            }
+            Self::Open { .. } => return Ok(None),
+            Self::Keys(_) => {}
         }
-        let key = only_key(presented(headers).chain(in_form.map(str::as_bytes)))?;
-        let holder = match in_form {
+        let key = only_key(presented(headers).chain(elsewhere.map(str::as_bytes)))?;
+        let holder = match elsewhere {
             Some(_) => self.holder_of(key),
-            None => identity.0.clone(),
+            None => holder.cloned(),
         };
         let holder = holder.ok_or_else(|| {
             let detail = "the key is not valid: it was mistyped, or the server's operator \
@@ -118,26 +106,6 @@ impl Access {
         match self {
             Self::Open { .. } => None,
             Self::Keys(keys) => keys.holder_of(key),
-        }
-    }
-
-    /// Like [`Self::check`]. Without keys, only a server that no other machine can reach allows the
-    /// request.
-    pub(in crate::api) fn check_of_its_own(
-        &self,
-        headers: &HeaderMap,
-        identity: &Identity,
-        wanted: Scope,
-    ) -> Result<(), Problem> {
-        match self {
-            Self::Open {
-                own_machine_only: false,
-            } => {
-                let detail = "without keys, clients of an open server (access.open) may only detect \
-                              and read: set access.keys_file and send a key with the scope admin";
-                Err(Problem::new(ProblemKind::Forbidden, detail))
-            }
-            _ => self.check(headers, identity, wanted),
         }
     }
 }

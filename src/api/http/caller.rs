@@ -13,7 +13,7 @@ use lookdown_detect::{
 use lookdown_http::request_id::RequestId;
 
 use super::{
-    access::{Access, Identity},
+    access::Access,
     problem::{Problem, ProblemKind},
 };
 use crate::access::Holder;
@@ -32,14 +32,13 @@ pub(in crate::api) struct Caller {
 }
 
 impl Caller {
-    /// Returns the caller with this identity. The routes check the key itself.
+    /// Returns the caller with the key of this holder. The routes check the key itself.
     pub(super) fn new(
         access: &Access,
-        identity: &Identity,
+        holder: Option<&Holder>,
         request_id: &RequestId,
         parts: &Parts,
     ) -> Self {
-        let holder = identity.holder();
         let address = parts.extensions.get::<SocketAddr>().map(SocketAddr::ip);
         Self {
             client: client(access, holder, address),

@@ -14,13 +14,11 @@ use axum::{
 };
 use lookdown_http::request_id::RequestId;
 
-use super::{
-    access::{Access, Identity},
-    caller::Caller,
-    deadline::Deadline,
-    problem::Problem,
+use super::{access::Access, caller::Caller, deadline::Deadline, problem::Problem};
+use crate::{
+    access::Holder,
+    telemetry::{RequestTrace, Tracer},
 };
-use crate::telemetry::{RequestTrace, Tracer};
 
 /// The settings of the contexts.
 #[derive(Clone)]
@@ -42,7 +40,7 @@ pub(in crate::api) struct RequestContext {
     /// The deadline of the response.
     pub(in crate::api) deadline: Deadline,
     /// The holder of the key in the headers: keys are compared here, once for each request.
-    pub(in crate::api) identity: Identity,
+    pub(in crate::api) holder: Option<Holder>,
     pub(in crate::api) caller: Caller,
     /// True if a part of this process sent the request.
     pub(in crate::api) is_own: bool,
@@ -56,13 +54,13 @@ impl ContextSource {
         name: impl FnOnce() -> String,
     ) -> Arc<RequestContext> {
         let id = RequestId::from_headers(&parts.headers);
-        let identity = self.access.identify(&parts.headers);
+        let holder = self.access.identify(&parts.headers);
         let context = Arc::new(RequestContext {
             trace: begin_trace(&self.tracer, name, &parts.headers),
             deadline: Deadline::begin(self.request_timeout),
-            caller: Caller::new(&self.access, &identity, &id, parts),
+            caller: Caller::new(&self.access, holder.as_ref(), &id, parts),
             is_own: parts.extensions.get::<OwnRequest>().is_some(),
-            identity,
+            holder,
             id,
         });
         parts.extensions.insert(Arc::clone(&context));
@@ -81,7 +79,7 @@ impl RequestContext {
 
     /// Adds the upload to the trace: the time until the whole body was in memory.
     pub(in crate::api) fn note_upload(&self, arrived: Instant) {
-        let began = self.deadline.began().into_std();
+        let began = self.deadline.began.into_std();
         self.trace.stage("upload", began, arrived);
     }
 }

@@ -42,7 +42,8 @@ impl SlowStore {
 /// The time at which a response must be complete.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::api) struct Deadline {
-    began: Instant,
+    /// The time at which the request arrived.
+    pub(in crate::api) began: Instant,
     limit: Duration,
     /// The setting or parameter that raises the limit.
     set_by: &'static str,
@@ -68,11 +69,6 @@ impl Deadline {
             },
             _ => self,
         }
-    }
-
-    /// Returns the time at which the request arrived.
-    pub(in crate::api) fn began(self) -> Instant {
-        self.began
     }
 
     pub(in crate::api) fn at(self) -> Instant {

@@ -16,7 +16,7 @@ use axum::{
         header::{CONNECTION, EXPECT},
     },
     middleware::Next,
-    response::{IntoResponse, Response},
+    response::Response,
 };
 use bytes::Bytes;
 use http_body::{Frame, SizeHint};
@@ -25,6 +25,7 @@ use tokio::{sync::oneshot, time::timeout_at};
 use super::{
     context::RequestContext,
     deadline::Deadline,
+    problem::Problem,
     request_body::{MinimumUploadRate, next_chunk},
 };
 
@@ -45,14 +46,11 @@ pub(in crate::api) async fn discard(
     State(limits): State<BodyLimits>,
     request: Request,
     next: Next,
-) -> Response {
+) -> Result<Response, Problem> {
     let (parts, body) = request.into_parts();
-    let deadline = match RequestContext::from_extensions(&parts.extensions) {
-        Ok(context) => context.deadline,
-        Err(problem) => return problem.into_response(),
-    };
+    let deadline = RequestContext::from_extensions(&parts.extensions)?.deadline;
     if body.is_end_stream() {
-        return next.run(Request::from_parts(parts, body)).await;
+        return Ok(next.run(Request::from_parts(parts, body)).await);
     }
     // A client with `Expect: 100-continue` sends nothing until the server starts to read.
     let asks_first = parts.headers.contains_key(EXPECT);
@@ -71,7 +69,7 @@ pub(in crate::api) async fn discard(
         let most = limits.max_body_bytes.saturating_mul(DISCARDED_LIMITS);
         throw_away(body.body, most, upload_rate, deadline).await;
     }
-    response
+    Ok(response)
 }
 
 async fn throw_away(

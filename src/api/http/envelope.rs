@@ -3,15 +3,15 @@
 use std::{any::Any, sync::Arc, time::Instant};
 
 use axum::{
-    Json,
     extract::{MatchedPath, Request, State},
-    http::{HeaderValue, Method, StatusCode, header},
+    http::{Method, StatusCode},
     middleware::Next,
     response::{IntoResponse, Response},
 };
 use lookdown_http::{
     page_headers,
-    request_id::{self, RequestId, new_id},
+    problem::with_document,
+    request_id::{self, new_id},
 };
 use tracing::Instrument;
 use uuid::Uuid;
@@ -82,7 +82,9 @@ pub(in crate::api) async fn wrap(
         if let Some(cause) = &problem.cause {
             tracing::error!(instance = %occurrence, "{cause:#}");
         }
-        response = write_problem(response, problem, &occurrence, request_id);
+        let status = problem.status;
+        let document = problem.body(&occurrence, request_id.as_str());
+        response = with_document(response, status, document);
     }
     let status = response.status();
     let class = status_class(status);
@@ -134,23 +136,6 @@ fn end(trace: &RequestTrace, status: StatusCode, reason: Option<&'static str>) {
     trace.end(fault);
 }
 
-/// Writes the problem as the body and keeps the headers of the response (`Allow`, `Retry-After` …).
-fn write_problem(
-    response: Response,
-    problem: Problem,
-    occurrence: &Uuid,
-    request_id: &RequestId,
-) -> Response {
-    let status = problem.status;
-    let body = Json(problem.body(occurrence, request_id.as_str())).into_response();
-    let (mut parts, _) = response.into_parts();
-    parts.status = status;
-    parts.headers.remove(header::CONTENT_LENGTH);
-    let problem_json = HeaderValue::from_static("application/problem+json");
-    parts.headers.insert(header::CONTENT_TYPE, problem_json);
-    Response::from_parts(parts, body.into_body())
-}
-
 /// Returns a metric label from a fixed list: clients can send arbitrary methods.
 fn method_label(method: &Method) -> &'static str {
     match *method {
@@ -179,7 +164,7 @@ fn status_class(status: StatusCode) -> &'static str {
 mod tests {
     use std::time::Duration;
 
-    use axum::{Router, body::Body, middleware::from_fn_with_state, routing::get};
+    use axum::{Router, body::Body, http::header, middleware::from_fn_with_state, routing::get};
     use http_body_util::BodyExt;
     use tower::ServiceExt;
     use tower_http::catch_panic::CatchPanicLayer;

@@ -4,7 +4,6 @@
 //! an ID of the occurrence, logs its cause and counts it. The [table](kind) declares the kinds.
 
 mod calibration;
-mod kind;
 mod pipeline;
 
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
@@ -19,8 +18,7 @@ use axum::{
 use serde_json::Value;
 use uuid::Uuid;
 
-pub(in crate::api) use kind::ProblemKind;
-pub(in crate::api) use lookdown_http::problem::ProblemBody;
+pub(in crate::api) use lookdown_http::problem::{Kind as ProblemKind, ProblemBody};
 
 /// The longest `Retry-After`.
 const MAX_RETRY_AFTER_SECONDS: u64 = 60;
@@ -48,7 +46,7 @@ impl Problem {
     pub(in crate::api) fn new(kind: ProblemKind, detail: impl Into<String>) -> Self {
         Self {
             kind,
-            status: kind.status(),
+            status: kind.entry().status,
             detail: detail.into(),
             parameter: None,
             retry_after: None,
@@ -180,7 +178,7 @@ impl Problem {
     pub(in crate::api) fn body(self, occurrence: &Uuid, request_id: &str) -> ProblemBody {
         ProblemBody {
             r#type: self.kind.path(),
-            title: self.kind.title(),
+            title: self.kind.entry().title,
             status: self.status.as_u16(),
             error: self.detail.clone(),
             detail: self.detail,
@@ -195,10 +193,9 @@ impl Problem {
 /// The problems of the layers that all listeners share have the kinds of the table.
 impl From<lookdown_http::problem::Problem> for Problem {
     fn from(problem: lookdown_http::problem::Problem) -> Self {
-        let kind = ProblemKind::from_name(problem.kind.name()).unwrap_or(ProblemKind::Internal);
         Self {
             parameter: problem.parameter,
-            ..Self::new(kind, problem.detail)
+            ..Self::new(problem.kind, problem.detail)
         }
     }
 }
@@ -207,7 +204,7 @@ impl From<lookdown_http::problem::Problem> for Problem {
 impl IntoResponse for Problem {
     fn into_response(self) -> Response {
         let mut response = self.status.into_response();
-        if let Some(least) = self.kind.retry_after_seconds() {
+        if let Some(least) = self.kind.entry().retry_after_seconds {
             let wanted = self.retry_after.map_or(0, |after| after.as_secs() + 1);
             let seconds = HeaderValue::from(wanted.clamp(least, MAX_RETRY_AFTER_SECONDS));
             response.headers_mut().insert(RETRY_AFTER, seconds);

@@ -106,11 +106,8 @@ pub(in crate::api) async fn apply(
     State(limiter): State<RateLimiter>,
     mut request: Request,
     next: Next,
-) -> Response {
-    let context = match RequestContext::from_extensions(request.extensions()) {
-        Ok(context) => context,
-        Err(problem) => return problem.into_response(),
-    };
+) -> Result<Response, Problem> {
+    let context = RequestContext::from_extensions(request.extensions())?;
     let client = context.caller.rate_limited.clone();
     let standing = limiter.take(client.clone());
     let last = Arc::new(Mutex::new(standing));
@@ -135,7 +132,7 @@ pub(in crate::api) async fn apply(
     if let Ok(remaining) = remaining.parse() {
         headers.insert(RATE_LIMIT, remaining);
     }
-    response
+    Ok(response)
 }
 
 fn too_fast(next_in: Duration) -> Problem {

@@ -47,9 +47,7 @@ queries! {
 /// The frame and parameters in a form: what `detect::upload::form` reads.
 pub(in crate::api) struct DetectForm;
 
-impl ToSchema for DetectForm {
-    fn schemas(_: &mut Vec<(String, RefOr<Schema>)>) {}
-}
+impl ToSchema for DetectForm {}
 
 impl PartialSchema for DetectForm {
     /// Returns the schema with the query parameters and the frame, and no other field.
@@ -172,9 +170,7 @@ fn value_schema(kind: ParameterKind) -> ObjectBuilder {
 /// A binary body.
 pub(in crate::api) struct RawBytes;
 
-impl ToSchema for RawBytes {
-    fn schemas(_: &mut Vec<(String, RefOr<Schema>)>) {}
-}
+impl ToSchema for RawBytes {}
 
 impl PartialSchema for RawBytes {
     fn schema() -> RefOr<Schema> {

@@ -179,7 +179,7 @@ fn status_of(kind: ProblemKind) -> StatusCode {
     match kind {
         ProblemKind::ImageTooLarge => StatusCode::BAD_REQUEST,
         ProblemKind::Timeout => StatusCode::INTERNAL_SERVER_ERROR,
-        kind => match kind.status() {
+        kind => match kind.entry().status {
             StatusCode::UNSUPPORTED_MEDIA_TYPE | StatusCode::UNPROCESSABLE_ENTITY => {
                 StatusCode::BAD_REQUEST
             }
@@ -231,7 +231,7 @@ impl FromRequest<ApiState> for DeepStackUpload {
         let mut budget = &state.uploads;
         if !is_form || access::shows_key(headers) {
             let context = RequestContext::from_extensions(request.extensions())?;
-            known.check(headers, &context.identity, Scope::Detect)?;
+            known.check(headers, context.holder.as_ref(), None, Scope::Detect)?;
         } else if known.needs_keys() {
             budget = &state.unauthenticated_uploads;
         }
@@ -251,12 +251,8 @@ impl FromRequest<ApiState> for DeepStackUpload {
         }
         drop(keys);
         let key = key.as_ref().map(|(_, key)| key.as_str());
-        let holder = known.check_with(
-            &upload.headers,
-            &upload.context.identity,
-            key,
-            Scope::Detect,
-        )?;
+        let holder = upload.context.holder.as_ref();
+        let holder = known.check(&upload.headers, holder, key, Scope::Detect)?;
         upload.caller = upload.caller.with_holder(known, holder.as_ref());
         Ok(Self { upload, query })
     }

@@ -474,9 +474,7 @@ impl IntoParams for KnownCameraQuery {
 /// Frames in a form, with the known values as further fields.
 struct FitForm;
 
-impl ToSchema for FitForm {
-    fn schemas(_: &mut Vec<(String, RefOr<Schema>)>) {}
-}
+impl ToSchema for FitForm {}
 
 impl PartialSchema for FitForm {
     fn schema() -> RefOr<Schema> {

@@ -225,11 +225,7 @@ pub(in crate::api) async fn put(
         state.results.delete_image(&name).await?;
     }
     tracing::info!(camera = name, "the camera was stored");
-    Ok(if is_new {
-        StatusCode::CREATED
-    } else {
-        StatusCode::NO_CONTENT
-    })
+    Ok(stored_status(is_new))
 }
 
 /// Change a camera
@@ -371,6 +367,15 @@ async fn using_files<T: Send + 'static>(
     done.await
 }
 
+/// Returns the status after something was stored.
+fn stored_status(is_new: bool) -> StatusCode {
+    if is_new {
+        StatusCode::CREATED
+    } else {
+        StatusCode::NO_CONTENT
+    }
+}
+
 fn unknown() -> Problem {
     Problem::new(
         ProblemKind::NotFound,
@@ -478,7 +483,8 @@ async fn rows(
     }
     for row in &mut rows {
         row.keep_image = state.keeps_image(&row.name);
-        row.suggestion = suggestion::state_of(state, &row.name);
+        let suggestion = state.suggestions.for_camera(&row.name);
+        row.suggestion = suggestion.as_ref().map(SuggestionState::new);
         let of_counts = || state.options.companions.count_warning(&row.name);
         let of_counts = || (!row.paused).then(of_counts).flatten();
         row.warning = row.warning.take().or_else(of_counts);

@@ -89,9 +89,11 @@ pub(in crate::api) async fn remove(state: &ApiState, camera: &str) -> bool {
     }
 }
 
-async fn answer(state: &ApiState, request: Request) -> Result<Response, Problem> {
+async fn answer(state: &ApiState, mut request: Request) -> Result<Response, Problem> {
+    // The routes would add the parameters of their path to those of the path here.
+    request.extensions_mut().clear();
     let response = match state.options.companions.counts() {
-        Counts::Here(routes) => match routes.oneshot(without_extensions(request)).await {
+        Counts::Here(routes) => match routes.oneshot(request).await {
             Ok(response) => response,
             Err(never) => match never {},
         },
@@ -110,17 +112,6 @@ async fn answer(state: &ApiState, request: Request) -> Result<Response, Problem>
         status if status.is_success() || status == StatusCode::NOT_MODIFIED => Ok(response),
         status => Err(problem(status, response).await),
     }
-}
-
-/// Returns the request without the parameters of its path here, which the routes would add theirs
-/// to.
-fn without_extensions(request: Request) -> Request {
-    let (parts, body) = request.into_parts();
-    let mut request = Request::new(body);
-    *request.method_mut() = parts.method;
-    *request.uri_mut() = parts.uri;
-    *request.headers_mut() = parts.headers;
-    request
 }
 
 /// Returns the request to another host.

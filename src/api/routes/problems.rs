@@ -63,9 +63,10 @@ pub(in crate::api) async fn get_problem(
         let detail = "there is no problem with this name: GET /problems lists all names";
         Problem::new(ProblemKind::NotFound, detail)
     })?;
-    let (title, name, status) = (kind.title(), kind.name(), kind.status().as_u16());
-    let (description, remedy) = (kind.description(), kind.remedy());
-    let retry = kind.retry_after_seconds().map_or(
+    let entry = kind.entry();
+    let (title, name, status) = (entry.title, entry.name, entry.status.as_u16());
+    let (description, remedy) = (entry.description, entry.remedy);
+    let retry = entry.retry_after_seconds.map_or(
         "",
         |_| "The header `Retry-After` has the time before a retry, in seconds.",
     );
@@ -90,7 +91,8 @@ pub(in crate::api) async fn get_problem(
 pub fn problem_table() -> String {
     let mut table = "| type | status | remedy |\n|---|---|---|\n".to_owned();
     for kind in ProblemKind::ALL {
-        let (path, status, remedy) = (kind.path(), kind.status().as_u16(), kind.remedy());
+        let (path, entry) = (kind.path(), kind.entry());
+        let (status, remedy) = (entry.status.as_u16(), entry.remedy);
         // Writing to a string cannot fail.
         let _ = writeln!(table, "| `{path}` | {status} | {remedy} |");
     }
@@ -100,14 +102,15 @@ pub fn problem_table() -> String {
 fn html_table() -> String {
     let mut table = "<table>\n<tr><th>Type<th>Status<th>Title<th>Cause<th>Remedy</tr>\n".to_owned();
     for kind in ProblemKind::ALL {
+        let entry = kind.entry();
         let _ = writeln!(
             table,
             "<tr><td><a href=\"problems/{name}\"><code>{name}</code></a><td>{}<td>{}<td>{}<td>{}</tr>",
-            kind.status().as_u16(),
-            kind.title(),
-            marked_up(kind.description()),
-            marked_up(kind.remedy()),
-            name = kind.name(),
+            entry.status.as_u16(),
+            entry.title,
+            marked_up(entry.description),
+            marked_up(entry.remedy),
+            name = entry.name,
         );
     }
     table + "</table>"

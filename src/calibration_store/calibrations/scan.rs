@@ -16,7 +16,7 @@ impl Calibrations {
     /// Lists the store and reads the files that have changed. Failures are logged, reported by
     /// [`Calibrations::health`], and leave the affected calibrations unchanged. Blocks.
     pub fn refresh(&self) {
-        let changing = self.lock();
+        let changing = self.changing.lock();
         if let Err(error) = self.scan(&changing) {
             self.keep_all(&error);
         }

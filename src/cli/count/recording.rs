@@ -21,7 +21,7 @@ use lookdown_detect::{
     parameters::DetectParameters,
     pipeline::{DetectJob, DetectedFrame, Engine, JobImage},
 };
-use lookdown_watch::{VideoFrames, VideoOptions, VideoWriter, video_created_at, video_duration};
+use lookdown_watch::{VideoFrames, VideoOptions, video_created_at, video_duration};
 use tokio::runtime::Runtime;
 
 use crate::{
@@ -29,7 +29,8 @@ use crate::{
     api::to_report,
     app::engine_for,
     cli::{
-        SettingsFile, annotate,
+        SettingsFile,
+        annotate::AnnotatedVideo,
         async_runtime::for_this_thread,
         detect::stream::{interval, is_video},
         output::UNWRITABLE,
@@ -99,7 +100,7 @@ struct Counting<'a> {
     every: Duration,
     /// Frames that are processed at the same time.
     at_once: usize,
-    video: Option<(VideoWriter, &'a Path)>,
+    video: Option<AnnotatedVideo<'a>>,
     drawing: AnnotationOptions,
     progress: Progress,
 }
@@ -158,7 +159,7 @@ pub(super) fn run(
         tracing::info!("continuing after {until}: earlier frames are counted already");
     }
     let video = match &flags.annotate {
-        Some(path) => Some((writer(path, every, &runtime)?, path.as_path())),
+        Some(path) => Some(AnnotatedVideo::create(path, every, &runtime)?),
         None => None,
     };
     let engine = engine_for(&settings, std::slice::from_ref(&parameters))?;
@@ -236,15 +237,13 @@ impl Counting<'_> {
             for (at, mut detected) in self.detect(&name, images)? {
                 let report = serde_json::to_vec(&to_report(&detected.report))?;
                 self.recording.count(at, &report)?;
-                if let Some((writer, path)) = &mut self.video {
+                if let Some(video) = &mut self.video {
                     // From 0.06 on, most persons are none. Those who are followed make the counts.
                     let followed = self.recording.followed(at);
                     let mut index = 0..;
                     let persons = &mut detected.report.persons;
                     persons.retain(|_| index.next().is_some_and(|index| followed.contains(&index)));
-                    let jpeg = annotate::jpeg(detected, &self.drawing)?;
-                    let written = self.runtime.block_on(writer.write(&jpeg));
-                    written.with_context(|| unwritable(path))?;
+                    video.append(detected, &self.drawing, &self.runtime)?;
                 }
                 self.progress.advance();
             }
@@ -287,9 +286,8 @@ impl Counting<'_> {
     /// Stores the last counts and completes the video.
     fn finish(mut self) -> anyhow::Result<Recording> {
         self.recording.commit()?;
-        if let Some((writer, path)) = self.video {
-            let finished = self.runtime.block_on(writer.finish());
-            finished.with_context(|| unwritable(path))?;
+        if let Some(video) = self.video {
+            video.finish(&self.runtime)?;
         }
         Ok(self.recording)
     }
@@ -345,16 +343,6 @@ fn modified_at(path: &Path) -> anyhow::Result<Timestamp> {
     let modified = modified.with_context(|| format!("{}: it cannot be read", path.display()))?;
     let since = modified.duration_since(UNIX_EPOCH).unwrap_or_default();
     Ok(Timestamp::UNIX_EPOCH + since)
-}
-
-fn writer(path: &Path, every: Duration, runtime: &Runtime) -> anyhow::Result<VideoWriter> {
-    let _entered = runtime.enter();
-    let writer = VideoWriter::create(path, every, &VideoOptions::default());
-    writer.with_context(|| unwritable(path))
-}
-
-fn unwritable(path: &Path) -> String {
-    format!("--annotate: {} cannot be written", path.display())
 }
 
 fn stem(path: &Path) -> String {

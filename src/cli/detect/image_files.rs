@@ -6,9 +6,8 @@ use std::{
 };
 
 use anyhow::{Context, bail};
+use lookdown_common::files::{IMAGE_ENDINGS, has_ending};
 
-/// Endings of images that can be read, in lower case.
-const ENDINGS: [&str; 4] = ["jpg", "jpeg", "png", "webp"];
 /// The maximum number of images of one run.
 const MAX_IMAGES: usize = 100_000;
 /// Most folders within each other.
@@ -68,7 +67,7 @@ fn walk(
         }
         if entry.file_type().with_context(unreadable)?.is_dir() {
             walk(&path, &format!("{prefix}{name}/"), depth - 1, image_files)?;
-        } else if is_image_file(&path) {
+        } else if has_ending(&path, &IMAGE_ENDINGS) && path.is_file() {
             if image_files.len() >= MAX_IMAGES {
                 bail!("{shown}: more than {MAX_IMAGES} images at once; name fewer");
             }
@@ -79,12 +78,6 @@ fn walk(
         }
     }
     Ok(())
-}
-
-fn is_image_file(path: &Path) -> bool {
-    let ending = path.extension().and_then(|ending| ending.to_str());
-    ending.is_some_and(|ending| ENDINGS.contains(&ending.to_ascii_lowercase().as_str()))
-        && path.is_file()
 }
 
 #[cfg(test)]

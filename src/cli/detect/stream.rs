@@ -8,8 +8,8 @@ use std::{
 
 use anyhow::{Context, bail};
 use bytes::Bytes;
-use lookdown_common::parse_duration;
-use lookdown_watch::{ImageReader, VideoFrames, VideoOptions, VideoWriter, video_duration};
+use lookdown_common::{files::has_ending, parse_duration};
+use lookdown_watch::{ImageReader, VideoFrames, VideoOptions, video_duration};
 use tokio::runtime::Runtime;
 
 use crate::cli::{async_runtime::for_this_thread, progress::Progress};
@@ -70,10 +70,7 @@ impl Stream {
 
 /// Returns true if the ending of a file is that of a video.
 pub(in crate::cli) fn is_video(path: &Path) -> bool {
-    let ending = path.extension().and_then(|ending| ending.to_str());
-    let ending = ending.map(str::to_ascii_lowercase);
-    ending.is_some_and(|ending| ENDINGS.contains(&ending.as_str()))
-        && (path.is_file() || !path.exists())
+    has_ending(path, &ENDINGS) && (path.is_file() || !path.exists())
 }
 
 /// Parses `--every`.
@@ -85,10 +82,10 @@ pub(in crate::cli) fn interval(text: &str) -> Result<Duration, String> {
 
 /// The frames of a stream, read one after another.
 pub(super) struct StreamReader {
-    runtime: Runtime,
+    pub(super) runtime: Runtime,
     frames: Frames,
     name: String,
-    every: Duration,
+    pub(super) every: Duration,
     pub(super) progress: Option<Progress>,
 }
 
@@ -171,48 +168,11 @@ impl StreamReader {
         frame.with_context(|| name.clone())
     }
 
-    /// Starts to write a video with the interval of the frames.
-    ///
-    /// # Errors
-    /// Returns an error if `ffmpeg` is missing.
-    pub(super) fn writer(&self, path: &Path) -> anyhow::Result<VideoWriter> {
-        let _entered = self.runtime.enter();
-        let writer = VideoWriter::create(path, self.every, &VideoOptions::default());
-        writer.with_context(|| unwritable(path))
-    }
-
-    /// Appends a JPEG to a video.
-    ///
-    /// # Errors
-    /// Returns an error if the file cannot be written.
-    pub(super) fn write(
-        &self,
-        writer: &mut VideoWriter,
-        path: &Path,
-        jpeg: &[u8],
-    ) -> anyhow::Result<()> {
-        let written = self.runtime.block_on(writer.write(jpeg));
-        written.with_context(|| unwritable(path))
-    }
-
-    /// Completes a video.
-    ///
-    /// # Errors
-    /// Returns an error if the file cannot be written.
-    pub(super) fn finish(&self, writer: VideoWriter, path: &Path) -> anyhow::Result<()> {
-        let finished = self.runtime.block_on(writer.finish());
-        finished.with_context(|| unwritable(path))
-    }
-
     /// Ends the reader. A read of standard input may never end, so it is not waited for.
     pub(super) fn end(self) {
         drop(self.frames);
         self.runtime.shutdown_background();
     }
-}
-
-fn unwritable(path: &Path) -> String {
-    format!("--annotate: {} cannot be written", path.display())
 }
 
 #[cfg(test)]

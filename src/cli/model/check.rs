@@ -86,7 +86,7 @@ pub(super) fn check_model(
         .map_err(|error| anyhow!(explain(&error)))?;
     let loaded = loading.elapsed();
     let mut out = io::stdout().lock();
-    write!(out, "{}", Lines(detector.description())).context(UNWRITABLE)?;
+    write!(out, "{}", Lines(&detector.description)).context(UNWRITABLE)?;
     writeln!(out, "loaded in    {}", millis(loaded)).context(UNWRITABLE)?;
     let most = settings.threads.batch_views.get().max(BATCH_VIEWS);
     let one_view = millis(time(&mut detector, 1)?);

@@ -302,23 +302,36 @@ fn unknown_retained_cameras_are_withdrawn_after_a_time() {
     cameras.begin_connection(begin);
     let mut retained = |topic: &str| cameras.compare(topic, b"1", true);
     let offline = |camera: &str| {
-        let topic = topics.availability(camera);
+        let topic = topics.of_camera(camera, "availability");
         Some(Message::retained(topic, "offline"))
     };
-    assert_eq!(retained(&topics.persons("old")), offline("old"));
+    assert_eq!(
+        retained(&topics.of_camera("old", "persons")),
+        offline("old")
+    );
     assert_eq!(retained(&topics.zone("old", "door")), None);
-    assert_eq!(retained(&topics.availability("other")), offline("other"));
-    assert_eq!(retained(&topics.persons("lobby")), None);
+    assert_eq!(
+        retained(&topics.of_camera("other", "availability")),
+        offline("other")
+    );
+    assert_eq!(retained(&topics.of_camera("lobby", "persons")), None);
     assert_eq!(retained(&topics.zone("lobby", "gone")), None);
     assert_eq!(retained("lookdown/status"), None);
     // The messages of this server and of another one come back as they are published.
     assert_eq!(
-        cameras.compare(&topics.availability("old"), b"offline", false),
+        cameras.compare(&topics.of_camera("old", "availability"), b"offline", false),
         None
     );
-    assert_eq!(cameras.compare(&topics.persons("other"), b"3", false), None);
-    let online = Message::retained(topics.availability("lobby"), "online");
-    let answer = cameras.compare(&topics.availability("lobby"), b"offline", false);
+    assert_eq!(
+        cameras.compare(&topics.of_camera("other", "persons"), b"3", false),
+        None
+    );
+    let online = Message::retained(topics.of_camera("lobby", "availability"), "online");
+    let answer = cameras.compare(
+        &topics.of_camera("lobby", "availability"),
+        b"offline",
+        false,
+    );
     assert_eq!(answer, Some(online));
 
     let removed = cameras.expire(begin + EXPIRY);
@@ -345,7 +358,10 @@ fn unknown_retained_cameras_are_withdrawn_after_a_time() {
     ];
     assert_eq!(removed, BTreeSet::from(wanted));
     // Later, retained messages are ignored.
-    assert_eq!(cameras.compare(&topics.persons("late"), b"1", true), None);
+    assert_eq!(
+        cameras.compare(&topics.of_camera("late", "persons"), b"1", true),
+        None
+    );
 }
 
 #[test]

@@ -102,7 +102,7 @@ fn dropped_listeners_leave_nothing_behind() {
         );
     }
     assert_eq!(count(&listeners), 0);
-    assert!(listeners.group().queues.is_empty());
+    assert!(listeners.group.lock().queues.is_empty());
 }
 
 #[test]

@@ -6,19 +6,19 @@ use std::{fmt, io, str::FromStr, time::Duration};
 
 use redis::{
     AsyncConnectionConfig, Client, ConnectionAddr, ProtocolVersion, RedisResult,
-    aio::{AsyncStream, MultiplexedConnection},
+    aio::MultiplexedConnection,
 };
-use tokio::{net::TcpStream, spawn, time::timeout};
+use tokio::{spawn, time::timeout};
 use url::Url;
 
 use super::pushes::{self, Pushes};
-use crate::tls::ClientTls;
+use crate::tls::{ClientTls, Stream, connect};
 
 /// The address and the credentials of a Redis. It is displayed without the credentials.
 #[derive(Clone)]
 pub struct RedisAddress {
     url: Url,
-    client: Client,
+    pub(super) client: Client,
 }
 
 /// The text is not an address of a Redis. The text is not repeated, as it may hold a password.
@@ -30,10 +30,6 @@ pub struct RedisAddress {
 pub struct RedisAddressError;
 
 impl RedisAddress {
-    pub(super) fn client(&self) -> &Client {
-        &self.client
-    }
-
     /// The number of the database.
     pub(super) fn database(&self) -> i64 {
         self.client.get_connection_info().redis_settings().db()
@@ -95,7 +91,7 @@ impl Connector {
     /// # Errors
     /// If TLS cannot be used.
     pub(super) fn new(address: RedisAddress) -> anyhow::Result<Self> {
-        let tls = match address.client().get_connection_info().addr() {
+        let tls = match address.client.get_connection_info().addr() {
             ConnectionAddr::TcpTls { .. } => Some(ClientTls::new("results.url", None)?),
             _ => None,
         };
@@ -124,7 +120,7 @@ impl Connector {
         let config = config
             .set_response_timeout(Some(TIMEOUT))
             .set_concurrency_limit(MAX_QUERIES);
-        let login = self.address.client().get_connection_info().redis_settings();
+        let login = self.address.client.get_connection_info().redis_settings();
         let login = login.clone().set_protocol(protocol);
         let opened = async {
             let stream = self.stream().await?;
@@ -138,19 +134,14 @@ impl Connector {
         Ok(connection)
     }
 
-    async fn stream(&self) -> io::Result<Box<dyn AsyncStream + Send + Unpin>> {
+    async fn stream(&self) -> io::Result<Box<dyn Stream>> {
         let (ConnectionAddr::Tcp(host, port) | ConnectionAddr::TcpTls { host, port, .. }) =
-            self.address.client().get_connection_info().addr()
+            self.address.client.get_connection_info().addr()
         else {
             // No address of this kind can be configured.
             return Err(io::ErrorKind::Unsupported.into());
         };
-        let stream = TcpStream::connect((host.as_str(), *port)).await?;
-        stream.set_nodelay(true)?;
-        Ok(match &self.tls {
-            Some(tls) => Box::new(tls.connect(host, stream).await?),
-            None => Box::new(stream),
-        })
+        connect(host, *port, self.tls.as_ref()).await
     }
 }
 

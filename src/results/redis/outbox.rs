@@ -3,7 +3,7 @@
 
 use std::collections::VecDeque;
 
-use parking_lot::{Mutex, MutexGuard};
+use parking_lot::Mutex;
 use tokio::sync::Notify;
 
 use crate::{annotated_image::StoredFrame, metrics::IntCounter, results::NewReport};
@@ -22,6 +22,7 @@ pub(super) struct PendingReport {
 /// The queue, oldest first.
 #[derive(Debug)]
 pub(super) struct Outbox {
+    // No change can panic before it is complete.
     waiting: Mutex<Waiting>,
     changed: Notify,
     /// Reports that were dropped or refused.
@@ -49,7 +50,7 @@ impl Outbox {
     /// Appends a report. Never waits.
     pub(super) fn push(&self, report: NewReport, image: Option<StoredFrame>) {
         let pending = PendingReport { report, image };
-        let mut waiting = self.waiting();
+        let mut waiting = self.waiting.lock();
         waiting.drop_image_of(&pending.report.camera);
         waiting.bytes += pending.bytes();
         waiting.reports.push_back(pending);
@@ -78,7 +79,7 @@ impl Outbox {
 
     /// Completes the report that was taken: it was stored, or it was `refused` permanently.
     pub(super) fn done(&self, refused: bool) {
-        let mut waiting = self.waiting();
+        let mut waiting = self.waiting.lock();
         waiting.one_is_taken = false;
         drop(waiting);
         self.dropped.inc_by(u64::from(refused));
@@ -100,20 +101,15 @@ impl Outbox {
 
     /// The number of reports that are not done.
     pub(super) fn count(&self) -> usize {
-        let waiting = self.waiting();
+        let waiting = self.waiting.lock();
         waiting.reports.len() + usize::from(waiting.one_is_taken)
     }
 
     fn take(&self) -> Option<PendingReport> {
-        let mut waiting = self.waiting();
+        let mut waiting = self.waiting.lock();
         let first = waiting.take_first()?;
         waiting.one_is_taken = true;
         Some(first)
-    }
-
-    fn waiting(&self) -> MutexGuard<'_, Waiting> {
-        // No change can panic before it is complete.
-        self.waiting.lock()
     }
 }
 

@@ -27,11 +27,18 @@ type Place = (ReportId, String);
 
 /// A connection to Redis, and its keys.
 pub(super) struct Reader<'a> {
-    pub(super) connection: MultiplexedConnection,
-    pub(super) keys: &'a Keys,
+    connection: MultiplexedConnection,
+    keys: &'a Keys,
 }
 
-impl Reader<'_> {
+impl<'a> Reader<'a> {
+    pub(super) fn new(connection: &MultiplexedConnection, keys: &'a Keys) -> Self {
+        Self {
+            connection: connection.clone(),
+            keys,
+        }
+    }
+
     pub(super) async fn latest(&mut self, camera: &str) -> RedisResult<Option<Arc<StoredReport>>> {
         let mut last = cmd("XREVRANGE");
         last.arg(self.keys.camera(camera));
@@ -44,7 +51,7 @@ impl Reader<'_> {
     /// the limit are not read, nor those with names that the server refuses.
     pub(super) async fn cameras(&mut self, most: NonZeroUsize) -> RedisResult<Vec<String>> {
         let mut last = cmd("ZRANGE");
-        last.arg(self.keys.cameras())
+        last.arg(self.keys.key("cameras"))
             .arg(format!("-{most}"))
             .arg(-1);
         // The bytes of another program may be no text.
@@ -69,7 +76,7 @@ impl Reader<'_> {
     pub(super) async fn delete_image(&mut self, camera: &str) -> RedisResult<()> {
         let mut both = atomic();
         both.cmd("DEL").arg(self.keys.image(camera));
-        both.cmd("ZREM").arg(self.keys.images()).arg(camera);
+        both.cmd("ZREM").arg(self.keys.key("images")).arg(camera);
         both.ignore().query_async(&mut self.connection).await
     }
 
@@ -129,7 +136,7 @@ impl Reader<'_> {
         most: NonZeroUsize,
     ) -> RedisResult<Vec<Place>> {
         let mut both = atomic();
-        for key in [self.keys.earlier(), self.keys.cameras()] {
+        for key in [self.keys.key("earlier"), self.keys.key("cameras")] {
             let first = both.cmd("ZRANGE").arg(key);
             first.arg(format!("({after}")).arg("+inf").arg("BYSCORE");
             first.arg("LIMIT").arg(0).arg(most.get()).arg("WITHSCORES");
@@ -187,17 +194,17 @@ impl Reader<'_> {
     /// The newest ID that was ever assigned.
     pub(super) async fn newest(&mut self) -> RedisResult<ReportId> {
         let mut last = cmd("HGET");
-        last.arg(self.keys.totals()).arg("last");
+        last.arg(self.keys.key("totals")).arg("last");
         let last: Option<String> = last.query_async(&mut self.connection).await?;
         Ok(last.and_then(|id| id.parse().ok()).unwrap_or_default())
     }
 
     pub(super) async fn usage(&mut self) -> RedisResult<ResultUse> {
         let mut counts = atomic();
-        counts.cmd("ZCARD").arg(self.keys.cameras());
-        counts.cmd("ZCARD").arg(self.keys.earlier());
-        counts.cmd("HGET").arg(self.keys.totals()).arg("bytes");
-        counts.cmd("ZCARD").arg(self.keys.images());
+        counts.cmd("ZCARD").arg(self.keys.key("cameras"));
+        counts.cmd("ZCARD").arg(self.keys.key("earlier"));
+        counts.cmd("HGET").arg(self.keys.key("totals")).arg("bytes");
+        counts.cmd("ZCARD").arg(self.keys.key("images"));
         let counts = counts.query_async(&mut self.connection);
         let (cameras, earlier, bytes, images): (usize, usize, Option<String>, usize) =
             counts.await?;

@@ -76,12 +76,8 @@ pub(super) async fn keep(shared: Arc<Shared>) {
 
 async fn open(shared: &Shared) -> RedisResult<Session> {
     let commands = shared.connector.connect().await?;
-    let mut reader = Reader {
-        connection: commands.clone(),
-        keys: &shared.keys,
-    };
     Ok(Session {
-        newest: reader.newest().await?,
+        newest: Reader::new(&commands, &shared.keys).newest().await?,
         news: shared.connector.connect_for_pushes().await?,
         commands,
     })
@@ -185,7 +181,9 @@ impl News<'_> {
             commands.cmd("SSUBSCRIBE").arg(channel).ignore();
         }
         let () = commands.query_async(&mut self.connection).await?;
-        let newest = self.reader().newest().await?;
+        let newest = Reader::new(&self.connection, &self.shared.keys)
+            .newest()
+            .await?;
         for (channel, cameras) in missing {
             self.catch_up(&cameras, newest).await?;
             self.channels.insert(channel, cameras.clone());
@@ -204,10 +202,7 @@ impl News<'_> {
         // A Redis that has lost its data may have a lower ID than this position.
         *position = newest.min(*position);
         let page = NonZeroUsize::new(PAGE).unwrap_or(NonZeroUsize::MIN);
-        let mut reader = Reader {
-            connection: self.connection.clone(),
-            keys: &self.shared.keys,
-        };
+        let mut reader = Reader::new(&self.connection, &self.shared.keys);
         while *position < newest {
             let missed = reader.since(cameras, *position, page).await?;
             for report in &missed {
@@ -224,7 +219,9 @@ impl News<'_> {
     /// Checks that Redis answers, and unsubscribes from channels without listeners. They are kept
     /// until then, as a client that polls comes back soon.
     async fn check(&mut self) -> RedisResult<()> {
-        self.reader().newest().await?;
+        Reader::new(&self.connection, &self.shared.keys)
+            .newest()
+            .await?;
         self.unsubscribe().await?;
         self.subscribe().await
     }
@@ -245,13 +242,6 @@ impl News<'_> {
             return Ok(());
         }
         commands.query_async(&mut self.connection).await
-    }
-
-    fn reader(&self) -> Reader<'_> {
-        Reader {
-            connection: self.connection.clone(),
-            keys: &self.shared.keys,
-        }
     }
 }
 

@@ -91,35 +91,13 @@ impl Keys {
         }
     }
 
-    /// The keys of forget.lua, in its order.
+    /// The keys of forget.lua, in its order. `earlier` is a sorted set of the reports that are not
+    /// their camera's latest: `ID:SIZE:CAMERA`. `cameras` is a sorted set of the cameras by the ID of
+    /// their latest report. `totals` is a hash of the newest ID (`last`) and the total size of all
+    /// reports (`bytes`). `images` is a sorted set of the cameras that have an image, by the ID of
+    /// its report.
     pub(super) fn index(&self) -> [String; 5] {
-        [
-            self.earlier(),
-            self.cameras(),
-            self.key("latest"),
-            self.totals(),
-            self.images(),
-        ]
-    }
-
-    /// A sorted set of the reports that are not their camera's latest: `ID:SIZE:CAMERA`.
-    pub(super) fn earlier(&self) -> String {
-        self.key("earlier")
-    }
-
-    /// A sorted set of the cameras by the ID of their latest report.
-    pub(super) fn cameras(&self) -> String {
-        self.key("cameras")
-    }
-
-    /// A hash of the newest ID (`last`) and the total size of all reports (`bytes`).
-    pub(super) fn totals(&self) -> String {
-        self.key("totals")
-    }
-
-    /// A sorted set of the cameras that have an image, by the ID of its report.
-    pub(super) fn images(&self) -> String {
-        self.key("images")
+        ["earlier", "cameras", "latest", "totals", "images"].map(|name| self.key(name))
     }
 
     /// A hash of a camera's image: the report's ID (`id`), `frame` and `sketch`.
@@ -130,11 +108,6 @@ impl Keys {
     /// The prefix of the keys of all images.
     pub(super) fn prefix_of_images(&self) -> String {
         self.key("image:")
-    }
-
-    /// A sorted set of the servers by the number of the last report that each sent.
-    pub(super) fn senders(&self) -> String {
-        self.key("senders")
     }
 
     /// A stream of a camera's reports.
@@ -156,7 +129,9 @@ impl Keys {
         }
     }
 
-    fn key(&self, name: &str) -> String {
+    /// The key of this name. `senders` is a sorted set of the servers by the number of the last report
+    /// that each sent; see [`Self::index`] for the others.
+    pub(super) fn key(&self, name: &str) -> String {
         format!("{}:{name}", self.tag)
     }
 }

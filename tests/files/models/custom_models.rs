@@ -62,7 +62,7 @@ fn a_model_with_a_fixed_batch_gets_all_views() {
     let colors = [RED, DARK_RED, BLUE, RED, DARK_RED];
     let mut pairs = load("pairs", "").unwrap();
     assert_eq!(scores(&detect(&mut pairs, &colors)), [100, 40, 0, 100, 40]);
-    assert_eq!(pairs.description().views_per_run.unwrap().get(), 2);
+    assert_eq!(pairs.description.views_per_run.unwrap().get(), 2);
     let mut threes = load("any_batch", "[input]\nbatch = 3").unwrap();
     assert_eq!(scores(&detect(&mut threes, &colors)), [100, 40, 0, 100, 40]);
     assert!(detect(&mut threes, &[]).per_view.is_empty());
@@ -71,7 +71,7 @@ fn a_model_with_a_fixed_batch_gets_all_views() {
 #[test]
 fn a_model_with_planes_last_gets_the_same_input() {
     let mut detector = load("planes_last", "").unwrap();
-    assert_eq!(detector.description().layout, Layout::Nhwc);
+    assert_eq!(detector.description.layout, Layout::Nhwc);
     assert_eq!(scores(&detect(&mut detector, &[DARK_RED, RED])), [40, 100]);
 }
 
@@ -86,14 +86,14 @@ fn a_model_of_any_size_gets_the_configured_size() {
 #[test]
 fn metadata_of_the_onnx_file_is_used_as_default() {
     let detector = OnnxDetector::load(&library(), &fixture("with_metadata"), &options()).unwrap();
-    let description = detector.description();
+    let description = &detector.description;
     assert_eq!((detector.input().width, detector.input().height), (96, 64));
     assert_eq!(description.license.as_deref(), Some("AGPL-3.0 License"));
     assert_eq!(detector.name(), "with_metadata");
     // The key of manifests of earlier versions.
     let other = load("with_metadata", "licence = \"MIT\"\n[input]\nwidth = 64\n").unwrap();
     assert_eq!((other.input().width, other.input().height), (64, 64));
-    assert_eq!(other.description().license.as_deref(), Some("MIT"));
+    assert_eq!(other.description.license.as_deref(), Some("MIT"));
 }
 
 #[test]

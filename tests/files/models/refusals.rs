@@ -130,7 +130,7 @@ fn a_manifest_that_contradicts_its_model_is_refused() {
 
 #[test]
 fn a_file_with_a_wrong_checksum_is_refused() {
-    let sum = load("any_batch", "").unwrap().description().sha256.clone();
+    let sum = load("any_batch", "").unwrap().description.sha256.clone();
     load("any_batch", &format!("sha256 = \"{sum}\"")).unwrap();
     let other = format!("sha256 = \"{}\"", "0".repeat(64));
     assert_says(&refusal("any_batch", &other), &[&sum, &"0".repeat(64)]);

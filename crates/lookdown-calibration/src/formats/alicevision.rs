@@ -3,35 +3,22 @@
 //! The focal length is in millimeters of the sensor. The principal point is an offset from the
 //! middle of the frame. `fisheye4` has the coefficients of `cv::fisheye`.
 
-use serde_json::Value;
-
 use super::{Camera, FileCamera, FormatError, distortion::four, fields::Fields};
 use lookdown_lens::geometry::lens::KannalaBrandt;
 
 pub(super) fn read(fields: &Fields<'_>) -> Vec<FileCamera> {
-    let count = fields.map()["intrinsics"].as_array().map_or(0, Vec::len);
-    let mut cameras = Vec::new();
-    for index in 0..count {
-        let camera = fields.entry("intrinsics", index);
-        let id = |camera: &Fields<'_>| {
-            camera
-                .map()
-                .get("intrinsicId")
-                .and_then(Value::as_str)
-                .map(str::to_owned)
-        };
-        cameras.push(FileCamera {
-            name: camera.as_ref().ok().and_then(id),
-            camera: camera.and_then(|camera| read_camera(&camera)),
-        });
-    }
-    cameras
+    let id = |camera: &Fields<'_>| camera.text("intrinsicId").ok().map(str::to_owned);
+    let cameras = fields.entries("intrinsics").map(|camera| FileCamera {
+        name: camera.as_ref().ok().and_then(id),
+        camera: camera.and_then(|camera| read_camera(&camera)),
+    });
+    cameras.collect()
 }
 
 fn read_camera(camera: &Fields<'_>) -> Result<Camera, FormatError> {
     let model = ["distortionType", "type"]
         .into_iter()
-        .find(|key| camera.map().get(*key).and_then(Value::as_str) == Some("fisheye4"));
+        .find(|key| camera.text(key).ok() == Some("fisheye4"));
     if model.is_none() {
         let problem = format!(
             "it is {:?}: fisheye4 is read, reconstruct with that model",

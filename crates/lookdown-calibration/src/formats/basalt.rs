@@ -14,20 +14,20 @@ use lookdown_lens::geometry::lens::Rectilinear;
 
 pub(super) fn read(fields: &Fields<'_>) -> Result<Vec<FileCamera>, FormatError> {
     let calibration = fields.child("value0")?;
-    let count = calibration
-        .get("intrinsics")?
-        .as_array()
-        .map_or(0, Vec::len);
-    Ok((0..count)
-        .map(|index| FileCamera {
-            name: Some(format!("cam{index}")),
-            camera: read_camera(&calibration, index),
-        })
-        .collect())
+    calibration.get("intrinsics")?;
+    let cameras = calibration.entries("intrinsics").enumerate();
+    let cameras = cameras.map(|(index, camera)| FileCamera {
+        name: Some(format!("cam{index}")),
+        camera: camera.and_then(|camera| read_camera(&calibration, index, &camera)),
+    });
+    Ok(cameras.collect())
 }
 
-fn read_camera(calibration: &Fields<'_>, index: usize) -> Result<Camera, FormatError> {
-    let camera = calibration.entry("intrinsics", index)?;
+fn read_camera(
+    calibration: &Fields<'_>,
+    index: usize,
+    camera: &Fields<'_>,
+) -> Result<Camera, FormatError> {
     let parameters = camera.child("intrinsics")?;
     let model = match camera.text("camera_type")? {
         "ds" => NamedModel::DoubleSphere,

@@ -105,7 +105,7 @@ pub(super) fn named(
     is_camera: impl Fn(&Value) -> bool,
     read: impl Fn(&Fields<'_>) -> Result<Camera, FormatError>,
 ) -> Vec<FileCamera> {
-    let cameras = fields.map().iter().filter(|(_, entry)| is_camera(entry));
+    let cameras = fields.map.iter().filter(|(_, entry)| is_camera(entry));
     cameras
         .map(|(name, _)| FileCamera {
             name: Some(name.clone()),

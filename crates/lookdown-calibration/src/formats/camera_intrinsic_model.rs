@@ -10,7 +10,7 @@ use super::{
 use lookdown_lens::geometry::lens::Fov;
 
 pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
-    let model = fields.map().keys().next().map_or("", String::as_str);
+    let model = fields.map.keys().next().map_or("", String::as_str);
     let parameters = fields.child(model)?;
     let lens = match model {
         "EUCM" => named_parameters::read(NamedModel::Eucm, &parameters)?,

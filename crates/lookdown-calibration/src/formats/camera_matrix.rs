@@ -61,7 +61,7 @@ impl CameraMatrix {
                 Err(fields.invalid(model, "it says none, but there are coefficients"))
             }
             Distortion::RadialTangential | Distortion::Fov => {
-                let name = fields.map().get(model).and_then(serde_json::Value::as_str);
+                let name = fields.text(model);
                 let name = name.unwrap_or("radial and tangential distortion");
                 Err(fields.invalid(model, not_a_fisheye(name)))
             }

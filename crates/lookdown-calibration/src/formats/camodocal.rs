@@ -13,15 +13,15 @@ pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
             let projection = fields.child("projection_parameters")?;
             let distortion = fields.child("distortion_parameters")?;
             let mirror = fields.child("mirror_parameters")?;
-            let pinhole = numbers(&projection, ["gamma1", "gamma2", "u0", "v0"])?;
+            let pinhole = projection.each(["gamma1", "gamma2", "u0", "v0"])?;
             let xi = mirror.number("xi")?;
-            let [k1, k2, p1, p2] = numbers(&distortion, ["k1", "k2", "p1", "p2"])?;
+            let [k1, k2, p1, p2] = distortion.each(["k1", "k2", "p1", "p2"])?;
             Mei::new(pinhole, xi, k1, k2, p1, p2).into()
         }
         "KANNALA_BRANDT" => {
             let projection = fields.child("projection_parameters")?;
-            let pinhole = numbers(&projection, ["mu", "mv", "u0", "v0"])?;
-            let k = numbers(&projection, ["k2", "k3", "k4", "k5"])?;
+            let pinhole = projection.each(["mu", "mv", "u0", "v0"])?;
+            let k = projection.each(["k2", "k3", "k4", "k5"])?;
             KannalaBrandt::new(pinhole, k).into()
         }
         model @ ("PINHOLE" | "PINHOLE_FULL") => {
@@ -36,14 +36,4 @@ pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
     };
     let image = fields.image("image_width", "image_height")?;
     Ok(Camera::new(Some(image), lens))
-}
-
-fn numbers(fields: &Fields<'_>, keys: [&str; 4]) -> Result<[f64; 4], FormatError> {
-    let [a, b, c, d] = keys;
-    Ok([
-        fields.number(a)?,
-        fields.number(b)?,
-        fields.number(c)?,
-        fields.number(d)?,
-    ])
 }

@@ -8,11 +8,10 @@ use lookdown_lens::geometry::lens::Ocam;
 pub(super) struct ColumnFirst {
     /// The direct polynomial with `OCamCalib`'s signs: the first coefficient is negative.
     pub(super) polynomial: Vec<f64>,
-    pub(super) c: f64,
-    pub(super) d: f64,
-    pub(super) e: f64,
-    pub(super) cx: f64,
-    pub(super) cy: f64,
+    /// `c`, `d`, `e`.
+    pub(super) affine: [f64; 3],
+    /// `cx`, `cy`.
+    pub(super) center: [f64; 2],
 }
 
 impl ColumnFirst {
@@ -23,7 +22,7 @@ impl ColumnFirst {
         [center, stretch]: [&str; 2],
         polynomial: &[f64],
     ) -> Result<Self, FormatError> {
-        let [cx, cy] = fields.exactly(center, "column and row")?;
+        let center = fields.exactly(center, "column and row")?;
         let [c, d, e, one] = fields.exactly(stretch, "[[c, d], [e, 1]]")?;
         if one != 1.0 {
             let problem = format!("its last number is {one}: it must be 1");
@@ -31,11 +30,8 @@ impl ColumnFirst {
         }
         Ok(Self {
             polynomial: negated(polynomial),
-            c,
-            d,
-            e,
-            cx,
-            cy,
+            affine: [c, d, e],
+            center,
         })
     }
 
@@ -44,9 +40,7 @@ impl ColumnFirst {
     /// With `rho' = c·rho` the maps agree for `c' = 1/c`, `d' = e/c`, `e' = d/c`, and the
     /// polynomial for `a'_i = a_i·c^(1-i)`, because `theta = atan2(rho, -p(rho))` must stay.
     pub(super) fn into_lens(self) -> Result<Ocam, FormatError> {
-        let Self {
-            c, d, e, cx, cy, ..
-        } = self;
+        let [c, d, e] = self.affine;
         if !(c.is_finite() && c > 0.0) {
             return Err(FormatError::invalid(
                 "c",
@@ -63,7 +57,7 @@ impl ColumnFirst {
             c: 1.0 / c,
             d: e / c,
             e: d / c,
-            ..Ocam::new(polynomial, [cx, cy])
+            ..Ocam::new(polynomial, self.center)
         })
     }
 }

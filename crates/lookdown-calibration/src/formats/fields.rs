@@ -10,7 +10,8 @@ use crate::native::NativeImage;
 #[derive(Debug, Clone)]
 pub(super) struct Fields<'a> {
     name: String,
-    map: &'a Map<String, Value>,
+    /// The map of keys to values.
+    pub(super) map: &'a Map<String, Value>,
 }
 
 impl<'a> Fields<'a> {
@@ -39,11 +40,6 @@ impl<'a> Fields<'a> {
         FormatError::invalid(self.name_of(key), problem)
     }
 
-    /// The map of keys to values.
-    pub(super) fn map(&self) -> &'a Map<String, Value> {
-        self.map
-    }
-
     pub(super) fn has(&self, key: &str) -> bool {
         self.map.contains_key(key)
     }
@@ -63,8 +59,22 @@ impl<'a> Fields<'a> {
         })
     }
 
-    /// An entry of a list of maps.
-    pub(super) fn entry(&self, key: &str, index: usize) -> Result<Self, FormatError> {
+    /// This map, or the one in the field if there is one.
+    pub(super) fn or_child(&self, key: &str) -> Result<Self, FormatError> {
+        if self.has(key) {
+            self.child(key)
+        } else {
+            Ok(self.clone())
+        }
+    }
+
+    /// The entries of a list of maps; none where there is no list.
+    pub(super) fn entries(&self, key: &str) -> impl Iterator<Item = Result<Self, FormatError>> {
+        let list = self.map.get(key).and_then(Value::as_array);
+        (0..list.map_or(0, Vec::len)).map(move |index| self.entry(key, index))
+    }
+
+    fn entry(&self, key: &str, index: usize) -> Result<Self, FormatError> {
         let name = format!("{key}[{index}]");
         let map = self
             .get(key)?
@@ -96,6 +106,15 @@ impl<'a> Fields<'a> {
         let value = self.get(key)?;
         number(value)
             .ok_or_else(|| self.invalid(key, format!("it is {}: a number is needed", brief(value))))
+    }
+
+    /// The numbers of several fields.
+    pub(super) fn each<const N: usize>(&self, keys: [&str; N]) -> Result<[f64; N], FormatError> {
+        let mut numbers = [0.0; N];
+        for (number, key) in numbers.iter_mut().zip(keys) {
+            *number = self.number(key)?;
+        }
+        Ok(numbers)
     }
 
     /// Numbers that are 0 where they are missing.
@@ -137,13 +156,7 @@ impl<'a> Fields<'a> {
         expected: &str,
     ) -> Result<[f64; N], FormatError> {
         let numbers = self.numbers(key)?;
-        let count = numbers.len();
-        numbers.try_into().map_err(|_| {
-            self.invalid(
-                key,
-                format!("it has {count} numbers: {N} are needed, {expected}"),
-            )
-        })
+        exactly(numbers, expected).map_err(|problem| self.invalid(key, problem))
     }
 
     /// The frame size, from two fields.
@@ -164,13 +177,24 @@ impl<'a> Fields<'a> {
     }
 
     fn side(&self, key: &str, pixels: f64) -> Result<u32, FormatError> {
-        whole_pixels(pixels).ok_or_else(|| {
-            self.invalid(
-                key,
-                format!("it is {pixels}: a whole number of pixels is needed"),
-            )
-        })
+        side(pixels).map_err(|problem| self.invalid(key, problem))
     }
+}
+
+/// Exactly `N` numbers, or the problem; `expected` says which.
+pub(super) fn exactly<const N: usize>(
+    numbers: Vec<f64>,
+    expected: &str,
+) -> Result<[f64; N], String> {
+    let count = numbers.len();
+    let numbers = numbers.try_into();
+    numbers.map_err(|_| format!("it has {count} numbers: {N} are needed, {expected}"))
+}
+
+/// The side of a frame, or the problem.
+pub(super) fn side(pixels: f64) -> Result<u32, String> {
+    let problem = || format!("it is {pixels}: a whole number of pixels is needed");
+    whole_pixels(pixels).ok_or_else(problem)
 }
 
 /// A count of pixels that some formats write as a decimal number.

@@ -19,11 +19,8 @@ pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
         let coefficients = parameters.child("coefficients")?;
         ColumnFirst {
             polynomial: negated(&coefficients.numbers("unprojection")?),
-            c: parameters.number("c")?,
-            d: parameters.number("d")?,
-            e: parameters.number("e")?,
-            cx: parameters.number("cx")?,
-            cy: parameters.number("cy")?,
+            affine: parameters.each(["c", "d", "e"])?,
+            center: parameters.each(["cx", "cy"])?,
         }
         .into_lens()?
         .into()

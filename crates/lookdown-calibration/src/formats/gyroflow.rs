@@ -4,25 +4,14 @@
 //!
 //! The matrix of an anamorphic lens is that of the stretched frame.
 
-use serde_json::Value;
-
 use super::{
     Camera, FormatError, camera_matrix::CameraMatrix, distortion::Distortion, fields::Fields,
 };
 
 pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
-    let project = "calibration_data";
-    let profile = if fields.has(project) {
-        fields.child(project)?
-    } else {
-        fields.clone()
-    };
+    let profile = fields.or_child("calibration_data")?;
     for (key, known) in [("distortion_model", "opencv_fisheye"), ("digital_lens", "")] {
-        let value = profile
-            .map()
-            .get(key)
-            .and_then(Value::as_str)
-            .unwrap_or_default();
+        let value = profile.text(key).unwrap_or_default();
         if !value.is_empty() && value != known {
             let problem = format!(
                 "it is {value:?}: only profiles of opencv_fisheye without a \

@@ -19,12 +19,7 @@ const POLYNOMIAL: &str = "MappingCoefficients";
 pub(super) const FIELDS: [&str; 2] = [POLYNOMIAL, "DistortionCoefficients"];
 
 pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
-    let intrinsics = "Intrinsics";
-    let camera = if fields.has(intrinsics) {
-        fields.child(intrinsics)?
-    } else {
-        fields.clone()
-    };
+    let camera = fields.or_child("Intrinsics")?;
     let size = "ImageSize";
     let sides = camera.exactly(size, "height and width")?.map(whole_pixels);
     let [Some(height), Some(width)] = sides else {
@@ -41,6 +36,6 @@ pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
     let [a0, a2, a3, a4] = camera.exactly(POLYNOMIAL, "a0, a2, a3, a4")?;
     let names = ["DistortionCenter", "StretchMatrix"];
     let mut lens = ColumnFirst::read(&camera, names, &[a0, 0.0, a2, a3, a4])?;
-    (lens.cx, lens.cy) = (lens.cx - 1.0, lens.cy - 1.0);
+    lens.center = lens.center.map(|pixel| pixel - 1.0);
     Ok(Camera::new(image, lens.into_lens()?))
 }

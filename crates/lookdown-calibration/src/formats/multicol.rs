@@ -28,11 +28,8 @@ pub(super) fn read(text: &str) -> Result<Camera, FormatError> {
     let polynomial = indices.map(|index| settings.number(&format!("Camera.a{index}")));
     let lens = ColumnFirst {
         polynomial: polynomial.collect::<Result<_, _>>()?,
-        c: settings.number("Camera.c")?,
-        d: settings.number("Camera.d")?,
-        e: settings.number("Camera.e")?,
-        cx: settings.number("Camera.u0")?,
-        cy: settings.number("Camera.v0")?,
+        affine: settings.each(["Camera.c", "Camera.d", "Camera.e"])?,
+        center: settings.each(["Camera.u0", "Camera.v0"])?,
     };
     let image = settings.image("Camera.Iw", "Camera.Ih")?;
     Ok(Camera::new(Some(image), lens.into_lens()?))

@@ -25,12 +25,7 @@ pub(super) fn read(model: NamedModel, fields: &Fields<'_>) -> Result<LensModel, 
         }
         NamedModel::Ucm => Ucm::new(pinhole, fields.number("alpha")?).into(),
         NamedModel::KannalaBrandt => {
-            let k = [
-                fields.number("k1")?,
-                fields.number("k2")?,
-                fields.number("k3")?,
-                fields.number("k4")?,
-            ];
+            let k = fields.each(["k1", "k2", "k3", "k4"])?;
             KannalaBrandt::new(pinhole, k).into()
         }
     })
@@ -38,10 +33,5 @@ pub(super) fn read(model: NamedModel, fields: &Fields<'_>) -> Result<LensModel, 
 
 /// `fx fy cx cy`.
 pub(super) fn pinhole(fields: &Fields<'_>) -> Result<Pinhole, FormatError> {
-    Ok([
-        fields.number("fx")?,
-        fields.number("fy")?,
-        fields.number("cx")?,
-        fields.number("cy")?,
-    ])
+    fields.each(["fx", "fy", "cx", "cy"])
 }

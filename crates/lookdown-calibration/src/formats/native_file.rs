@@ -17,7 +17,7 @@ pub(super) fn read(
     text: &str,
     syntax: Syntax,
 ) -> Result<CalibrationFile, FormatError> {
-    if let Some(version) = fields.map().get(StoredFile::KEY) {
+    if let Some(version) = fields.map.get(StoredFile::KEY) {
         let checked = StoredFile::Calibration.check(&version.to_string());
         checked.map_err(|problem| {
             FormatError::invalid(StoredFile::KEY, format!("the calibration {problem}"))

@@ -36,15 +36,11 @@ const INTRINSICS: [&str; 12] = [
 
 /// The different cameras of the frames, in their order.
 pub(super) fn read(fields: &Fields<'_>) -> Vec<FileCamera> {
-    let frames = fields.map().get("frames").and_then(Value::as_array);
     let mut seen: Vec<Vec<Option<&Value>>> = Vec::new();
     let mut cameras = Vec::new();
-    for index in 0..frames.map_or(0, Vec::len) {
-        let Ok(frame) = fields.entry("frames", index) else {
-            continue;
-        };
+    for frame in fields.entries("frames").flatten() {
         let values = INTRINSICS
-            .map(|key| fields.map().get(key).or(frame.map().get(key)))
+            .map(|key| fields.map.get(key).or(frame.map.get(key)))
             .to_vec();
         if !seen.contains(&values) && cameras.len() <= MAX_CAMERAS {
             seen.push(values);
@@ -79,7 +75,7 @@ fn read_camera<'a>(with: impl Fn(&str) -> &'a Fields<'a>) -> Result<Camera, Form
     } else {
         ""
     };
-    let is_fisheye = with("is_fisheye").map().get("is_fisheye") == Some(&Value::Bool(true));
+    let is_fisheye = with("is_fisheye").map.get("is_fisheye") == Some(&Value::Bool(true));
     if is_fisheye || Distortion::from_name(model) == Some(Distortion::Fisheye) {
         return Ok(Camera::new(Some(image), KannalaBrandt::new(pinhole, k)));
     }

@@ -16,7 +16,7 @@ pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
         return Err(fields.invalid("camera_model_type", problem));
     }
     let parameters = fields.child("camera_model_parameters")?;
-    if let Some(windshield) = parameters.map().get("external_distortion_parameters")
+    if let Some(windshield) = parameters.map.get("external_distortion_parameters")
         && *windshield != Value::Null
     {
         return Err(parameters.invalid(

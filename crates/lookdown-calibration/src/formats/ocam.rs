@@ -17,7 +17,7 @@ use lookdown_lens::geometry::lens::Ocam;
 use super::{
     Camera, FormatError,
     column_first::ColumnFirst,
-    fields::{Fields, whole_pixels},
+    fields::{self, Fields, whole_pixels},
 };
 use crate::native::NativeImage;
 
@@ -56,14 +56,8 @@ pub(super) fn read(text: &str) -> Result<Camera, FormatError> {
     let [row, column] = exactly(BLOCKS[2], center, "row and column")?;
     let [c, d, e] = exactly(BLOCKS[3], affine, "c, d and e")?;
     let [height, width] = exactly(BLOCKS[4], image, "height and width")?;
-    let side = |pixels| {
-        whole_pixels(pixels).ok_or_else(|| {
-            FormatError::invalid(
-                BLOCKS[4],
-                format!("it is {pixels}: a whole number of pixels is needed"),
-            )
-        })
-    };
+    let side =
+        |pixels| fields::side(pixels).map_err(|problem| FormatError::invalid(BLOCKS[4], problem));
     let image = NativeImage {
         width: side(width)?,
         height: side(height)?,
@@ -98,13 +92,7 @@ fn exactly<const N: usize>(
     expected: &str,
 ) -> Result<[f64; N], FormatError> {
     let numbers = numbers(block, line)?;
-    let count = numbers.len();
-    numbers.try_into().map_err(|_| {
-        FormatError::invalid(
-            block,
-            format!("it has {count} numbers: {N} are needed, {expected}"),
-        )
-    })
+    fields::exactly(numbers, expected).map_err(|problem| FormatError::invalid(block, problem))
 }
 
 /// Reads a file of `py-OCamCalib`.

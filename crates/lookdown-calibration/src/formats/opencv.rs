@@ -46,11 +46,11 @@ const CORNERS: [&str; 2] = ["imagePoints", "image_points"];
 
 /// Returns true for a file with any of the names by which OpenCV's files are known.
 pub(super) fn is_storage(fields: &Fields<'_>) -> bool {
-    let mut entries = fields.map().values().filter_map(Value::as_object);
+    let mut entries = fields.map.values().filter_map(Value::as_object);
     if OTHERS.iter().any(|name| fields.has(name)) {
         return false;
     }
-    has_matrix(fields.map())
+    has_matrix(fields.map)
         || CORNERS.iter().any(|name| fields.has(name))
         || !sides(fields).is_empty()
         || entries.any(has_matrix)
@@ -64,7 +64,7 @@ fn has_matrix(map: &Map<String, Value>) -> bool {
 /// as a number or a side.
 fn sides<'a>(fields: &Fields<'a>) -> Vec<&'a str> {
     let mut sides = Vec::new();
-    for key in fields.map().keys() {
+    for key in fields.map.keys() {
         // A number under such a name is a coefficient.
         if !fields.numbers(key).is_ok_and(|numbers| numbers.len() == 9) {
             continue;
@@ -84,7 +84,7 @@ fn sides<'a>(fields: &Fields<'a>) -> Vec<&'a str> {
 
 pub(super) fn read(fields: &Fields<'_>) -> Vec<FileCamera> {
     let is_camera = |entry: &Value| entry.as_object().is_some_and(has_matrix);
-    if has_matrix(fields.map()) {
+    if has_matrix(fields.map) {
         return alone(read_camera(fields, ""));
     }
     let mut cameras = named(fields, is_camera, |camera| read_camera(camera, ""));
@@ -166,7 +166,7 @@ fn said_distortion<'a>(fields: &Fields<'a>) -> Result<(&'a str, Option<Distortio
     } else {
         "fisheye_model"
     };
-    let distortion = match fields.map().get(flag) {
+    let distortion = match fields.map.get(flag) {
         None => None,
         Some(Value::Bool(false)) => Some(Distortion::RadialTangential),
         Some(value) if value.as_f64() == Some(0.0) => Some(Distortion::RadialTangential),
@@ -202,6 +202,6 @@ fn present<'a>(fields: &Fields<'a>, names: &str, side: &str) -> Option<&'a str> 
             ]
         });
         let key = joined.iter().flatten().find(|key| fields.has(key))?;
-        Some(fields.map().get_key_value(key)?.0.as_str())
+        Some(fields.map.get_key_value(key)?.0.as_str())
     })
 }

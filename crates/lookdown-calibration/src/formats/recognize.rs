@@ -42,13 +42,13 @@ fn is_colmap_camera(line: &str) -> bool {
 pub(super) fn recognize_tree(fields: &Fields<'_>) -> Option<Format> {
     let has = |key: &str| fields.has(key);
     let any_entry_has = |keys: &[&str]| {
-        let mut entries = fields.map().values();
+        let mut entries = fields.map.values();
         entries.any(|entry| keys.iter().all(|key| entry.get(key).is_some()))
     };
     let part_has = |part: Option<&Value>, key: &str| part.is_some_and(|it| it.get(key).is_some());
-    let field_has = |field: &str, key: &str| part_has(fields.map().get(field), key);
+    let field_has = |field: &str, key: &str| part_has(fields.map.get(field), key);
     let first_has =
-        |list: &str, key: &str| part_has(fields.map().get(list).and_then(|list| list.get(0)), key);
+        |list: &str, key: &str| part_has(fields.map.get(list).and_then(|list| list.get(0)), key);
     Format::iter().find(|format| match format {
         Format::Native => has("lens") || (has("id") && has("image")),
         Format::Kalibr => {
@@ -62,7 +62,7 @@ pub(super) fn recognize_tree(fields: &Fields<'_>) -> Option<Format> {
         Format::PyOCamCalib => has("taylor_coefficient"),
         Format::Moil => has("calibrationRatio") || any_entry_has(&["calibrationRatio"]),
         Format::FisheyeCalibAdapter => has("image") && has("parameter"),
-        Format::CameraIntrinsicModel => fields.map().len() == 1 && any_entry_has(&["fx", "width"]),
+        Format::CameraIntrinsicModel => fields.map.len() == 1 && any_entry_has(&["fx", "width"]),
         Format::Slam => slam::is_settings(fields),
         Format::Nerfstudio => has("fl_x") || first_has("frames", "fl_x"),
         Format::Gyroflow => has("fisheye_params") || has("calibration_data"),

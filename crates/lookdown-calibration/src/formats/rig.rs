@@ -3,8 +3,6 @@
 //!
 //! There `equidistant` is `cv::fisheye`, and `fisheye` is the model of one angle, `FOV`.
 
-use serde_json::Value;
-
 use super::{
     Camera, FileCamera, FormatError,
     distortion::{are_all_zero, four, not_a_fisheye},
@@ -17,20 +15,18 @@ const LIST: &str = "cameras";
 
 /// Returns true for a list whose entries have a distortion of their own.
 pub(super) fn is_rig(fields: &Fields<'_>) -> bool {
-    let first = fields.map().get(LIST).and_then(|list| list.get(0));
+    let first = fields.map.get(LIST).and_then(|list| list.get(0));
     let has = |key: &str| first.is_some_and(|entry| entry.get(key).is_some());
     has("distortion_type") || has("camera")
 }
 
 pub(super) fn read(fields: &Fields<'_>) -> Vec<FileCamera> {
-    let count = fields.map()[LIST].as_array().map_or(0, Vec::len);
-    let entry = |index| FileCamera {
-        name: Some(format!("{index}")),
-        camera: fields
-            .entry(LIST, index)
-            .and_then(|entry| read_camera(&entry)),
-    };
-    (0..count).map(entry).collect()
+    let cameras = fields.entries(LIST).enumerate();
+    let cameras = cameras.map(|(index, camera)| FileCamera {
+        name: Some(index.to_string()),
+        camera: camera.and_then(|camera| read_camera(&camera)),
+    });
+    cameras.collect()
 }
 
 fn read_camera(entry: &Fields<'_>) -> Result<Camera, FormatError> {
@@ -39,23 +35,19 @@ fn read_camera(entry: &Fields<'_>) -> Result<Camera, FormatError> {
         let [cx, cy] = entry.exactly("principal_point", "cx, cy")?;
         let values = entry.numbers("distortion_coefficients")?;
         let lens = lens(entry, "distortion_type", [fx, fy, cx, cy], &values)?;
-        return Ok(Camera::new(
-            Some(entry.image_pair("image_dimension")?),
-            lens,
-        ));
+        let image = entry.image_pair("image_dimension")?;
+        return Ok(Camera::new(Some(image), lens));
     }
     let camera = entry.child("camera")?;
-    if camera.map().get("type").and_then(Value::as_str) != Some("pinhole") {
+    if camera.text("type").ok() != Some("pinhole") {
         return Err(camera.invalid("type", "only pinhole with a distortion is read"));
     }
     let pinhole = camera.exactly("intrinsics", "fu, fv, cu, cv")?;
     let distortion = camera.child("distortion")?;
     let values = distortion.numbers("parameters")?;
     let lens = lens(&distortion, "type", pinhole, &values)?;
-    Ok(Camera::new(
-        Some(camera.image("image_width", "image_height")?),
-        lens,
-    ))
+    let image = camera.image("image_width", "image_height")?;
+    Ok(Camera::new(Some(image), lens))
 }
 
 fn lens(

@@ -49,11 +49,8 @@ fn region(fields: &Fields<'_>) -> Result<Option<(NativeImage, [f64; 2])>, Format
         return Ok(None);
     }
     let roi = fields.child("roi")?;
-    let offset = [
-        roi.number_or("x_offset", 0.0)?,
-        roi.number_or("y_offset", 0.0)?,
-    ];
-    let size = [roi.number_or("width", 0.0)?, roi.number_or("height", 0.0)?];
+    let offset = roi.optional(["x_offset", "y_offset"])?;
+    let size: [f64; 2] = roi.optional(["width", "height"])?;
     match (size.contains(&0.0), offset == [0.0, 0.0]) {
         (true, true) => Ok(None),
         (true, false) => {

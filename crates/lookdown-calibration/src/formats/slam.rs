@@ -29,14 +29,14 @@ pub(super) fn is_settings(fields: &Fields<'_>) -> bool {
 
 /// The fields below a name, or those whose names begin with it and a dot.
 fn group(fields: &Fields<'_>, name: &str) -> Map<String, Value> {
-    if let Some(Value::Object(nested)) = fields.map().get(name) {
+    if let Some(Value::Object(nested)) = fields.map.get(name) {
         return nested.clone();
     }
     let below = |(key, value): (&String, &Value)| {
         let key = key.strip_prefix(name)?.strip_prefix('.')?;
         Some((key.to_owned(), value.clone()))
     };
-    fields.map().iter().filter_map(below).collect()
+    fields.map.iter().filter_map(below).collect()
 }
 
 pub(super) fn read(fields: &Fields<'_>) -> Vec<FileCamera> {

@@ -15,19 +15,13 @@ pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
     }
     let image = intrinsic.image("width", "height")?;
     let center = |side: u32| f64::from(side) / 2.0 - 0.5;
-    let coefficients = vec![
-        0.0,
-        intrinsic.number("k1")?,
-        intrinsic.number("k2")?,
-        intrinsic.number("k3")?,
-        intrinsic.number("k4")?,
-    ];
+    let [k1, k2, k3, k4] = intrinsic.each(["k1", "k2", "k3", "k4"])?;
     let aspect = intrinsic.number_or("aspect_ratio", 1.0)?;
     let cx = intrinsic.number("cx_offset")? + center(image.width);
     let cy = intrinsic.number("cy_offset")? + center(image.height);
     let lens = RadialPolynomial {
         aspect,
-        ..RadialPolynomial::new(coefficients, [cx, cy])
+        ..RadialPolynomial::new(vec![0.0, k1, k2, k3, k4], [cx, cy])
     };
     Ok(Camera::new(Some(image), lens))
 }

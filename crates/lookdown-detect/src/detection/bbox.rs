@@ -74,26 +74,6 @@ impl<S> BBox<S> {
         }
     }
 
-    /// Left edge, pixels.
-    pub fn x_min(&self) -> f64 {
-        self.x_min
-    }
-
-    /// Top edge, pixels.
-    pub fn y_min(&self) -> f64 {
-        self.y_min
-    }
-
-    /// Right edge, pixels.
-    pub fn x_max(&self) -> f64 {
-        self.x_max
-    }
-
-    /// Bottom edge, pixels.
-    pub fn y_max(&self) -> f64 {
-        self.y_max
-    }
-
     /// `[x_min, y_min, x_max, y_max]`, pixels.
     pub fn corners(&self) -> [f64; 4] {
         [self.x_min, self.y_min, self.x_max, self.y_max]

@@ -47,9 +47,10 @@ impl OverlapGrid {
     ) -> Self {
         let cut = least_iou.min(0.5) * (1.0 - ROUNDING);
         let cells_per_box = CELLS_PER_BOX[0] + CELLS_PER_BOX[1] * 2.0 * cut;
-        let columns = boxes.clone().map(|bbox| (bbox.x_min(), bbox.x_max()));
+        let corners = boxes.map(BBox::corners);
+        let columns = corners.clone().map(|[x_min, _, x_max, _]| (x_min, x_max));
         let columns = Axis::covering(columns, cells_per_box);
-        let rows = boxes.map(|bbox| (bbox.y_min(), bbox.y_max()));
+        let rows = corners.map(|[_, y_min, _, y_max]| (y_min, y_max));
         let rows = Axis::covering(rows, cells_per_box);
         Self {
             cells: vec![Vec::new(); columns.cells * rows.cells],
@@ -120,15 +121,11 @@ impl OverlapGrid {
     /// both of its ends.
     fn reach_of(&self, bbox: &BBox<FramePixels>, cut: f64) -> Reach {
         let (x_cut, y_cut) = (cut * bbox.width(), cut * bbox.height());
+        let [x_min, y_min, x_max, y_max] = bbox.corners();
+        let (columns, rows) = (&self.columns, &self.rows);
         Reach {
-            columns: (
-                self.columns.cell(bbox.x_min() + x_cut),
-                self.columns.cell(bbox.x_max() - x_cut),
-            ),
-            rows: (
-                self.rows.cell(bbox.y_min() + y_cut),
-                self.rows.cell(bbox.y_max() - y_cut),
-            ),
+            columns: (columns.cell(x_min + x_cut), columns.cell(x_max - x_cut)),
+            rows: (rows.cell(y_min + y_cut), rows.cell(y_max - y_cut)),
         }
     }
 }

@@ -252,10 +252,10 @@ proptest! {
     ) {
         for detection in refine(&candidates, &parameters) {
             let members = || detection.members.iter().map(|index| candidates[*index].bbox);
-            let left = members().map(|bbox| bbox.x_min()).fold(f64::INFINITY, f64::min);
-            let right = members().map(|bbox| bbox.x_max()).fold(f64::NEG_INFINITY, f64::max);
-            prop_assert!(detection.bbox.x_min() >= left - 1e-9);
-            prop_assert!(detection.bbox.x_max() <= right + 1e-9);
+            let left = members().map(|bbox| bbox.corners()[0]).fold(f64::INFINITY, f64::min);
+            let right = members().map(|bbox| bbox.corners()[2]).fold(f64::NEG_INFINITY, f64::max);
+            prop_assert!(detection.bbox.corners()[0] >= left - 1e-9);
+            prop_assert!(detection.bbox.corners()[2] <= right + 1e-9);
         }
     }
 
@@ -273,10 +273,10 @@ proptest! {
         // Rescored scores may be equal. Then the order decides which detection is cut off.
         if original.len() < parameters.max_detections {
             let by_score_and_place = |a: &(BBox<_>, f64), b: &(BBox<_>, f64)| {
-                b.1.total_cmp(&a.1).then(a.0.x_min().total_cmp(&b.0.x_min()))
-                    .then(a.0.y_min().total_cmp(&b.0.y_min()))
-                    .then(a.0.x_max().total_cmp(&b.0.x_max()))
-                    .then(a.0.y_max().total_cmp(&b.0.y_max()))
+                b.1.total_cmp(&a.1).then(a.0.corners()[0].total_cmp(&b.0.corners()[0]))
+                    .then(a.0.corners()[1].total_cmp(&b.0.corners()[1]))
+                    .then(a.0.corners()[2].total_cmp(&b.0.corners()[2]))
+                    .then(a.0.corners()[3].total_cmp(&b.0.corners()[3]))
             };
             original.sort_by(by_score_and_place);
             other.sort_by(by_score_and_place);

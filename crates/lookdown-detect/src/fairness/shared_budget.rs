@@ -3,7 +3,7 @@
 
 use std::{collections::HashMap, sync::Arc};
 
-use parking_lot::{Mutex, MutexGuard};
+use parking_lot::Mutex;
 
 use super::Client;
 
@@ -18,6 +18,7 @@ pub struct SharedBudget(Arc<Shared>);
 struct Shared {
     total: usize,
     share: usize,
+    // No change can panic half-way.
     usage: Mutex<Usage>,
 }
 
@@ -60,7 +61,7 @@ impl SharedBudget {
     /// # Errors
     /// [`BudgetError`] when the budget, or the share of the client, is too small now.
     pub fn take(&self, client: &Client, amount: usize) -> Result<BudgetShare, BudgetError> {
-        let mut usage = self.0.usage();
+        let mut usage = self.0.usage.lock();
         self.0.check(&usage, client, amount)?;
         if amount > 0 {
             usage.used += amount;
@@ -78,7 +79,7 @@ impl SharedBudget {
     /// # Errors
     /// The same as [`SharedBudget::take`].
     pub fn check(&self, client: &Client, amount: usize) -> Result<(), BudgetError> {
-        self.0.check(&self.0.usage(), client, amount)
+        self.0.check(&self.0.usage.lock(), client, amount)
     }
 
     /// The number of permits.
@@ -94,7 +95,7 @@ impl SharedBudget {
     /// The number of permits in use.
     #[cfg(test)]
     fn used(&self) -> usize {
-        self.0.usage().used
+        self.0.usage.lock().used
     }
 }
 
@@ -108,11 +109,6 @@ impl Shared {
             return Err(BudgetError::Full);
         }
         Ok(())
-    }
-
-    fn usage(&self) -> MutexGuard<'_, Usage> {
-        // No change can panic half-way.
-        self.usage.lock()
     }
 }
 
@@ -137,7 +133,7 @@ impl Drop for BudgetShare {
         if self.amount == 0 {
             return;
         }
-        let mut usage = self.budget.0.usage();
+        let mut usage = self.budget.0.usage.lock();
         usage.used -= self.amount;
         if let Some(own) = usage.by_client.get_mut(&self.client) {
             *own -= self.amount;
@@ -171,7 +167,7 @@ mod tests {
         assert_eq!(full, BudgetError::Full);
         drop((greedy, others));
         assert_eq!(budget.used(), 0);
-        assert!(budget.0.usage().by_client.is_empty());
+        assert!(budget.0.usage.lock().by_client.is_empty());
     }
 
     #[test]

@@ -142,7 +142,7 @@ impl Head {
             height: input.height,
         };
         let known = Output::all(outputs.iter().map(|output| (output.name, output.shape)));
-        let mut collector = CandidateCollector::new(views, input, floor);
+        let mut collector = CandidateCollector::new(batch, floor);
         outputs
             .iter()
             .try_for_each(TensorView::check_len)
@@ -152,7 +152,7 @@ impl Head {
                     .iter()
                     .map(|output| &outputs[output.index])
                     .collect();
-                self.decoder().decode(&tensors, &batch, &mut collector);
+                self.decoder().decode(&tensors, &mut collector);
                 collector.finish()
             })
             .map_err(InferenceError::Run)

@@ -58,13 +58,6 @@ impl Model {
         }
     }
 
-    pub(super) fn with_files(self, files: ModelFiles) -> Self {
-        Self {
-            files: Some(files),
-            ..self
-        }
-    }
-
     /// The largest useful batch of at most `max_views` views. It is at least the number of views
     /// per run, and a multiple of it where that number is fixed.
     pub fn batch_of(&self, max_views: NonZeroUsize) -> NonZeroUsize {

@@ -1,7 +1,5 @@
 //! Detectors run by ONNX Runtime. Only this module and `description` use `ort`.
 
-mod first_line;
-
 use std::{
     num::NonZeroUsize,
     path::{Path, PathBuf},
@@ -16,7 +14,7 @@ use ort::{
         CUDA, ExecutionProvider, ExecutionProviderDispatch, OpenVINO, TensorRT,
         cuda::ConvAlgorithmSearch,
     },
-    session::{Session, builder::SessionBuilder},
+    session::Session,
     value::TensorRef,
 };
 use parking_lot::Mutex;
@@ -30,16 +28,14 @@ use super::{
     heads::{Head, TensorView},
     manifest::ModelManifest,
     onnx_file,
-    signature::Signature,
     staging::{Staged, Staging},
 };
-
-use first_line::first_line;
 
 /// A model in an ONNX file, with the output head of its manifest.
 pub struct OnnxDetector {
     session: Session,
-    description: ModelDescription,
+    /// Description of the model, from its manifest and its ONNX file.
+    pub description: ModelDescription,
     staging: Staging,
     options: OnnxOptions,
 }
@@ -73,22 +69,13 @@ impl OnnxDetector {
         let environment = load_environment(library)?;
         let manifest = ModelManifest::locate(model)?;
         let path = manifest.onnx.clone();
-        let unusable = |problem: String| InferenceError::Unusable {
-            path: path.clone(),
-            problem,
-        };
-        let bytes = onnx_file::read(&path).map_err(|detail| InferenceError::Unreadable {
-            path: path.clone(),
-            detail,
-        })?;
+        let unusable = unusable(&path);
+        let bytes = onnx_file::read(&path)?;
         let sha256 = sha256_of(&bytes);
         check_sum(&manifest, &sha256).map_err(unusable)?;
         onnx_file::check(&bytes).map_err(unusable)?;
 
-        let open = || {
-            let session = session_builder(environment, library, options)?.commit(&bytes);
-            session.map_err(|error| unusable(first_line(&error)))
-        };
+        let open = || open(environment, library, options, &path, &bytes);
         // Reports a failing model once, before every thread logs the same failure.
         let session = open()?;
         let others = std::thread::scope(|scope| {
@@ -101,18 +88,8 @@ impl OnnxDetector {
         })?;
         let metadata = description::metadata(&session);
         let (inputs, outputs) = description::tensors(&session);
-        let signature = Signature::new(&inputs, &manifest.input, &metadata).map_err(unusable)?;
-        let shapes: Vec<_> = description::float_shapes(&outputs).collect();
-        let size = (signature.width, signature.height);
-        manifest.output.check(&shapes, size).map_err(unusable)?;
-        let (scale, offset) = manifest.input.normalization().map_err(unusable)?;
-        let input = NetworkInput {
-            width: signature.width,
-            height: signature.height,
-            channel_order: manifest.input.channel_order,
-            scale,
-            offset,
-        };
+        let fitted = manifest.fit(&inputs, &outputs, &metadata);
+        let (signature, input) = fitted.map_err(unusable)?;
         // The revision covers the settings of the manifest in addition to the weights.
         let used = format!("{sha256} {:?} {:?}", manifest.input, manifest.output);
         let description = ModelDescription {
@@ -147,25 +124,26 @@ impl OnnxDetector {
         options: &OnnxOptions,
     ) -> Result<(Vec<OnnxTensor>, Vec<OnnxTensor>), InferenceError> {
         let environment = load_environment(library)?;
-        let path = || file.to_owned();
-        let unusable = |problem| InferenceError::Unusable {
-            path: path(),
-            problem,
-        };
-        let bytes = onnx_file::read(file).map_err(|detail| InferenceError::Unreadable {
-            path: path(),
-            detail,
-        })?;
-        onnx_file::check(&bytes).map_err(unusable)?;
-        let session = session_builder(environment, library, options)?.commit(&bytes);
-        let session = session.map_err(|error| unusable(first_line(&error)))?;
+        let bytes = onnx_file::read(file)?;
+        onnx_file::check(&bytes).map_err(unusable(file))?;
+        let session = open(environment, library, options, file, &bytes)?;
         Ok(description::tensors(&session))
     }
+}
 
-    /// Description of the model, from its manifest and its ONNX file.
-    pub fn description(&self) -> &ModelDescription {
-        &self.description
+/// Returns the error about a model in the file `path`.
+fn unusable(path: &Path) -> impl Fn(String) -> InferenceError + Copy {
+    |problem| InferenceError::Unusable {
+        path: path.to_owned(),
+        problem,
     }
+}
+
+/// The runtime's error message without its call stack.
+fn first_line(error: &ort::Error) -> String {
+    let text = error.to_string();
+    let line = text.lines().next().unwrap_or_default().trim();
+    line.trim_end_matches('.').to_owned()
 }
 
 fn check_sum(manifest: &ModelManifest, found: &str) -> Result<(), String> {
@@ -296,21 +274,15 @@ pub struct OnnxOptions {
     pub candidates: CandidateOptions,
 }
 
-/// Builder of sessions.
-struct Builder(SessionBuilder);
-
-impl Builder {
-    fn commit(mut self, model: &[u8]) -> Result<Session, ort::Error> {
-        self.0.commit_from_memory(model)
-    }
-}
-
-/// Returns a builder of sessions on the options' device, without a fallback to another device.
-fn session_builder(
+/// Opens a session of the model `bytes`, the content of the file `path`, on the options' device,
+/// without a fallback to another device.
+fn open(
     environment: &Environment,
     library: &Path,
     options: &OnnxOptions,
-) -> Result<Builder, InferenceError> {
+    path: &Path,
+    bytes: &[u8],
+) -> Result<Session, InferenceError> {
     let device = options.device;
     let (providers, available) = providers(device, options.threads);
     if !available {
@@ -320,7 +292,7 @@ fn session_builder(
         });
     }
     let failed = |error: ort::Error| InferenceError::Run(first_line(&error));
-    let builder = Session::builder(environment)
+    let mut builder = Session::builder(environment)
         .map_err(failed)?
         .with_intra_threads(options.threads.get())
         .map_err(|error| failed(error.into()))?
@@ -332,7 +304,8 @@ fn session_builder(
             device,
             detail: first_line(&error.into()),
         })?;
-    Ok(Builder(builder))
+    let session = builder.commit_from_memory(bytes);
+    session.map_err(|error| unusable(path)(first_line(&error)))
 }
 
 /// The device's execution providers in order of preference, and true if the library has them. The

@@ -13,6 +13,8 @@ use std::path::Path;
 
 use lookdown_common::files;
 
+use super::InferenceError;
+
 /// Largest ONNX file, bytes. Protocol buffers are limited to 2 GiB.
 const MAX_BYTES: u64 = 1 << 30;
 /// Most values of one tensor in a file.
@@ -23,9 +25,13 @@ const ENGINE: &[u8] = b"EPContext";
 /// Reads a whole file.
 ///
 /// # Errors
-/// One sentence: the error of the operating system, or that the file is too large.
-pub(super) fn read(path: &Path) -> Result<Vec<u8>, String> {
-    files::read(path, MAX_BYTES).map_err(|error| error.to_string())
+/// [`InferenceError::Unreadable`]: the error of the operating system, or that the file is too
+/// large.
+pub(super) fn read(path: &Path) -> Result<Vec<u8>, InferenceError> {
+    files::read(path, MAX_BYTES).map_err(|error| InferenceError::Unreadable {
+        path: path.to_owned(),
+        detail: error.to_string(),
+    })
 }
 
 /// Checks that the runtime may load this file.

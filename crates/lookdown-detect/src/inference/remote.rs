@@ -28,7 +28,7 @@ use crate::open_inference::{
     metadata::{ModelMetadata, ServerMetadata, TensorMetadata},
 };
 
-use exchange::{Answer, Question};
+use exchange::Question;
 use server::refusal;
 
 pub use options::{BearerToken, InvalidToken, RemoteOptions};
@@ -113,7 +113,7 @@ fn run(
         outputs: &understood.outputs,
         as_bytes: understood.as_bytes,
     };
-    let Answer { outputs } = server.infer(&understood.name_there, &question)?;
+    let outputs = server.infer(&understood.name_there, &question)?;
     let tensors: Vec<_> = outputs
         .iter()
         .map(|output| TensorView {
@@ -163,25 +163,17 @@ impl RemoteModel {
             check_tensor(tensor).map_err(unusable)?;
         }
         let (inputs, outputs) = (tensors(&model.inputs), tensors(&model.outputs));
-        let signature = Signature::new(&inputs, &manifest.input, &Metadata::default());
-        let signature = signature.map_err(unusable)?;
-        let shapes: Vec<_> = float_shapes(&outputs).collect();
-        let size = (signature.width, signature.height);
-        manifest.output.check(&shapes, size).map_err(unusable)?;
-        let (scale, offset) = manifest.input.normalization().map_err(unusable)?;
+        let fitted = manifest.fit(&inputs, &outputs, &Metadata::default());
+        let (signature, network_input) = fitted.map_err(unusable)?;
         let versions = &model.versions;
         let ModelManifest { input, output, .. } = &manifest;
         let used = format!("{name_there} {versions:?} {inputs:?} {outputs:?} {input:?} {output:?}");
         Ok(Self {
             revision: revision_of(used.as_bytes()),
-            input: NetworkInput {
-                width: signature.width,
-                height: signature.height,
-                channel_order: manifest.input.channel_order,
-                scale,
-                offset,
-            },
-            outputs: shapes.iter().map(|output| output.name.to_owned()).collect(),
+            input: network_input,
+            outputs: float_shapes(&outputs)
+                .map(|output| output.name.to_owned())
+                .collect(),
             as_bytes: metadata
                 .extensions
                 .iter()

@@ -47,6 +47,7 @@ pub struct ModelRepository {
     /// The server on which the networks run, or `None` if they run locally.
     pub remote: Option<Arc<RemoteServer>>,
     /// Locked while a model is loaded, so that only one is loaded at a time.
+    // After a panic the maps contain only complete entries.
     memory: Mutex<Memory>,
     metrics: Arc<DetectMetrics>,
 }
@@ -116,7 +117,7 @@ impl ModelRepository {
         if !self.is_remote_available() {
             return;
         }
-        let mut memory = self.lock();
+        let mut memory = self.memory.lock();
         for model in self.registry.all() {
             let Some(files) = &model.files else { continue };
             let name = &model.name;
@@ -179,7 +180,7 @@ impl ModelRepository {
             text: (self.options.explain)(&cause),
             cause,
         };
-        let model = (self.loader)(path).map_err(refused)?;
+        let mut model = (self.loader)(path).map_err(refused)?;
         if model.name != name {
             return Err(RepositoryError::OtherName {
                 name: name.to_owned(),
@@ -187,7 +188,7 @@ impl ModelRepository {
                 path: path.to_owned(),
             });
         }
-        let model = model.with_files(ModelFiles {
+        model.files = Some(ModelFiles {
             path: path.to_owned(),
             stamp: stamp.clone(),
         });
@@ -203,11 +204,6 @@ impl ModelRepository {
     /// Locks the state, or returns [`RepositoryError::Busy`] while a model is being loaded.
     fn try_lock(&self) -> Result<MutexGuard<'_, Memory>, RepositoryError> {
         self.memory.try_lock().ok_or(RepositoryError::Busy)
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Memory> {
-        // After a panic the maps contain only complete entries.
-        self.memory.lock()
     }
 }
 

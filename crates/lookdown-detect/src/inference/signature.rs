@@ -6,9 +6,10 @@ use std::{
 };
 
 use super::{
-    description::{FLOAT, Metadata, OnnxTensor},
-    manifest::{Layout, ManifestInput},
+    description::{FLOAT, Metadata, OnnxTensor, float_shapes},
+    manifest::{Layout, ManifestInput, ModelManifest},
 };
+use lookdown_imaging::NetworkInput;
 
 /// Network input sides accepted, pixels.
 const SIDE: RangeInclusive<u32> = 32..=4096;
@@ -24,6 +25,31 @@ pub(super) struct Signature {
     pub(super) views_per_run: Option<NonZeroUsize>,
     pub(super) width: u32,
     pub(super) height: u32,
+}
+
+impl ModelManifest {
+    /// Checks the inputs and outputs of a model against its manifest. Returns its signature and the
+    /// input format.
+    pub(super) fn fit(
+        &self,
+        inputs: &[OnnxTensor],
+        outputs: &[OnnxTensor],
+        metadata: &Metadata,
+    ) -> Result<(Signature, NetworkInput), String> {
+        let signature = Signature::new(inputs, &self.input, metadata)?;
+        let (width, height) = (signature.width, signature.height);
+        let shapes: Vec<_> = float_shapes(outputs).collect();
+        self.output.check(&shapes, (width, height))?;
+        let (scale, offset) = self.input.normalization()?;
+        let input = NetworkInput {
+            width,
+            height,
+            channel_order: self.input.channel_order,
+            scale,
+            offset,
+        };
+        Ok((signature, input))
+    }
 }
 
 impl Signature {

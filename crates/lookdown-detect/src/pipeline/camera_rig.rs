@@ -77,7 +77,7 @@ impl CameraRig {
         let views = plan.views(&geometry.mount, input.width, input.height);
         let tables = RemapTable::for_views(&views, &geometry.lens, frame_width, frame_height);
         let mut planned = views.into_iter().zip(tables);
-        let views = Visible::new(planned.by_ref().take(plan.constant_count()), &hidden);
+        let views = Visible::new(planned.by_ref().take(plan.constant_count), &hidden);
         let details = Visible::new(planned, &hidden);
         Self {
             geometry,
@@ -320,7 +320,7 @@ impl CameraRig {
     pub(super) fn views_holding(&self, footprint: &Footprint) -> usize {
         match &self.views {
             Views::Virtual(views) => {
-                let outline = footprint.rays();
+                let outline = &footprint.rays;
                 let holds = |view: &VirtualView| outline.iter().all(|ray| view.holds(ray));
                 views.iter().filter(|(view, _)| holds(view)).count()
             }

@@ -104,8 +104,9 @@ pub struct Engine {
     rigs: RigCache,
     motion_cache: MotionCache,
     follow_cache: FollowCache,
-    /// The turn of all view plans, radians.
-    plan_turn: f64,
+    /// The turn of all view plans about their axis, radians. A person is then seen in other views, so
+    /// that several turns tell how much of a precision is chance.
+    pub plan_turn: f64,
     /// The options.
     pub options: EngineOptions,
     pub(super) metrics: Arc<DetectMetrics>,
@@ -293,14 +294,10 @@ impl Engine {
                 observation.is_searched = true;
             }
         }
-        timeline.enter(Stage::Queue, Instant::now());
-        let first = self.inference.queue_pass(
-            Arc::clone(&observation.camera.rig),
-            Arc::clone(&observation.model),
-            Arc::clone(&observation.network_frame),
-            job.ticket.clone(),
-            self.cached_views(job, &observation),
-        );
+        let rig = Arc::clone(&observation.camera.rig);
+        let model = Arc::clone(&observation.model);
+        let cached = self.cached_views(job, &observation);
+        let first = self.queue_pass(job, &observation, rig, model, cached);
         observation.wait_for(&first)?;
         self.look_again(job, &mut observation)?;
         Ok(observation)

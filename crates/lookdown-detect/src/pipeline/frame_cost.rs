@@ -22,7 +22,7 @@ pub(super) fn for_frame(job: &DetectJob, max_pixels: u64) -> usize {
     }
     let profile = job.parameters.profile;
     let plan = profile.view_plan();
-    let first_pass = plan.map_or(1, |plan| plan.directions().len());
+    let first_pass = plan.map_or(1, |plan| plan.directions.len());
     let inputs = first_pass + profile.max_crop_inputs();
     cost(size, job.ticket.drawn_width, inputs)
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use parking_lot::{Condvar, Mutex, MutexGuard};
+use parking_lot::{Condvar, Mutex};
 
 use super::{
     Ticket,
@@ -12,6 +12,7 @@ use super::{
 /// A queue ordered by priority, then by the turns of the clients. The caller of `push` bounds its
 /// length.
 pub(super) struct FrameQueue<T> {
+    // No change can panic part-way, so the state is consistent after a panic.
     state: Mutex<State<T>>,
     changed: Condvar,
 }
@@ -37,7 +38,7 @@ impl<T> FrameQueue<T> {
     /// Queues an entry, which costs its client `cost`. Returns it as an error if the queue is
     /// closed.
     pub(super) fn push(&self, ticket: &Ticket, cost: usize, entry: T) -> Result<(), T> {
-        let mut state = self.lock();
+        let mut state = self.state.lock();
         if state.closed {
             return Err(entry);
         }
@@ -50,7 +51,7 @@ impl<T> FrameQueue<T> {
 
     /// Waits for the next entry; `None` if the queue is closed and empty. Blocks.
     pub(super) fn pop(&self) -> Option<T> {
-        let mut state = self.lock();
+        let mut state = self.state.lock();
         self.changed.wait_while(&mut state, |state| {
             state.waiting.is_empty() && !state.closed
         });
@@ -61,13 +62,8 @@ impl<T> FrameQueue<T> {
 
     /// Closes the queue for new entries. Waiting entries can still be popped.
     pub(super) fn close(&self) {
-        self.lock().closed = true;
+        self.state.lock().closed = true;
         self.changed.notify_all();
-    }
-
-    fn lock(&self) -> MutexGuard<'_, State<T>> {
-        // No change can panic part-way, so the state is consistent after a panic.
-        self.state.lock()
     }
 }
 

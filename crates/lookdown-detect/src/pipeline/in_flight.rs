@@ -11,7 +11,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use parking_lot::{Mutex, MutexGuard};
+use parking_lot::Mutex;
 
 use super::{Stage, Ticket};
 use crate::fairness::BudgetShare;
@@ -78,7 +78,7 @@ impl InFlight {
         permits: BudgetShare,
         now: Instant,
     ) -> InFlightGuard {
-        let mut state = self.state();
+        let mut state = self.0.lock();
         if state.work.is_empty() {
             state.progress(now);
         }
@@ -100,31 +100,26 @@ impl InFlight {
 
     /// Returns the amount of work that waits or is being processed.
     pub(super) fn count(&self) -> usize {
-        self.state().work.len()
+        self.0.lock().work.len()
     }
 
     /// Returns the time without progress. Zero without work.
     pub(super) fn quiet_for(&self, now: Instant) -> Duration {
-        self.state().quiet_for(now)
+        self.0.lock().quiet_for(now)
     }
 
     /// Returns the stall that has lasted for at least `limit`, if there is one.
     pub(super) fn stall(&self, now: Instant, limit: Duration) -> Option<Stall> {
-        self.state().stall(now, limit)
+        self.0.lock().stall(now, limit)
     }
 
     /// Returns a stall like [`InFlight::stall`], but each only once.
     pub(super) fn new_stall(&self, now: Instant, limit: Duration) -> Option<Stall> {
-        let mut state = self.state();
+        let mut state = self.0.lock();
         let stall = state.stall(now, limit);
         let is_new = stall.is_some() && !state.is_reported;
         state.is_reported = stall.is_some();
         stall.filter(|_| is_new)
-    }
-
-    fn state(&self) -> MutexGuard<'_, State> {
-        // No change can panic half-way.
-        self.0.lock()
     }
 }
 
@@ -175,7 +170,7 @@ impl Work {
 impl InFlightGuard {
     /// Records that a worker has taken the work.
     pub(super) fn begin(&self, now: Instant) {
-        let mut state = self.in_flight.state();
+        let mut state = self.in_flight.0.lock();
         state.progress(now);
         if let Some(work) = state.work.get_mut(&self.number) {
             work.has_begun = true;
@@ -190,7 +185,7 @@ impl InFlightGuard {
 
 impl Drop for InFlightGuard {
     fn drop(&mut self) {
-        let mut state = self.in_flight.state();
+        let mut state = self.in_flight.0.lock();
         state.work.remove(&self.number);
         state.progress(self.ended.unwrap_or_else(Instant::now));
     }

@@ -48,7 +48,7 @@ impl Mapped {
         let mount = &rig.geometry.mount;
         let height_ratio = self
             .footprint
-            .extremities()
+            .extremities
             .and_then(|extremities| extremities.height_ratio(mount));
         let holding = views_holding(passes, &self.footprint);
         let expected_views = holding.max(1) as f64;
@@ -226,7 +226,7 @@ fn person(
     let outlines = proportioned.map(|member| {
         let weight = member.candidate.score.powi(3) * member.candidate.coordinate_weight;
         // A score of 0 is valid, but the outline needs a weight above 0.
-        (weight.max(f64::MIN_POSITIVE), member.footprint.outline())
+        (weight.max(f64::MIN_POSITIVE), &*member.footprint.outline)
     });
     let averaged = OrientedBox::averaging(up, outlines)?;
     let oriented_box = if has_exact {

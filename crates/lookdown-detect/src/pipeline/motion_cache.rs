@@ -9,7 +9,7 @@ use std::{
 };
 
 use lookdown_lens::geometry::{FrameCrop, VirtualView};
-use parking_lot::{Mutex, MutexGuard};
+use parking_lot::Mutex;
 
 use super::{camera_cache::CameraCache, camera_rig::CameraRig};
 use crate::inference::{Model, ViewDetection};
@@ -43,6 +43,7 @@ pub(super) struct CameraViews {
     // Weak: an inactive camera must not keep tables or weights in memory.
     rig: Weak<CameraRig>,
     model: Weak<Model>,
+    // Every change is one assignment, so the state is consistent after a panic.
     views: Mutex<Vec<Option<CachedView>>>,
 }
 
@@ -112,7 +113,7 @@ impl<V: PartialEq> ChangingViews<V> {
         let cached = places.iter().map(|place| {
             let before = before.as_ref()?;
             let same = before.places.iter().position(|other| other == place)?;
-            before.views.lock()[same].clone()
+            before.views.views.lock()[same].clone()
         });
         let views = CameraViews::new(rig, model, cached.collect());
         *last = Some(PlacedViews {
@@ -146,7 +147,7 @@ impl CameraViews {
         view: usize,
         signature: &ViewSignature,
     ) -> Option<Vec<ViewDetection>> {
-        let views = self.lock();
+        let views = self.views.lock();
         let cached = views[view].as_ref()?;
         let is_fresh = cached.inferred_at.elapsed() < MAX_AGE;
         let is_still = is_fresh && !cached.signature.differs_from(signature);
@@ -155,15 +156,10 @@ impl CameraViews {
 
     /// Stores the detections of a view.
     pub(super) fn store(&self, view: usize, signature: ViewSignature, found: Vec<ViewDetection>) {
-        self.lock()[view] = Some(CachedView {
+        self.views.lock()[view] = Some(CachedView {
             signature,
             found,
             inferred_at: Instant::now(),
         });
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Vec<Option<CachedView>>> {
-        // Every change is one assignment, so the state is consistent after a panic.
-        self.views.lock()
     }
 }

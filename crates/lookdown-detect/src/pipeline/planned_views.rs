@@ -61,13 +61,9 @@ impl PlannedView {
     /// Returns the nodes of a grid of `cells` × `cells` over the view, row by row from its top left
     /// corner, in corner-origin frame pixels. Nodes beyond the lens image are `None`.
     pub fn grid(&self, lens: &Lens, cells: u32) -> Vec<Option<Pixel>> {
-        let place =
-            |index: u32, side: u32| f64::from(index) / f64::from(cells) * f64::from(side) - 0.5;
-        let (width, height) = (self.view.width(), self.view.height());
-        let nodes = (0..=cells).flat_map(|row| (0..=cells).map(move |column| (column, row)));
-        let nodes = nodes.map(|(column, row)| {
-            let pixel = Pixel::new(place(column, width), place(row, height));
-            let seen = lens.project(&self.view.ray_in_camera(&pixel))?;
+        let nodes = (0..=cells).flat_map(|row| (0..=cells).map(move |column| [column, row]));
+        let nodes = nodes.map(|at| {
+            let seen = node(&self.view, lens, cells, at)?;
             Some(cross_half_pixel(seen, PixelConvention::CornerOrigin))
         });
         nodes.collect()
@@ -159,13 +155,15 @@ impl CoarseMasks {
 
 /// Returns true when the view covers some part of the lens image for which `counts` holds.
 fn sees(view: &VirtualView, lens: &Lens, counts: impl Fn(Pixel) -> bool) -> bool {
-    let place =
-        |index: u32, side: u32| f64::from(index) / f64::from(SIGHT_STEPS) * f64::from(side) - 0.5;
     (0..=SIGHT_STEPS).any(|row| {
-        (0..=SIGHT_STEPS).any(|column| {
-            let pixel = Pixel::new(place(column, view.width()), place(row, view.height()));
-            let seen = lens.project(&view.ray_in_camera(&pixel));
-            seen.is_some_and(&counts)
-        })
+        (0..=SIGHT_STEPS)
+            .any(|column| node(view, lens, SIGHT_STEPS, [column, row]).is_some_and(&counts))
     })
+}
+
+/// Returns the pixel of a node of a grid of `cells` × `cells` over a view, if the lens sees it.
+fn node(view: &VirtualView, lens: &Lens, cells: u32, [column, row]: [u32; 2]) -> Option<Pixel> {
+    let place = |index: u32, side: u32| f64::from(index) / f64::from(cells) * f64::from(side) - 0.5;
+    let pixel = Pixel::new(place(column, view.width), place(row, view.height));
+    lens.project(&view.ray_in_camera(&pixel))
 }

@@ -22,13 +22,3 @@ pub struct Ticket {
     /// The times at which the frame entered and left each stage.
     pub timeline: Timeline,
 }
-
-impl Ticket {
-    /// Creates a ticket that is not withdrawn.
-    pub fn new(priority: Priority) -> Self {
-        Self {
-            priority,
-            ..Self::default()
-        }
-    }
-}

@@ -6,7 +6,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use parking_lot::{Mutex, MutexGuard};
+use parking_lot::Mutex;
 use strum::IntoStaticStr;
 
 use super::StageTimings;
@@ -88,7 +88,7 @@ impl Stages {
 impl Timeline {
     /// Returns the stages so far. The current stage ends at `until`.
     pub fn spans(&self, until: Instant) -> Vec<StageSpan> {
-        let stages = self.lock();
+        let stages = self.0.lock();
         let now = stages.now.map(|(stage, began)| StageSpan {
             stage,
             began,
@@ -100,7 +100,7 @@ impl Timeline {
     /// Returns the total time in each completed stage.
     pub(super) fn timings(&self) -> StageTimings {
         let mut timings = StageTimings::default();
-        for span in &self.lock().over {
+        for span in &self.0.lock().over {
             *timings.stage_mut(span.stage) += span.ended - span.began;
         }
         timings
@@ -108,7 +108,7 @@ impl Timeline {
 
     /// Records that the frame leaves its current stage and enters `stage`.
     pub(super) fn enter(&self, stage: Stage, at: Instant) {
-        let mut stages = self.lock();
+        let mut stages = self.0.lock();
         stages.progress(at);
         if stages.now.is_none_or(|(now, _)| now != stage) {
             let at = stages.not_before_the_last(at);
@@ -119,23 +119,18 @@ impl Timeline {
 
     /// Records that the frame leaves its current stage.
     pub(super) fn leave(&self, at: Instant) {
-        self.lock().leave(at);
+        self.0.lock().leave(at);
     }
 
     /// Records that the work of the current stage progresses.
     pub(super) fn progress(&self, at: Instant) {
-        self.lock().progress(at);
+        self.0.lock().progress(at);
     }
 
     /// Returns the current stage and the time of the last progress.
     pub(super) fn standing(&self) -> (Option<Stage>, Option<Instant>) {
-        let stages = self.lock();
+        let stages = self.0.lock();
         (stages.now.map(|(stage, _)| stage), stages.progressed)
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Stages> {
-        // No update can panic half-way.
-        self.0.lock()
     }
 }
 

@@ -9,7 +9,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use parking_lot::{Mutex, MutexGuard};
+use parking_lot::Mutex;
 use tokio::sync::oneshot;
 use tokio_util::sync::CancellationToken;
 
@@ -57,6 +57,7 @@ struct Shared {
     queue: FrameQueue<Entry>,
     budget: SharedBudget,
     in_flight: Arc<InFlight>,
+    // The rate holds plain numbers only, so a panic cannot leave it inconsistent.
     rate: Mutex<ServiceRate>,
     metrics: Arc<DetectMetrics>,
 }
@@ -97,22 +98,14 @@ impl WorkerPool {
         &self.shared.engine
     }
 
-    /// Queues a frame and waits for its report. Dropping the future withdraws the frame: work that
-    /// has not begun is skipped.
+    /// Queues a frame, waits for its report, and calls `finish` with the result on the worker
+    /// thread, before the permit is released. Slow work such as drawing is thus bounded as well.
+    /// Dropping the future withdraws the frame: work that has not begun is skipped.
     ///
     /// # Errors
     /// [`PipelineError::Overloaded`] at once when the queue is full, [`PipelineError::ShareUsed`]
     /// when the client has too many frames in it, [`PipelineError::ShuttingDown`] after
     /// [`WorkerPool::shut_down`], otherwise the error of the engine.
-    pub async fn detect(&self, job: DetectJob) -> Result<DetectedFrame, PipelineError> {
-        self.detect_and(job, |detected| detected).await
-    }
-
-    /// Detects like [`WorkerPool::detect`], then calls `finish` with the result on the worker
-    /// thread, before the permit is released. Slow work such as drawing is thus bounded as well.
-    ///
-    /// # Errors
-    /// The same as [`WorkerPool::detect`].
     pub async fn detect_and<T: Send + 'static>(
         &self,
         job: DetectJob,
@@ -130,7 +123,7 @@ impl WorkerPool {
     /// the token passed to the work so that long work can stop.
     ///
     /// # Errors
-    /// The same as [`WorkerPool::detect`].
+    /// The same as [`WorkerPool::detect_and`].
     pub async fn run<T: Send + 'static>(
         &self,
         ticket: Ticket,
@@ -153,7 +146,7 @@ impl WorkerPool {
         let guard = self.shared.in_flight.add(&ticket, permits, Instant::now());
         let _withdrawal = ticket.withdrawn.clone().drop_guard();
         let (answer, waiting) = oneshot::channel();
-        self.shared.rate().began(Instant::now());
+        self.shared.rate.lock().began(Instant::now());
         let entry = Entry {
             ticket: ticket.clone(),
             job: Box::new(|engine| {
@@ -188,7 +181,7 @@ impl WorkerPool {
 
     /// Returns the number of frames queued or in progress.
     pub fn pending(&self) -> usize {
-        self.shared.pending()
+        self.shared.in_flight.count()
     }
 
     /// Returns the stall of the pool: there is work, and for at least `limit` none has progressed.
@@ -220,7 +213,7 @@ impl WorkerPool {
 
     fn refusal(&self, error: BudgetError, client: &Client) -> PipelineError {
         let capacity = self.shared.budget.total();
-        let retry_after = self.shared.rate().time_for(self.pending());
+        let retry_after = self.shared.rate.lock().time_for(self.pending());
         match error {
             BudgetError::Full => PipelineError::Overloaded {
                 capacity,
@@ -251,28 +244,21 @@ impl Shared {
                 self.metrics.withdrawn_frames.inc();
                 drop(job);
                 guard.end(Instant::now());
-                self.rate().given_up(self.pending());
+                self.rate.lock().given_up(self.in_flight.count());
                 continue;
             }
             guard.begin(Instant::now());
             let done = job(&self.engine);
             // A client that sends the next frame after this answer must find the permit free.
             guard.end(Instant::now());
-            self.rate().ended(Instant::now(), self.pending());
+            self.rate
+                .lock()
+                .ended(Instant::now(), self.in_flight.count());
             if done.withdrawn {
                 self.metrics.withdrawn_frames.inc();
             }
             (done.deliver)();
         }
-    }
-
-    fn pending(&self) -> usize {
-        self.in_flight.count()
-    }
-
-    fn rate(&self) -> MutexGuard<'_, ServiceRate> {
-        // The rate holds plain numbers only, so a panic cannot leave it inconsistent.
-        self.rate.lock()
     }
 }
 

@@ -6,10 +6,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use lookdown_common::files::FileError;
+use lookdown_common::files::{FileError, IMAGE_ENDINGS, has_ending};
 
-/// Extensions of images that can be decoded, in lower case.
-const IMAGE_ENDINGS: [&str; 4] = ["jpg", "jpeg", "png", "webp"];
 /// Most levels of folders. The largest data sets have five.
 const MAX_DEPTH: usize = 12;
 /// Most files and folders. The largest data sets have some 300 000.
@@ -77,7 +75,7 @@ impl Files {
 
     /// The files with this extension, given in lower case.
     pub(super) fn ending_in(&self, ending: &str) -> Vec<PathBuf> {
-        self.named(|path| has_ending(path, ending))
+        self.named(|path| has_ending(path, &[ending]))
     }
 
     /// The files for which `is_wanted` returns true.
@@ -174,12 +172,7 @@ fn the_only(found: &[&PathBuf], name: &Path) -> Result<PathBuf, String> {
 }
 
 fn is_image_file(path: &Path) -> bool {
-    IMAGE_ENDINGS.iter().any(|ending| has_ending(path, ending))
-}
-
-fn has_ending(path: &Path, ending: &str) -> bool {
-    path.extension()
-        .is_some_and(|actual| actual.eq_ignore_ascii_case(ending))
+    has_ending(path, &IMAGE_ENDINGS)
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use parking_lot::{Mutex, MutexGuard};
+use parking_lot::Mutex;
 use tokio::time::{Instant, sleep_until};
 
 use super::ConnectionLimits;
@@ -63,6 +63,7 @@ impl Reading {
 /// Tracks the phases of a connection and detects timeouts.
 #[derive(Debug)]
 pub(super) struct ConnectionTimeouts {
+    // No change can panic before it is complete.
     state: Mutex<State>,
     header_timeout: Duration,
     idle_timeout: Duration,
@@ -85,7 +86,7 @@ impl ConnectionTimeouts {
 
     /// Records that bytes have arrived.
     pub(super) fn received(&self) {
-        let mut state = self.state();
+        let mut state = self.state.lock();
         if state.phase == Phase::Idle {
             state.phase = Phase::Head;
             state.until = Some(Instant::now() + self.header_timeout);
@@ -94,7 +95,7 @@ impl ConnectionTimeouts {
 
     /// Records that the head of a request is complete.
     pub(super) fn request_begins(&self) {
-        let mut state = self.state();
+        let mut state = self.state.lock();
         state.phase = Phase::Service;
         state.until = None;
     }
@@ -102,14 +103,15 @@ impl ConnectionTimeouts {
     /// Records that all of a response is ready to be sent. A head that arrived in part with the
     /// last request has the time of an idle connection.
     pub(super) fn request_ends(&self) {
-        let mut state = self.state();
+        let mut state = self.state.lock();
         state.phase = Phase::Idle;
         state.until = Some(Instant::now() + self.idle_timeout);
     }
 
     /// Records that the client blocks the response.
     pub(super) fn blocked(&self) {
-        self.state()
+        self.state
+            .lock()
             .reading
             .blocked_since
             .get_or_insert_with(Instant::now);
@@ -117,7 +119,7 @@ impl ConnectionTimeouts {
 
     /// Records sent bytes.
     pub(super) fn sent(&self, bytes: usize) {
-        let mut state = self.state();
+        let mut state = self.state.lock();
         state.reading.sent(bytes);
         // The body of a response may be dropped long before its last byte is read.
         if state.phase == Phase::Idle {
@@ -127,7 +129,7 @@ impl ConnectionTimeouts {
 
     /// Returns true if no request has arrived yet.
     pub(super) fn awaits_first_request(&self) -> bool {
-        self.state().phase == Phase::FirstHead
+        self.state.lock().phase == Phase::FirstHead
     }
 
     /// Waits for a timeout.
@@ -138,17 +140,12 @@ impl ConnectionTimeouts {
         loop {
             let now = Instant::now();
             let next_look = now + self.header_timeout.min(self.idle_timeout);
-            let deadline = self.state().deadline(self.idle_timeout);
+            let deadline = self.state.lock().deadline(self.idle_timeout);
             if deadline.is_some_and(|deadline| deadline <= now) {
                 return;
             }
             sleep_until(deadline.map_or(next_look, |deadline| deadline.min(next_look))).await;
         }
-    }
-
-    fn state(&self) -> MutexGuard<'_, State> {
-        // No change can panic before it is complete.
-        self.state.lock()
     }
 }
 

@@ -16,7 +16,8 @@ pub(super) struct NodeGrid {
     x: Vec<f32>,
     y: Vec<f32>,
     nodes_across: usize,
-    visibility: Visibility,
+    /// The pixels that show the lens image.
+    pub(super) visibility: Visibility,
 }
 
 /// A row of nodes: places in the normalized plane, coordinate by coordinate.
@@ -28,7 +29,7 @@ pub(super) struct Nodes<'a> {
 
 impl NodeGrid {
     pub(super) fn new(view: &VirtualView, lens: &Lens) -> Self {
-        let size = [view.width(), view.height()];
+        let size = [view.width, view.height];
         Self::from_positions(size, Visibility::new(view, lens), |pixel| {
             let place = lens.continued_beyond_rim(&view.ray_in_camera(pixel));
             // A node without a place hides the four patches around it.
@@ -38,7 +39,7 @@ impl NodeGrid {
 
     /// The nodes of a panorama. Those beyond the lens image have no place.
     pub(super) fn for_panorama(panorama: &Panorama, lens: &Lens) -> Self {
-        let size = [panorama.width(), panorama.height()];
+        let size = [panorama.width, panorama.height];
         Self::from_positions(size, Visibility::everywhere(size), |pixel| {
             let ray = panorama.ray_in_camera(pixel);
             let place = lens.project(&ray).and(lens.continued_beyond_rim(&ray));
@@ -92,11 +93,6 @@ impl NodeGrid {
     /// Patches in a row.
     pub(super) fn patches_across(&self) -> usize {
         self.nodes_across - 1
-    }
-
-    /// The pixels that show the lens image.
-    pub(super) fn visibility(&self) -> &Visibility {
-        &self.visibility
     }
 
     /// Memory held, bytes.

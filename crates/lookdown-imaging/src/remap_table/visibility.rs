@@ -40,17 +40,17 @@ impl Visibility {
                 let margin = margin(x);
                 margin > 0.0 || (margin == 0.0 && !spans_are_hidden)
             };
-            let peak = first(0, view.width() - 1, |x| margin(x + 1) <= margin(x));
+            let peak = first(0, view.width - 1, |x| margin(x + 1) <= margin(x));
             if !is_in_span(peak) {
                 return [0, 0];
             }
             [
                 first(0, peak, is_in_span),
-                first(peak, view.width(), |x| !is_in_span(x)),
+                first(peak, view.width, |x| !is_in_span(x)),
             ]
         };
         Self {
-            spans: (0..view.height()).map(span).collect(),
+            spans: (0..view.height).map(span).collect(),
             spans_are_hidden,
         }
     }

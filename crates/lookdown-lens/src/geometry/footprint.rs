@@ -43,9 +43,14 @@ pub enum BackProjection {
 /// An outline in the frame, corner-origin pixels, never empty.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Footprint {
-    outline: Vec<Pixel>,
-    rays: Vec<Ray>,
-    extremities: Option<Extremities>,
+    /// The outline's points, corner-origin frame pixels.
+    pub outline: Vec<Pixel>,
+    /// Some of the outline's points as rays (camera frame, any length); none of a box found in the
+    /// frame itself.
+    pub rays: Vec<Ray>,
+    /// The ends of the outline along the vertical and across it; `None` for corner hulls, which
+    /// know no vertical.
+    pub extremities: Option<Extremities>,
 }
 
 impl Footprint {
@@ -133,23 +138,6 @@ impl Footprint {
             rays: Vec::new(),
             extremities: None,
         }
-    }
-
-    /// The outline's points, corner-origin frame pixels.
-    pub fn outline(&self) -> &[Pixel] {
-        &self.outline
-    }
-
-    /// Some of the outline's points as rays (camera frame, any length); none of a box found in the
-    /// frame itself.
-    pub fn rays(&self) -> &[Ray] {
-        &self.rays
-    }
-
-    /// The ends of the outline along the vertical and across it; `None` for corner hulls, which
-    /// know no vertical.
-    pub fn extremities(&self) -> Option<&Extremities> {
-        self.extremities.as_ref()
     }
 
     /// The axis-parallel hull `[x_min, y_min, x_max, y_max]`, corner-origin frame pixels.

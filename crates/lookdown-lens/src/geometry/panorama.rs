@@ -15,8 +15,10 @@ pub struct Panorama {
     radians_per_pixel: f64,
     /// The conformal latitude of the upper border.
     top: f64,
-    width: u32,
-    height: u32,
+    /// Width, pixels.
+    pub width: u32,
+    /// Height, pixels.
+    pub height: u32,
 }
 
 impl Panorama {
@@ -33,16 +35,6 @@ impl Panorama {
             width,
             height,
         }
-    }
-
-    /// Width, pixels.
-    pub fn width(&self) -> u32 {
-        self.width
-    }
-
-    /// Height, pixels.
-    pub fn height(&self) -> u32 {
-        self.height
     }
 
     /// The width of a whole turn, pixels.

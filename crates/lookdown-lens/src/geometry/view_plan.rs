@@ -59,9 +59,10 @@ const PAPER_FIRST_AZIMUTH: f64 = 3.14;
 /// The directions a camera is looked at from within.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViewPlan {
-    directions: Vec<ViewDirection>,
+    /// The directions, in plan order: detail views last.
+    pub directions: Vec<ViewDirection>,
     /// The number of directions, from the first on, in which every frame is looked at.
-    constant_count: usize,
+    pub constant_count: usize,
 }
 
 impl ViewPlan {
@@ -125,17 +126,6 @@ impl ViewPlan {
             direction.azimuth += angle;
         }
         self
-    }
-
-    /// The number of views in which every frame is looked at. They come first; the others are
-    /// detail views.
-    pub fn constant_count(&self) -> usize {
-        self.constant_count
-    }
-
-    /// The directions, in plan order: detail views last.
-    pub fn directions(&self) -> &[ViewDirection] {
-        &self.directions
     }
 
     /// The plan's views for a mount, `width` × `height` pixels each, in plan order.

@@ -20,10 +20,14 @@ pub struct ViewDirection {
 /// A pinhole view of `width` × `height` pixels with square pixels and a central principal point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VirtualView {
-    camera_from_view: Rotation3<f64>,
-    focal: f64,
-    width: u32,
-    height: u32,
+    /// Rotation from the view frame to the camera frame.
+    pub camera_from_view: Rotation3<f64>,
+    /// Focal length, pixels.
+    pub focal: f64,
+    /// Width, pixels.
+    pub width: u32,
+    /// Height, pixels.
+    pub height: u32,
 }
 
 /// Up is undefined in a view whose axis is within this of it (sine of the angle).
@@ -89,26 +93,6 @@ impl VirtualView {
             width,
             height,
         }
-    }
-
-    /// Rotation from the view frame to the camera frame.
-    pub fn camera_from_view(&self) -> &Rotation3<f64> {
-        &self.camera_from_view
-    }
-
-    /// Focal length, pixels.
-    pub fn focal(&self) -> f64 {
-        self.focal
-    }
-
-    /// Width, pixels.
-    pub fn width(&self) -> u32 {
-        self.width
-    }
-
-    /// Height, pixels.
-    pub fn height(&self) -> u32 {
-        self.height
     }
 
     /// Full horizontal opening angle, radians.

@@ -13,7 +13,7 @@ use std::{
 
 use jiff::Timestamp;
 use lookdown_common::{
-    files::{self, Links},
+    files::{self, IMAGE_ENDINGS, Links},
     text::one_line,
 };
 use tokio::{task::spawn_blocking, time::sleep};
@@ -23,8 +23,6 @@ use crate::{Camera, MAX_FRAME_BYTES, SourceError};
 
 /// Shortest and longest interval of the checks for new files.
 const CHECKS: (Duration, Duration) = (Duration::from_millis(100), Duration::from_millis(500));
-/// Endings of image files, in lower case.
-const ENDINGS: [&str; 4] = ["jpg", "jpeg", "png", "webp"];
 /// Most files of a folder.
 const MAX_FILES: usize = 100_000;
 
@@ -139,9 +137,7 @@ fn is_image(path: &Path) -> bool {
     let is_hidden = path
         .file_name()
         .is_none_or(|name| name.to_string_lossy().starts_with('.'));
-    let ending = path.extension().and_then(|ending| ending.to_str());
-    let ending = ending.unwrap_or_default().to_ascii_lowercase();
-    !is_hidden && ENDINGS.contains(&ending.as_str())
+    !is_hidden && files::has_ending(path, &IMAGE_ENDINGS)
 }
 
 #[cfg(test)]

@@ -22,7 +22,8 @@ const FIRST_FRAME: Duration = Duration::from_secs(10);
 /// The receiver of a camera's frames.
 pub(super) struct Sink<'a> {
     slot: &'a Slot<Frame>,
-    metrics: &'a CameraMetrics,
+    /// The metrics of the camera, which know its viewers.
+    pub(super) metrics: &'a CameraMetrics,
     started: Instant,
     /// The time of the last sign that the camera works.
     alive: Mutex<Option<Instant>>,
@@ -64,11 +65,6 @@ impl<'a> Sink<'a> {
             tracing::info!("the camera sends frames again");
         }
         Ok(())
-    }
-
-    /// Returns the metrics of the camera, which know its viewers.
-    pub(super) fn metrics(&self) -> &CameraMetrics {
-        self.metrics
     }
 
     /// Notes that the camera works, although it sent no new frame.

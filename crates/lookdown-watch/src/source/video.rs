@@ -34,11 +34,11 @@ pub(super) async fn run_stream(
     sink: &Sink<'_>,
 ) -> Result<Infallible, SourceError> {
     loop {
-        let has_viewers = sink.metrics().has_viewers();
+        let has_viewers = sink.metrics.has_viewers();
         let every = (!has_viewers).then(|| camera.every());
         tokio::select! {
             ended = read_stream(camera, url, every, login, sink) => return ended,
-            () = sink.metrics().viewers_changed(has_viewers) => login.restart(),
+            () = sink.metrics.viewers_changed(has_viewers) => login.restart(),
         }
     }
 }
@@ -114,7 +114,7 @@ pub(super) async fn run_file(
     arguments.push("-re".into());
     arguments.extend(file_input(path));
     // A file cannot continue with another rate.
-    if !sink.metrics().has_viewers() {
+    if !sink.metrics.has_viewers() {
         arguments.extend(["-vf", &first_of_each(camera.every())].map(OsString::from));
     }
     arguments.extend(["-fps_mode", "passthrough"].map(OsString::from));
@@ -134,7 +134,7 @@ fn first_of_each(every: Duration) -> String {
 
 /// The playlist with the URL of the relay and its options (`ffmpeg-formats`, concat).
 fn script(camera: &Camera, url: &str) -> String {
-    let transport = camera.video.transport.name();
+    let transport: &str = camera.video.transport.into();
     let mut script =
         format!("ffconcat version 1.0\nfile '{url}'\noption rtsp_transport {transport}\n");
     // Microseconds.

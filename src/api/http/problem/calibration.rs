@@ -36,10 +36,9 @@ impl From<ChangeError> for Problem {
             }
             ChangeError::Store(_) => return Self::internal(error),
         };
-        let problem = Self::new(kind, error.to_string());
-        match parameter {
-            Some(parameter) => problem.with_parameter(parameter),
-            None => problem,
+        Self {
+            parameter,
+            ..Self::new(kind, error.to_string())
         }
     }
 }

@@ -38,9 +38,9 @@ impl From<PipelineError> for Problem {
             }
             other => Self::new(kind, other.to_string()),
         };
-        match parameter {
-            Some(parameter) => problem.with_parameter(parameter),
-            None => problem,
+        Self {
+            parameter,
+            ..problem
         }
     }
 }

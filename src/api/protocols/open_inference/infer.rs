@@ -144,9 +144,7 @@ struct InferOutputParameters {
 /// The parameters of a request.
 struct InferParameters;
 
-impl ToSchema for InferParameters {
-    fn schemas(_: &mut Vec<(String, RefOr<Schema>)>) {}
-}
+impl ToSchema for InferParameters {}
 
 impl PartialSchema for InferParameters {
     /// Returns the schema of the parameters of `/detect` and of the protocol.

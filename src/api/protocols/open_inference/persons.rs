@@ -117,10 +117,8 @@ pub(super) async fn infer(
     if is_batch {
         headers = vec![(PERSON_COUNT, HeaderValue::from(found.scores.len()))];
     }
-    let write = move || InferAnswer::write(request.id, &found.into_outputs(), &request.wanted);
-    let mut answer = context.deadline.blocking(write).await?;
-    answer.report_headers = headers;
-    Ok(answer)
+    let write = move || InferAnswer::write(request.id, &found, &request.wanted, headers);
+    context.deadline.blocking(write).await
 }
 
 /// Detects the persons in a frame, which takes one of the `tokens` of a rate limit.
@@ -190,23 +188,20 @@ impl FrameOutputs {
         self.reports.append(&mut next.reports);
     }
 
-    fn into_outputs(self) -> Vec<Output> {
+    /// Returns the shapes and the values, in the order of [`OUTPUTS`].
+    fn tensors(&self) -> Result<[(Vec<usize>, TensorValues<'_>); 6], Problem> {
         let (persons, frames) = (self.scores.len(), self.reports.len());
-        let shapes_and_values = [
-            (vec![persons, 4], OutputValues::Floats(self.boxes)),
-            (vec![persons], OutputValues::Floats(self.scores)),
-            (vec![persons, 5], OutputValues::Floats(self.oriented_boxes)),
-            (vec![persons], OutputValues::Integers(self.views)),
-            (vec![frames], OutputValues::Integers(self.counts)),
-            (vec![frames], OutputValues::Texts(self.reports)),
-        ];
-        let named = OUTPUTS.into_iter().zip(shapes_and_values);
-        let output = |(name, (shape, values))| Output {
-            name,
-            shape,
-            values,
-        };
-        named.map(output).collect()
+        let reports = self.reports.iter().map(|report| str::from_utf8(report));
+        let reports = reports.collect::<Result<_, _>>();
+        let reports = reports.map_err(Problem::internal)?;
+        Ok([
+            (vec![persons, 4], TensorValues::Floats(&self.boxes)),
+            (vec![persons], TensorValues::Floats(&self.scores)),
+            (vec![persons, 5], TensorValues::Floats(&self.oriented_boxes)),
+            (vec![persons], TensorValues::Integers(&self.views)),
+            (vec![frames], TensorValues::Integers(&self.counts)),
+            (vec![frames], TensorValues::Texts(reports)),
+        ])
     }
 }
 
@@ -273,52 +268,27 @@ pub(super) struct InferAnswer {
     report_headers: Vec<(HeaderName, HeaderValue)>,
 }
 
-/// An output tensor.
-struct Output {
-    name: &'static str,
-    shape: Vec<usize>,
-    values: OutputValues,
-}
-
-/// The values of an output, row-major.
-enum OutputValues {
-    Floats(Vec<f32>),
-    Integers(Vec<i32>),
-    /// The elements of a `BYTES` tensor.
-    Texts(Vec<Bytes>),
-}
-
-impl OutputValues {
-    fn as_tensor(&self) -> Result<TensorValues<'_>, Problem> {
-        Ok(match self {
-            Self::Floats(values) => TensorValues::Floats(values),
-            Self::Integers(values) => TensorValues::Integers(values),
-            Self::Texts(texts) => {
-                let texts = texts.iter().map(|text| str::from_utf8(text));
-                let texts = texts.collect::<Result<_, _>>();
-                TensorValues::Texts(texts.map_err(Problem::internal)?)
-            }
-        })
-    }
-}
-
 impl InferAnswer {
     /// Writes the requested outputs; `id` is that of the request.
-    fn write(id: Option<String>, outputs: &[Output], wanted: &Wanted) -> Result<Self, Problem> {
+    fn write(
+        id: Option<String>,
+        found: &FrameOutputs,
+        wanted: &Wanted,
+        report_headers: Vec<(HeaderName, HeaderValue)>,
+    ) -> Result<Self, Problem> {
         let mut behind = Vec::new();
-        let mut written = Vec::with_capacity(outputs.len());
-        for output in outputs {
-            let Some(binary) = wanted.how(output.name) else {
+        let mut written = Vec::with_capacity(OUTPUTS.len());
+        for (name, (shape, values)) in OUTPUTS.into_iter().zip(found.tensors()?) {
+            let Some(binary) = wanted.how(name) else {
                 continue;
             };
-            let values = output.values.as_tensor()?;
             if binary {
                 behind.push(values.clone());
             }
             written.push(OutputTensor {
-                name: output.name.to_owned(),
+                name: name.to_owned(),
                 datatype: values.datatype().to_string(),
-                shape: Entries(output.shape.clone()),
+                shape: Entries(shape),
                 parameters: binary.then(|| OutputParameters {
                     binary_data_size: Some(values.byte_count()),
                 }),
@@ -334,7 +304,7 @@ impl InferAnswer {
         let message = Message::write(&response, &behind).map_err(Problem::internal)?;
         Ok(Self {
             message,
-            report_headers: Vec::new(),
+            report_headers,
         })
     }
 }

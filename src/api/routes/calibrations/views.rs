@@ -248,7 +248,7 @@ impl ViewPlanRequest {
 
     fn view(self, planned: &PlannedView, lens: &Lens) -> ViewInfo {
         let view = &planned.view;
-        let rotation = view.camera_from_view().matrix();
+        let rotation = view.camera_from_view.matrix();
         let axis = rotation.column(2);
         let principal = view.principal_point();
         let node = |node: Option<Pixel>| node.map(|at| [pixels(at.x), pixels(at.y)]);
@@ -258,8 +258,8 @@ impl ViewPlanRequest {
             azimuth_deg: axis.y.atan2(axis.x).to_degrees().rem_euclid(360.0),
             off_axis_deg: axis.x.hypot(axis.y).atan2(axis.z).to_degrees(),
             field_of_view_deg: view.field_of_view().to_degrees(),
-            size: [view.width(), view.height()],
-            focal: view.focal(),
+            size: [view.width, view.height],
+            focal: view.focal,
             principal_point: [principal.x, principal.y],
             outline: planned.outline.iter().map(|at| [at.x, at.y]).collect(),
             grid: grid.map(|nodes| nodes.into_iter().map(node).collect()),

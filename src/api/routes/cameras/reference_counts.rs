@@ -14,7 +14,7 @@ use lookdown_tracking::taught::{MAX_FRAMES, MIN_FRAMES};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::CameraBody;
+use super::{CameraBody, stored_status};
 use crate::{
     api::{
         ApiState,
@@ -142,11 +142,7 @@ pub(in crate::api) async fn put(
     }
     let count = reference_count(&state, &camera, &report, persons).await?;
     let put = move || state.references.put(&camera, count, Timestamp::now());
-    Ok(if deadline.using(&CAMERAS, put).await? {
-        StatusCode::CREATED
-    } else {
-        StatusCode::NO_CONTENT
-    })
+    deadline.using(&CAMERAS, put).await.map(stored_status)
 }
 
 /// Delete a reference count

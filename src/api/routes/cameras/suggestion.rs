@@ -7,7 +7,7 @@ use axum::{
     response::IntoResponse,
 };
 use lookdown_calibration::native::NativeCalibration;
-use lookdown_lens::self_calibration::{CameraHeight, FitRefusal, HeightRefusal};
+use lookdown_lens::self_calibration::CameraHeight;
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -35,7 +35,7 @@ pub(super) enum SuggestionState {
 }
 
 impl SuggestionState {
-    fn new(found: &Suggestion) -> Self {
+    pub(super) fn new(found: &Suggestion) -> Self {
         let is_refused = match &found.fit {
             Some(fit) => fit.is_err(),
             None => matches!(found.height, Some(Err(_))),
@@ -46,12 +46,6 @@ impl SuggestionState {
             None => Self::Waiting,
         }
     }
-}
-
-/// The state of the suggestion of a camera, if the server looks for one.
-pub(super) fn state_of(state: &ApiState, camera: &str) -> Option<SuggestionState> {
-    let found = state.suggestions.for_camera(camera)?;
-    Some(SuggestionState::new(&found))
 }
 
 /// A reason for not having a value.
@@ -138,8 +132,14 @@ pub(in crate::api) async fn get(
 impl From<Suggestion> for SuggestedCalibration {
     fn from(found: Suggestion) -> Self {
         let state = SuggestionState::new(&found);
-        let (lens, lens_refusal) = split(found.fit, |fit| FoundLens::from(&fit), Refusal::from);
-        let (height, height_refusal) = split(found.height, FoundHeight::from, Refusal::from);
+        let (lens, lens_refusal) = split(
+            found.fit,
+            |fit| FoundLens::from(&fit),
+            |refusal| Refusal::new(refusal.reason(), &refusal),
+        );
+        let (height, height_refusal) = split(found.height, FoundHeight::from, |refusal| {
+            Refusal::new(refusal.reason(), &refusal)
+        });
         Self {
             state,
             frames: found.frames,
@@ -179,19 +179,10 @@ impl From<CameraHeight> for FoundHeight {
     }
 }
 
-impl From<FitRefusal> for Refusal {
-    fn from(refusal: FitRefusal) -> Self {
+impl Refusal {
+    fn new(reason: &'static str, refusal: &impl ToString) -> Self {
         Self {
-            reason: refusal.reason(),
-            detail: refusal.to_string(),
-        }
-    }
-}
-
-impl From<HeightRefusal> for Refusal {
-    fn from(refusal: HeightRefusal) -> Self {
-        Self {
-            reason: refusal.reason(),
+            reason,
             detail: refusal.to_string(),
         }
     }

@@ -23,7 +23,7 @@ use serde_json::Value;
 use tokio::time::{timeout, timeout_at};
 use utoipa::{IntoParams, OpenApi};
 
-use super::{CameraBody, refused};
+use super::{CameraBody, refused, stored_status};
 use crate::{
     api::{
         ApiState,
@@ -176,11 +176,7 @@ pub(in crate::api) async fn put(
         live.check(&view)?;
     }
     let store = move |views: &Views| views.put(&camera, &name, view).map_err(refused);
-    Ok(if using_file(&state, deadline, store).await? {
-        StatusCode::CREATED
-    } else {
-        StatusCode::NO_CONTENT
-    })
+    using_file(&state, deadline, store).await.map(stored_status)
 }
 
 /// Delete a view
@@ -518,11 +514,9 @@ async fn using_file<T: Send + 'static>(
 }
 
 fn flag(name: &str, value: Option<&str>) -> Result<bool, ParameterError> {
-    match value {
-        None | Some("false") => Ok(false),
-        Some("true") => Ok(true),
-        Some(other) => Err(ParameterError::is_not(name, other, "true or false")),
-    }
+    let Some(value) = value else { return Ok(false) };
+    let parsed = value.parse();
+    parsed.map_err(|_| ParameterError::is_not(name, value, "true or false"))
 }
 
 fn stored(state: &ApiState, camera: &str, name: &str) -> Result<View, Problem> {

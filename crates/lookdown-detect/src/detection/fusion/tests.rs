@@ -48,10 +48,10 @@ fn a_fused_box_is_the_mean_weighted_by_cubed_score() {
     );
     assert_eq!(fused.len(), 1);
     assert_close(
-        fused[0].bbox.x_min(),
+        fused[0].bbox.corners()[0],
         (100.0 * 0.512 + 110.0 * 0.064) / 0.576,
     );
-    assert_close(fused[0].bbox.y_max(), 200.0);
+    assert_close(fused[0].bbox.corners()[3], 200.0);
     assert_close(fused[0].score, 0.8 * iou_when_shifted(10.0 * 0.064 / 0.576));
     assert_eq!(fused[0].members, [0, 1]);
 }
@@ -68,7 +68,7 @@ fn a_box_cut_off_by_its_view_votes_but_hardly_moves_the_mean() {
         ..candidate(PERSON, 0.8, 0)
     };
     let fused = fuse(&[whole, cut_off], 0.4);
-    assert_close(fused[0].bbox.x_min(), (100.0 + 110.0 * 0.1) / 1.1);
+    assert_close(fused[0].bbox.corners()[0], (100.0 + 110.0 * 0.1) / 1.1);
     let moved = 1.0 / 1.1;
     let agreement = f64::midpoint(iou_when_shifted(moved), iou_when_shifted(10.0 - moved));
     assert_close(fused[0].score, 0.8 * agreement);
@@ -197,7 +197,7 @@ fn tiny_scores_still_average_to_a_box() {
         &[candidate(PERSON, tiny, 0), candidate(SHIFTED, tiny, 1)],
         0.4,
     );
-    assert_close(fused[0].bbox.x_min(), 105.0);
+    assert_close(fused[0].bbox.corners()[0], 105.0);
 }
 
 #[test]

@@ -57,12 +57,7 @@ impl Decoder for BoxesScoresHead {
         Ok(vec![boxes, scores])
     }
 
-    fn decode(
-        &self,
-        tensors: &[&TensorView<'_>],
-        _batch: &Batch,
-        collector: &mut CandidateCollector,
-    ) {
+    fn decode(&self, tensors: &[&TensorView<'_>], collector: &mut CandidateCollector) {
         let (boxes, scores) = (tensors[0], tensors[1]);
         for (view, (boxes, scores)) in boxes.views().zip(scores.views()).enumerate() {
             for (corners, &raw) in boxes.chunks_exact(4).zip(scores) {

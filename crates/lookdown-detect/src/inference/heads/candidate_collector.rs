@@ -1,14 +1,17 @@
 //! Collection of the persons of a batch, candidate by candidate.
 
-use super::score::{Floor, Score};
+use super::{
+    score::{Floor, Score},
+    shape::Batch,
+};
 use crate::{
     detection::{BBox, BBoxError, ViewPixels},
     inference::{HeadOutput, ViewDetection},
 };
-use lookdown_imaging::NetworkInput;
 
 /// Collects persons and counts the dropped candidates.
 pub(super) struct CandidateCollector {
+    pub(super) batch: Batch,
     /// Least score of a person.
     pub(super) floor: Floor,
     /// The whole view. `None` for inputs too large to have boxes.
@@ -18,13 +21,14 @@ pub(super) struct CandidateCollector {
 }
 
 impl CandidateCollector {
-    pub(super) fn new(views: usize, input: &NetworkInput, floor: f64) -> Self {
-        let [width, height] = [input.width, input.height].map(f64::from);
+    pub(super) fn new(batch: Batch, floor: f64) -> Self {
+        let [width, height] = [batch.width, batch.height].map(f64::from);
         Self {
+            batch,
             floor: Floor::new(floor),
             bounds: BBox::new([0.0, 0.0, width, height]).ok(),
             output: HeadOutput {
-                per_view: vec![Vec::new(); views],
+                per_view: vec![Vec::new(); batch.views.unwrap_or(0)],
                 non_finite: 0,
             },
             not_a_probability: None,

@@ -15,10 +15,5 @@ pub(super) trait Decoder {
     fn select<'o>(&self, outputs: &'o [Output<'o>], batch: &Batch) -> Selected<'o>;
 
     /// Passes every candidate of the selected outputs to `collector`.
-    fn decode(
-        &self,
-        tensors: &[&TensorView<'_>],
-        batch: &Batch,
-        collector: &mut CandidateCollector,
-    );
+    fn decode(&self, tensors: &[&TensorView<'_>], collector: &mut CandidateCollector);
 }

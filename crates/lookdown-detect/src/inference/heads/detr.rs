@@ -58,15 +58,11 @@ impl Decoder for DetrHead {
         Ok(vec![boxes, scores])
     }
 
-    fn decode(
-        &self,
-        tensors: &[&TensorView<'_>],
-        batch: &Batch,
-        collector: &mut CandidateCollector,
-    ) {
+    fn decode(&self, tensors: &[&TensorView<'_>], collector: &mut CandidateCollector) {
         let (boxes, scores) = (tensors[0], tensors[1]);
         let person = usize::from(self.person_class);
-        let [view_width, view_height] = [batch.width, batch.height].map(f64::from);
+        let [view_width, view_height] =
+            [collector.batch.width, collector.batch.height].map(f64::from);
         for (view, (boxes, all_scores)) in boxes.views().zip(scores.views()).enumerate() {
             let queries = boxes
                 .chunks_exact(4)

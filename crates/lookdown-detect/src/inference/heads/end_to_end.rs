@@ -70,7 +70,6 @@ impl EndToEndHead {
         row: &[f32],
         indices: &Indices,
         view: usize,
-        batch: &Batch,
         collector: &mut CandidateCollector,
     ) {
         let class = row[indices.class];
@@ -82,7 +81,7 @@ impl EndToEndHead {
         }
         let [width, height] = match self.unit {
             EndToEndUnit::Pixels => [1.0; 2],
-            EndToEndUnit::Share => [batch.width, batch.height].map(f64::from),
+            EndToEndUnit::Share => [collector.batch.width, collector.batch.height].map(f64::from),
         };
         let score = Activation::None.score(row[indices.score], collector.floor);
         collector.offer(view, score, || {
@@ -123,12 +122,7 @@ impl Decoder for EndToEndHead {
         Ok(vec![rows])
     }
 
-    fn decode(
-        &self,
-        tensors: &[&TensorView<'_>],
-        batch: &Batch,
-        collector: &mut CandidateCollector,
-    ) {
+    fn decode(&self, tensors: &[&TensorView<'_>], collector: &mut CandidateCollector) {
         let rows = tensors[0];
         let columns = rows.shape[rows.shape.len() - 1];
         let Some(Ok(indices)) = self.columns(Some(columns)).map(Indices::new) else {
@@ -137,7 +131,7 @@ impl Decoder for EndToEndHead {
         let Some(index) = indices.view else {
             for (view, values) in rows.views().enumerate() {
                 for row in values.chunks_exact(columns) {
-                    self.offer(row, &indices, view, batch, collector);
+                    self.offer(row, &indices, view, collector);
                 }
             }
             return;
@@ -145,8 +139,8 @@ impl Decoder for EndToEndHead {
         for row in rows.values.chunks_exact(columns) {
             if !row[index].is_finite() {
                 collector.count_non_finite();
-            } else if let Some(view) = view_number(row[index], batch.views.unwrap_or(0)) {
-                self.offer(row, &indices, view, batch, collector);
+            } else if let Some(view) = view_number(row[index], collector.batch.views.unwrap_or(0)) {
+                self.offer(row, &indices, view, collector);
             }
         }
     }

@@ -118,19 +118,15 @@ impl Decoder for NanodetHead {
         Ok(vec![candidates])
     }
 
-    fn decode(
-        &self,
-        tensors: &[&TensorView<'_>],
-        batch: &Batch,
-        collector: &mut CandidateCollector,
-    ) {
+    fn decode(&self, tensors: &[&TensorView<'_>], collector: &mut CandidateCollector) {
+        let batch = collector.batch;
         let candidates = tensors[0];
         let columns = candidates.shape[2];
         let classes = columns - 4 * self.bins();
         let person = usize::from(self.person_class);
         for (view, values) in candidates.views().enumerate() {
             let rows = values.chunks_exact(columns);
-            for (values, (grid, cell)) in rows.zip(pyramid(&self.strides, batch)) {
+            for (values, (grid, cell)) in rows.zip(pyramid(&self.strides, &batch)) {
                 let score = self.score_activation.score(values[person], collector.floor);
                 collector.offer(view, score, || self.corners(&values[classes..], grid, cell));
             }

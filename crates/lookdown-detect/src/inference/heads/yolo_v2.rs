@@ -53,14 +53,9 @@ impl Decoder for YoloV2Head {
         Ok(vec![map])
     }
 
-    fn decode(
-        &self,
-        tensors: &[&TensorView<'_>],
-        batch: &Batch,
-        collector: &mut CandidateCollector,
-    ) {
+    fn decode(&self, tensors: &[&TensorView<'_>], collector: &mut CandidateCollector) {
         let map = tensors[0];
-        let grid = Grid::from_map(map, batch);
+        let grid = Grid::from_map(map, &collector.batch);
         let channels = map.shape[1] / self.anchors.len();
         let person = usize::from(self.person_class);
         let floor = collector.floor;

@@ -73,12 +73,7 @@ impl Decoder for YoloV8Head {
         Ok(vec![candidates])
     }
 
-    fn decode(
-        &self,
-        tensors: &[&TensorView<'_>],
-        _batch: &Batch,
-        collector: &mut CandidateCollector,
-    ) {
+    fn decode(&self, tensors: &[&TensorView<'_>], collector: &mut CandidateCollector) {
         let candidates = tensors[0];
         let (cells, per_channel, per_cell) = match self.layout {
             YoloV8Layout::ChannelsFirst => (candidates.shape[2], candidates.shape[2], 1),

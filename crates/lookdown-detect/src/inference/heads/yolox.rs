@@ -70,18 +70,14 @@ impl Decoder for YoloxHead {
         Ok(vec![candidates])
     }
 
-    fn decode(
-        &self,
-        tensors: &[&TensorView<'_>],
-        batch: &Batch,
-        collector: &mut CandidateCollector,
-    ) {
+    fn decode(&self, tensors: &[&TensorView<'_>], collector: &mut CandidateCollector) {
+        let batch = collector.batch;
         let candidates = tensors[0];
         let person = 5 + usize::from(self.person_class);
         let floor = collector.floor;
         for (view, values) in candidates.views().enumerate() {
             let rows = values.chunks_exact(candidates.shape[2]);
-            for (values, (grid, cell)) in rows.zip(pyramid(&self.strides, batch)) {
+            for (values, (grid, cell)) in rows.zip(pyramid(&self.strides, &batch)) {
                 let score = self
                     .score_activation
                     .score(values[4], floor)

@@ -23,12 +23,7 @@ pub(super) struct Question<'a> {
     pub(super) as_bytes: bool,
 }
 
-/// The outputs with readable numbers: those of type `FP32`.
-#[derive(Debug, PartialEq)]
-pub(super) struct Answer {
-    pub(super) outputs: Vec<Output>,
-}
-
+/// An output with readable numbers: of type `FP32`.
 #[derive(Debug, PartialEq)]
 pub(super) struct Output {
     pub(super) name: String,
@@ -65,12 +60,12 @@ impl Question<'_> {
     }
 }
 
-impl Answer {
-    /// Parses a response.
+impl Output {
+    /// Returns the outputs of a response with readable numbers.
     ///
     /// # Errors
     /// Description of the error.
-    pub(super) fn read(message: &Message) -> Result<Self, String> {
+    pub(super) fn all(message: &Message) -> Result<Vec<Self>, String> {
         let (json, mut behind) = message
             .split()
             .ok_or("its response is shorter than its declared length")?;
@@ -96,13 +91,13 @@ impl Answer {
             let count = element_count(output.shape.0.iter().copied());
             let count = count.ok_or("its response contains an impossible shape")?;
             let values = data.and_then(|data| data.floats(count)).map_err(wrong)?;
-            outputs.push(Output {
+            outputs.push(Self {
                 name,
                 shape: output.shape.0,
                 values,
             });
         }
-        Ok(Self { outputs })
+        Ok(outputs)
     }
 }
 
@@ -133,8 +128,8 @@ mod tests {
         (message.body, message.head_length)
     }
 
-    fn read(body: Vec<u8>, head_length: usize) -> Result<Answer, String> {
-        Answer::read(&Message {
+    fn read(body: Vec<u8>, head_length: usize) -> Result<Vec<Output>, String> {
+        Output::all(&Message {
             body: body.into(),
             head_length: Some(head_length),
         })
@@ -179,17 +174,13 @@ mod tests {
         let numbers = [f32::NAN.to_le_bytes(), 2.0_f32.to_le_bytes()].concat();
         let body = [head.as_bytes(), &[9; 8], &numbers].concat();
         let answer = read(body, head.len()).unwrap();
-        let names: Vec<_> = answer
-            .outputs
-            .iter()
-            .map(|output| output.name.as_str())
-            .collect();
+        let names: Vec<_> = answer.iter().map(|output| output.name.as_str()).collect();
         assert_eq!(names, ["boxes", "scores"]);
         assert!(
-            answer.outputs[0].values[0].is_nan(),
+            answer[0].values[0].is_nan(),
             "NaN is passed on to the heads"
         );
-        assert_eq!(answer.outputs[1].values, [0.5, 1.0]);
+        assert_eq!(answer[1].values, [0.5, 1.0]);
     }
 
     #[test]

@@ -14,11 +14,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-use parking_lot::{Mutex, MutexGuard};
+use parking_lot::Mutex;
 
 use super::{
     connection::{Connection, Reply},
-    exchange::{Answer, Question},
+    exchange::{Output, Question},
     options::RemoteOptions,
 };
 use crate::{
@@ -122,7 +122,7 @@ impl RemoteServer {
         &self,
         model: &str,
         question: &Question<'_>,
-    ) -> Result<Answer, InferenceError> {
+    ) -> Result<Vec<Output>, InferenceError> {
         if self.breaker.is_open() {
             self.count("not_sent");
             return Err(self.unavailable(
@@ -140,7 +140,7 @@ impl RemoteServer {
         self.in_flight.fetch_sub(1, Ordering::Relaxed);
         let wait = |reply: &Reply| reply.retry_after.unwrap_or(RETRY_AFTER);
         let answer = reply.and_then(|reply| match reply.status {
-            200 => Answer::read(&reply.into_message()).map(Ok),
+            200 => Output::all(&reply.into_message()).map(Ok),
             429 => Ok(Err(wait(&reply))),
             503 if self.ready().is_ok() => Ok(Err(wait(&reply))),
             _ => Err(refusal(&reply)),
@@ -251,17 +251,17 @@ struct State {
 
 impl Breaker {
     fn is_open(&self) -> bool {
-        self.state().is_open
+        self.0.lock().is_open
     }
 
     /// Records a response.
     fn succeeded(&self) {
-        self.state().failures = 0;
+        self.0.lock().failures = 0;
     }
 
     /// Records a failure. Returns true if that opens the breaker.
     fn failed(&self) -> bool {
-        let mut state = self.state();
+        let mut state = self.0.lock();
         state.failures = state.failures.saturating_add(1);
         let opens = !state.is_open && state.failures >= FAILURES;
         state.is_open |= opens;
@@ -270,18 +270,13 @@ impl Breaker {
 
     /// Records that the server is ready. Returns true if that closes the breaker.
     fn close(&self) -> bool {
-        let mut state = self.state();
+        let mut state = self.0.lock();
         let closes = state.is_open;
         if closes {
             state.is_open = false;
             state.failures = FAILURES - 1;
         }
         closes
-    }
-
-    fn state(&self) -> MutexGuard<'_, State> {
-        // The state contains only numbers, so a panic cannot leave it inconsistent.
-        self.0.lock()
     }
 }
 

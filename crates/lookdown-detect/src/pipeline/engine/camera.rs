@@ -59,13 +59,6 @@ pub(super) struct FrameCamera {
 }
 
 impl Engine {
-    /// Turns the views of all plans about the plan's axis, radians. A person is then seen in other
-    /// views, so that several turns tell how much of a precision is chance.
-    pub fn with_plan_turn(mut self, angle: f64) -> Self {
-        self.plan_turn = angle;
-        self
-    }
-
     pub(super) fn camera(
         &self,
         job: &DetectJob,

@@ -24,7 +24,6 @@ impl Engine {
             parameters.motion,
         );
         let at = parameters.captured_at.unwrap_or(job.received_at);
-        let frame = Arc::clone(&observation.network_frame);
         let follow = self
             .follow_cache
             .compare(camera, origin, &observation.frame, at);
@@ -44,6 +43,7 @@ impl Engine {
         }
         let model = self.crop_model(parameters, &observation.model);
         let side = model.input.width.min(model.input.height);
+        let frame = &observation.network_frame;
         let (width, height) = (frame.width(), frame.height());
         let fill = observation.tuning.crop_fill;
         let tiles = |per_side: u32| {
@@ -61,11 +61,7 @@ impl Engine {
         if crops.view_count() == 0 {
             return FirstPass::Nothing;
         }
-        job.ticket.timeline.enter(Stage::Queue, Instant::now());
-        let ticket = job.ticket.clone();
-        let task = self
-            .inference
-            .queue_pass(Arc::new(crops), model, frame, ticket, None);
+        let task = self.queue_pass(job, observation, Arc::new(crops), model, None);
         FirstPass::Crops(task)
     }
 

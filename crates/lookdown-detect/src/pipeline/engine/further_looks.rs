@@ -35,8 +35,8 @@ impl Engine {
         Ok(())
     }
 
-    /// Queues a later pass over a frame.
-    pub(super) fn queue_later(
+    /// Queues a pass over a frame. Views without motion according to `cached_views` skip the network.
+    pub(super) fn queue_pass(
         &self,
         job: &DetectJob,
         observation: &Observation,
@@ -67,7 +67,7 @@ impl Engine {
         let rig = Arc::new(rig);
         let camera = job.parameters.motion_camera();
         let cached = camera.and_then(|camera| self.motion_cache.crop_views(camera, &rig, &model));
-        Some(self.queue_later(job, observation, rig, model, cached))
+        Some(self.queue_pass(job, observation, rig, model, cached))
     }
 
     /// Plans upright crops for the profile's model of crops, or for the model that the request
@@ -125,7 +125,7 @@ impl Engine {
         let model = Arc::clone(&observation.model);
         let camera = job.parameters.motion_camera();
         let cached = camera.and_then(|camera| self.motion_cache.detail_views(camera, &rig, &model));
-        Some(self.queue_later(job, observation, rig, model, cached))
+        Some(self.queue_pass(job, observation, rig, model, cached))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::{ops::Range, sync::Arc, time::Instant};
 
-use parking_lot::{Condvar, Mutex, MutexGuard};
+use parking_lot::{Condvar, Mutex};
 
 use super::BatchCost;
 use crate::{
@@ -22,6 +22,7 @@ pub(in crate::pipeline) struct PassTask {
     /// The tracing span to which the log lines of the work belong.
     pub(super) request: tracing::Span,
     pub(super) queued: Instant,
+    // The queue counts the views, so no update can panic half-way.
     progress: Mutex<Progress>,
     over: Condvar,
 }
@@ -73,7 +74,7 @@ impl PassTask {
 
     /// Waits until every view is processed or the pass fails. Blocks.
     pub(in crate::pipeline) fn wait(&self) -> Result<PassOutput, PipelineError> {
-        let mut progress = self.lock();
+        let mut progress = self.progress.lock();
         self.over
             .wait_while(&mut progress, |progress| !progress.is_over());
         if let Some(failure) = progress.failure.take() {
@@ -90,12 +91,12 @@ impl PassTask {
     /// Returns true when the remaining views are not needed: the pass failed, or its client has
     /// disconnected.
     pub(super) fn is_pointless(&self) -> bool {
-        self.ticket.withdrawn.is_cancelled() || self.lock().failed
+        self.ticket.withdrawn.is_cancelled() || self.progress.lock().failed
     }
 
     /// Ends the pass with an error. Detections in views still being processed are discarded.
     pub(super) fn fail(&self, error: PipelineError) {
-        let mut progress = self.lock();
+        let mut progress = self.progress.lock();
         if !progress.failed {
             progress.failed = true;
             progress.failure = Some(error);
@@ -112,7 +113,7 @@ impl PassTask {
         cost: BatchCost,
     ) {
         self.ticket.timeline.progress(cost.ended);
-        let mut progress = self.lock();
+        let mut progress = self.progress.lock();
         progress.missing -= views.len();
         for (slot, found) in progress.per_view[views].iter_mut().zip(found) {
             *slot = found;
@@ -123,11 +124,6 @@ impl PassTask {
         if over {
             self.over.notify_all();
         }
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Progress> {
-        // The queue counts the views, so no update can panic half-way.
-        self.progress.lock()
     }
 }
 

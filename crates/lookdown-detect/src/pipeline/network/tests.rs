@@ -159,7 +159,13 @@ fn an_urgent_frame_overtakes_one_that_has_not_begun() {
     let before = bench.submit(1, Ticket::default());
     bench.next_run();
     let usual = bench.submit(10, Ticket::default());
-    let urgent = bench.submit(20, Ticket::new(Priority::High));
+    let urgent = bench.submit(
+        20,
+        Ticket {
+            priority: Priority::High,
+            ..Ticket::default()
+        },
+    );
     bench.let_go(3);
     assert_eq!(bench.next_run(), (4, 20.0));
     assert_eq!(bench.next_run(), (4, 10.0));

@@ -3,7 +3,7 @@
 
 use std::{collections::BTreeMap, sync::Arc, time::Instant};
 
-use parking_lot::{Condvar, Mutex, MutexGuard};
+use parking_lot::{Condvar, Mutex};
 
 use super::{BatchOptions, Claim, PassTask};
 use crate::{
@@ -17,6 +17,7 @@ use crate::{
 /// The queue of views for inference, bounded by the number of frames in progress.
 pub(super) struct ViewQueue {
     options: BatchOptions,
+    // No update can panic half-way.
     state: Mutex<State>,
     changed: Condvar,
 }
@@ -57,7 +58,7 @@ impl ViewQueue {
         if task.rig.view_count() == 0 {
             return;
         }
-        let mut state = self.lock();
+        let mut state = self.state.lock();
         let ticket = &task.ticket;
         let cost = task.rig.view_count();
         let turn = state.turns.next(ticket.priority, &ticket.client, cost);
@@ -69,14 +70,14 @@ impl ViewQueue {
 
     /// Closes the queue for new tasks. Views already queued are still dispatched.
     pub(super) fn close(&self) {
-        self.lock().closed = true;
+        self.state.lock().closed = true;
         self.changed.notify_all();
     }
 
     /// Waits for the views of the next run, in queue order and all for one model. Returns `None`
     /// when the queue is closed and empty.
     pub(super) fn next_batch(&self) -> Option<Vec<Claim>> {
-        let mut state = self.lock();
+        let mut state = self.state.lock();
         loop {
             state.drop_pointless();
             let Some(first) = state.waiting.values().next() else {
@@ -95,11 +96,6 @@ impl ViewQueue {
             }
             self.changed.wait_for(&mut state, to_wait);
         }
-    }
-
-    fn lock(&self) -> MutexGuard<'_, State> {
-        // No update can panic half-way.
-        self.state.lock()
     }
 }
 

@@ -6,6 +6,12 @@ use std::{
 use super::*;
 use crate::pipeline::test_support::{BlobDetector, engine, frame_with_disc, job};
 
+impl WorkerPool {
+    async fn detect(&self, job: DetectJob) -> Result<DetectedFrame, PipelineError> {
+        self.detect_and(job, |detected| detected).await
+    }
+}
+
 /// A detector that reports the start of each batch and then waits for release.
 fn gated_pool(capacity: usize) -> (Arc<WorkerPool>, Receiver<()>, SyncSender<()>) {
     let (begun, begins) = sync_channel(64);

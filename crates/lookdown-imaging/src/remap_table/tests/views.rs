@@ -110,7 +110,7 @@ fn every_pixel_of_a_whole_patch_shows_the_lens_image() {
         let last = f64::from(FRAME_SIDE - 1);
         let mut whole = 0;
         for (table, band) in tables.iter().flat_map(|table| {
-            (0..table.grid.visibility().bands()).map(move |band| (table, table.band(band)))
+            (0..table.grid.visibility.bands()).map(move |band| (table, table.band(band)))
         }) {
             for (x, y) in band.whole_patches.flat_map(|patch| {
                 let rows = band.rows.clone();
@@ -126,7 +126,7 @@ fn every_pixel_of_a_whole_patch_shows_the_lens_image() {
                 );
             }
         }
-        let pixels: u32 = views.iter().map(|view| view.width() * view.height()).sum();
+        let pixels: u32 = views.iter().map(|view| view.width * view.height).sum();
         let share = f64::from(whole) / f64::from(pixels);
         assert!(share > 0.5, "{}: {share}", lens.model());
     }

@@ -62,10 +62,10 @@ impl FittedCurve<Polynomial> {
         let reach = 4.0 * PI / polynomial.slope(0.0);
         let whole = Self::angle_up_to(reach, polynomial).table;
         // Beyond PI there is nothing more to see.
-        let end = if whole.value(whole.end()) > PI {
+        let end = if whole.value(whole.end) > PI {
             whole.invert(PI)
         } else {
-            whole.end()
+            whole.end
         };
         Self {
             table: whole.limited_to(end),
@@ -76,7 +76,7 @@ impl FittedCurve<Polynomial> {
 
 impl<F: Rising> Curve for FittedCurve<F> {
     fn limit(&self) -> f64 {
-        let end = self.table.end();
+        let end = self.table.end;
         let end = if self.gives_angle {
             self.table.value(end)
         } else {

@@ -21,7 +21,7 @@ const SLOPE_SAMPLES: usize = 20_000;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Tabulated<F> {
     function: F,
-    end: f64,
+    pub(super) end: f64,
     places: Vec<f64>,
     steps_per_value: f64,
 }
@@ -53,10 +53,6 @@ impl<F: Rising> Tabulated<F> {
     /// The same function with an earlier end.
     pub(super) fn limited_to(self, end: f64) -> Self {
         Self::new(self.function, end)
-    }
-
-    pub(super) fn end(&self) -> f64 {
-        self.end
     }
 
     pub(super) fn value(&self, x: f64) -> f64 {

@@ -63,7 +63,7 @@ fn a_wall_camera_keeps_the_plan_on_its_optical_axis() {
     let axis = view.ray_in_camera(&Pixel::new(150.0, 150.0));
     assert!((axis - Ray::z()).norm() < 1e-12);
     // Image up of the frame is up in the world, so it is up in the view, whatever the azimuth.
-    let up = view.camera_from_view() * Vector3::new(0.0, -1.0, 0.0);
+    let up = view.camera_from_view * Vector3::new(0.0, -1.0, 0.0);
     assert!((up - mount.world_up()).norm() < 1e-12);
 }
 

@@ -14,16 +14,16 @@ macro_rules! problems {
     )+) => {
         /// A kind of problem.
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-        pub(in crate::api) enum ProblemKind {
+        pub enum Kind {
             $($(#[doc = $description])+ $kind,)+
         }
 
-        impl ProblemKind {
+        impl Kind {
             /// Every kind, in the order of the table.
-            pub(in crate::api) const ALL: &[Self] = &[$(Self::$kind),+];
+            pub const ALL: &[Self] = &[$(Self::$kind),+];
 
             /// The entry of the table.
-            fn entry(self) -> Entry {
+            pub fn entry(self) -> Entry {
                 match self {
                     $(Self::$kind => Entry {
                         name: $name,
@@ -40,13 +40,13 @@ macro_rules! problems {
 }
 
 /// One row of the table.
-struct Entry {
-    name: &'static str,
-    status: StatusCode,
-    title: &'static str,
-    description: &'static str,
-    remedy: &'static str,
-    retry_after_seconds: Option<u64>,
+pub struct Entry {
+    pub name: &'static str,
+    pub status: StatusCode,
+    pub title: &'static str,
+    pub description: &'static str,
+    pub remedy: &'static str,
+    pub retry_after_seconds: Option<u64>,
 }
 
 problems! {
@@ -171,47 +171,22 @@ problems! {
         => "Use a faster profile, send fewer frames at a time, or raise `timeout_millis`.";
 }
 
-impl ProblemKind {
+impl Kind {
     /// Returns the kind of this name.
-    pub(in crate::api) fn from_name(name: &str) -> Option<Self> {
+    pub fn from_name(name: &str) -> Option<Self> {
         let mut kinds = Self::ALL.iter().copied();
         kinds.find(|kind| kind.name() == name)
     }
 
     /// The stable name: the end of the path, and the label of metrics.
-    pub(in crate::api) fn name(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         self.entry().name
     }
 
     /// The path of the documentation, which identifies the kind to programs: `type` of a problem
     /// document.
-    pub(in crate::api) fn path(self) -> String {
+    pub fn path(self) -> String {
         format!("/problems/{}", self.name())
-    }
-
-    /// The HTTP status.
-    pub(in crate::api) fn status(self) -> StatusCode {
-        self.entry().status
-    }
-
-    /// The usual phrase for the kind.
-    pub(in crate::api) fn title(self) -> &'static str {
-        self.entry().title
-    }
-
-    /// The cause, as one sentence.
-    pub(in crate::api) fn description(self) -> &'static str {
-        self.entry().description
-    }
-
-    /// The remedy, as one sentence.
-    pub(in crate::api) fn remedy(self) -> &'static str {
-        self.entry().remedy
-    }
-
-    /// The least `Retry-After`, seconds; `None` where a retry does not help.
-    pub(in crate::api) fn retry_after_seconds(self) -> Option<u64> {
-        self.entry().retry_after_seconds
     }
 }
 
@@ -223,36 +198,25 @@ mod tests {
 
     #[test]
     fn names_are_unique_and_fit_into_a_path() {
-        let names: BTreeSet<_> = ProblemKind::ALL.iter().map(|kind| kind.name()).collect();
-        assert_eq!(names.len(), ProblemKind::ALL.len());
+        let names: BTreeSet<_> = Kind::ALL.iter().map(|kind| kind.name()).collect();
+        assert_eq!(names.len(), Kind::ALL.len());
         for name in names {
             let fits = |c: char| c.is_ascii_lowercase() || c == '-';
             assert!(name.chars().all(fits), "{name}");
-            let found = ProblemKind::from_name(name).unwrap();
+            let found = Kind::from_name(name).unwrap();
             assert_eq!(found.path(), format!("/problems/{name}"));
         }
     }
 
     #[test]
-    fn shared_kinds_are_those_of_the_table() {
-        for shared in lookdown_http::problem::Kind::ALL {
-            let kind = ProblemKind::from_name(shared.name()).unwrap();
-            assert_eq!(
-                (kind.status(), kind.title()),
-                (shared.status(), shared.title())
-            );
-        }
-    }
-
-    #[test]
     fn every_kind_has_an_error_status_and_full_sentences() {
-        for kind in ProblemKind::ALL {
-            let status = kind.status();
+        for kind in Kind::ALL {
+            let status = kind.entry().status;
             assert!(
                 status.is_client_error() || status.is_server_error(),
                 "{kind:?}"
             );
-            for sentence in [kind.description(), kind.remedy()] {
+            for sentence in [kind.entry().description, kind.entry().remedy] {
                 assert!(sentence.ends_with('.'), "{sentence}");
                 // Cells of a table and HTML text need no escapes.
                 assert!(!sentence.contains(['|', '<', '>', '&']), "{sentence}");

@@ -1,4 +1,4 @@
-//! The names of zones and lines.
+//! The names of zones, lines and sites.
 
 use lookdown_common::plain_name::{MAX_CHARS, is_plain};
 
