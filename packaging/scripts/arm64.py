@@ -25,12 +25,11 @@ PROGRAM = ROOT / "target" / TARGET / "release" / "lookdown"
 RUSTC = Path("/usr/bin/rustc")
 """Of the package rustc-web; rustup's compiler cannot use Debian's library."""
 PACKAGES = ("rustc-web", "gcc-aarch64-linux-gnu", "libc6-dev-arm64-cross", "libstdc++6-arm64-cross", "qemu-user-static")
-VARIABLES = ("ORT_DISABLE_TELEMETRY=1", "MALLOC_MMAP_THRESHOLD_=131072")
-"""Those of src/main.rs: the program would replace itself to set them, which the kernel cannot do with an emulated one."""
-EMULATOR = ("qemu-aarch64-static", "-E", ",".join(VARIABLES), "-L", "/usr/aarch64-linux-gnu")
+VARIABLES = "ORT_DISABLE_TELEMETRY=1,MALLOC_MMAP_THRESHOLD_=131072"
+EMULATOR = ("qemu-aarch64-static", "-E", VARIABLES, "-L", "/usr/aarch64-linux-gnu")
+"""With the variables of src/main.rs: an emulated program cannot replace itself to set them."""
 HIDE_CPU = ("unshare", "--mount", "sh", "-c", 'mount -t tmpfs none /sys && exec "$@"', "sh")
-"""Runs a command without /sys: in the emulator, ONNX Runtime ends with a segmentation fault while it reads there
-about the caches of the x86-64 processor. Needs root."""
+"""Runs a command without /sys: ONNX Runtime would crash while it reads there about the caches of x86-64. Needs root."""
 RECORD = ROOT / "tests" / "fixtures" / "sample_persons.json"
 LIBRARIES = ("lookdown-lens", "lookdown-calibration", "lookdown-imaging", "lookdown-detect", "lookdown-eval")
 
