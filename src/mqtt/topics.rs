@@ -69,7 +69,8 @@ impl Topics {
         ["+/detection", "+/detection/set"].map(|rest| format!("{}/cameras/{rest}", self.prefix))
     }
 
-    /// Recognizes a topic of a camera's switch: returns the level of its name, and true for commands.
+    /// Recognizes a topic of a camera's switch: returns the level of its name, and true for
+    /// commands.
     pub(super) fn switch_topic<'a>(&self, topic: &'a str) -> Option<(&'a str, bool)> {
         let (camera, rest) = self.below_cameras(topic)?;
         match rest {
@@ -93,8 +94,8 @@ impl Topics {
             .map(|rest| format!("{}/cameras/{rest}", self.prefix))
     }
 
-    /// Recognizes `persons`, `availability`, and `zones/` or `views/` with the level of a name: returns
-    /// the level of the camera, and the rest of the topic.
+    /// Recognizes `persons`, `availability`, and `zones/` or `views/` with the level of a name:
+    /// returns the level of the camera, and the rest of the topic.
     pub(super) fn camera_topic<'a>(&self, topic: &'a str) -> Option<(&'a str, &'a str)> {
         let (camera, rest) = self.below_cameras(topic)?;
         let is_known = ["persons", "availability"].contains(&rest) || is_part(rest);
@@ -102,8 +103,8 @@ impl Topics {
     }
 
     /// A topic of a camera: `frame_persons` of its latest frame, `persons` that it sees now,
-    /// `occupancy`, `availability`, `attributes` of its entities, its latest `image`, `detection` for
-    /// the state of its switch, or `report`.
+    /// `occupancy`, `availability`, `attributes` of its entities, its latest `image`, `detection`
+    /// for the state of its switch, or `report`.
     pub(super) fn of_camera(&self, camera: &str, topic: &str) -> String {
         format!("{}/cameras/{}/{topic}", self.prefix, level(camera))
     }

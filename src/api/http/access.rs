@@ -35,9 +35,10 @@ impl Access {
         self.holder_of(only_key(presented(headers)).ok()?)
     }
 
-    /// Checks that the keys allow `wanted` to the request with these headers, whose only key is that
-    /// of `holder`. Its key may also be `elsewhere`, as in a form. Returns the holder of its key, if
-    /// there are keys. Without keys, only a server that no other machine can reach allows changes.
+    /// Checks that the keys allow `wanted` to the request with these headers, whose only key is
+    /// that of `holder`. Its key may also be `elsewhere`, as in a form. Returns the holder of its
+    /// key, if there are keys. Without keys, only a server that no other machine can reach allows
+    /// changes.
     pub(in crate::api) fn check(
         &self,
         headers: &HeaderMap,

@@ -92,10 +92,10 @@ impl Keys {
     }
 
     /// The keys of forget.lua, in its order. `earlier` is a sorted set of the reports that are not
-    /// their camera's latest: `ID:SIZE:CAMERA`. `cameras` is a sorted set of the cameras by the ID of
-    /// their latest report. `totals` is a hash of the newest ID (`last`) and the total size of all
-    /// reports (`bytes`). `images` is a sorted set of the cameras that have an image, by the ID of
-    /// its report.
+    /// their camera's latest: `ID:SIZE:CAMERA`. `cameras` is a sorted set of the cameras by the ID
+    /// of their latest report. `totals` is a hash of the newest ID (`last`) and the total size of
+    /// all reports (`bytes`). `images` is a sorted set of the cameras that have an image, by the ID
+    /// of its report.
     pub(super) fn index(&self) -> [String; 5] {
         ["earlier", "cameras", "latest", "totals", "images"].map(|name| self.key(name))
     }
@@ -129,8 +129,8 @@ impl Keys {
         }
     }
 
-    /// The key of this name. `senders` is a sorted set of the servers by the number of the last report
-    /// that each sent; see [`Self::index`] for the others.
+    /// The key of this name. `senders` is a sorted set of the servers by the number of the last
+    /// report that each sent; see [`Self::index`] for the others.
     pub(super) fn key(&self, name: &str) -> String {
         format!("{}:{name}", self.tag)
     }

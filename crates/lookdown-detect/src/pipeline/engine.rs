@@ -104,8 +104,8 @@ pub struct Engine {
     rigs: RigCache,
     motion_cache: MotionCache,
     follow_cache: FollowCache,
-    /// The turn of all view plans about their axis, radians. A person is then seen in other views, so
-    /// that several turns tell how much of a precision is chance.
+    /// The turn of all view plans about their axis, radians. A person is then seen in other views,
+    /// so that several turns tell how much of a precision is chance.
     pub plan_turn: f64,
     /// The options.
     pub options: EngineOptions,

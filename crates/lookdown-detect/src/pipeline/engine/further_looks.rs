@@ -35,7 +35,8 @@ impl Engine {
         Ok(())
     }
 
-    /// Queues a pass over a frame. Views without motion according to `cached_views` skip the network.
+    /// Queues a pass over a frame. Views without motion according to `cached_views` skip the
+    /// network.
     pub(super) fn queue_pass(
         &self,
         job: &DetectJob,
