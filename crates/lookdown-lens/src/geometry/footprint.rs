@@ -7,6 +7,7 @@ use nalgebra::Vector2;
 use super::{
     FrameCrop, Lens, Mount, Pixel, Ray, VirtualView,
     height_ratio::Extremities,
+    hull::{hull, middle},
     pixels::{PixelConvention, cross_half_pixel},
 };
 
@@ -112,8 +113,8 @@ impl Footprint {
     /// the outline is the inscribed ellipse, which touches all four sides. `None` when the middle
     /// of the box lies beyond the lens image.
     pub fn from_crop_box(crop_box: [f64; 4], crop: &FrameCrop, lens: &Lens) -> Option<Self> {
-        let [x_min, y_min, x_max, y_max] = crop.frame_box(crop_box);
-        let center = Pixel::new(f64::midpoint(x_min, x_max), f64::midpoint(y_min, y_max));
+        let frame_box @ [x_min, y_min, x_max, y_max] = crop.frame_box(crop_box);
+        let center = middle(frame_box);
         let half = Vector2::new(x_max - x_min, y_max - y_min) / 2.0;
         let ray = |point: &Pixel| {
             let pixel = cross_half_pixel(*point, PixelConvention::PixelCenter);
@@ -143,16 +144,8 @@ impl Footprint {
     /// The axis-parallel hull `[x_min, y_min, x_max, y_max]`, corner-origin frame pixels.
     pub fn bounds(&self) -> [f64; 4] {
         let first = self.outline[0];
-        self.outline
-            .iter()
-            .fold([first.x, first.y, first.x, first.y], |hull, point| {
-                [
-                    hull[0].min(point.x),
-                    hull[1].min(point.y),
-                    hull[2].max(point.x),
-                    hull[3].max(point.y),
-                ]
-            })
+        let points = self.outline.iter().map(|at| [at.x, at.y, at.x, at.y]);
+        points.fold([first.x, first.y, first.x, first.y], hull)
     }
 }
 
