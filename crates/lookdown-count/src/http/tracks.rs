@@ -215,7 +215,9 @@ fn zone_rows(camera: &SceneCamera, current: &[ZoneSnapshot]) -> Vec<ZoneRow> {
         let mut drawn = geometry.areas.zones.iter();
         let drawn = drawn.find(|drawn| drawn.name == zone.zone);
         let outline = drawn.map(|zone| {
-            let outline = zone.outline(&geometry.lens, &geometry.mount, OUTLINE_SEGMENTS);
+            let outline = zone
+                .area
+                .outline(&geometry.lens, &geometry.mount, OUTLINE_SEGMENTS);
             let seen = outline.into_iter().flatten();
             seen.map(|point| rounded([point.x, point.y]))
                 .collect::<Vec<_>>()
