@@ -11,11 +11,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Plane, TailPoint, Track, TrackId};
 
-/// Most points of a line.
-pub const MAX_LINE_POINTS: usize = 64;
-/// Most lines of a counter.
-pub const MAX_LINES: usize = 64;
-
 /// The direction of a crossing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -34,7 +29,7 @@ pub struct Line {
     pub name: String,
     /// The plane of the points.
     pub plane: Plane,
-    /// The points in order, 2 to [`MAX_LINE_POINTS`].
+    /// The points in order, at least 2.
     pub points: Vec<[f64; 2]>,
     /// Half the width of the hysteresis band, in the unit of the plane: meters or pixels.
     pub band: f64,
@@ -55,11 +50,6 @@ pub struct Crossing {
     /// Time at which the person was beyond the band, seconds since the Unix epoch.
     pub at_s: f64,
 }
-
-/// Lines that cannot be counted.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{0}")]
-pub struct LineError(String);
 
 /// The lines over the tracks of one tracker.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -89,28 +79,12 @@ struct Approach {
 }
 
 impl LineCounter {
-    /// Returns a counter of these lines.
-    ///
-    /// # Errors
-    /// [`LineError`] for a line that cannot be counted.
-    pub fn new(lines: Vec<Line>) -> Result<Self, LineError> {
-        Self::resumed(lines, LineState::default())
-    }
-
-    /// Returns a counter of the lines that `state` was kept for.
-    ///
-    /// # Errors
-    /// [`LineError`] for a line that cannot be counted.
-    pub fn resumed(lines: Vec<Line>, mut state: LineState) -> Result<Self, LineError> {
-        if lines.len() > MAX_LINES {
-            let problem = format!("there are {} lines: give at most {MAX_LINES}", lines.len());
-            return Err(LineError(problem));
-        }
-        lines.iter().try_for_each(Line::check)?;
+    /// Returns a counter of the lines that `state` was kept for, or with an empty one a new counter.
+    pub fn new(lines: Vec<Line>, mut state: LineState) -> Self {
         state
             .tracks
             .retain(|_, approaches| approaches.len() == lines.len());
-        Ok(Self { lines, state })
+        Self { lines, state }
     }
 
     /// Returns the crossings since the last call. `tracks` are all confirmed tracks of the tracker,
@@ -172,24 +146,6 @@ impl Approach {
             self.pending = 0;
         }
         counted
-    }
-}
-
-impl Line {
-    fn check(&self) -> Result<(), LineError> {
-        let (count, band) = (self.points.len(), self.band);
-        let problem = if !(2..=MAX_LINE_POINTS).contains(&count) {
-            format!("has {count} points: give 2 to {MAX_LINE_POINTS}")
-        } else if !self.points.iter().flatten().all(|part| part.is_finite()) {
-            "has a coordinate that is not finite: give numbers".to_owned()
-        } else if self.points.windows(2).any(|pair| pair[0] == pair[1]) {
-            "has the same point twice in a row: leave one out".to_owned()
-        } else if !(band > 0.0 && band.is_finite()) {
-            format!("has the band {band}: give a number above 0")
-        } else {
-            return Ok(());
-        };
-        Err(LineError(format!("line `{}` {problem}", self.name)))
     }
 }
 

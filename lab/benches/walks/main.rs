@@ -26,7 +26,7 @@ use std::{
 use anyhow::{Context, Result, bail};
 use lookdown_tracking::{
     CameraPose, Observation, Tracker, TrackerSettings,
-    lines::LineCounter,
+    lines::{LineCounter, LineState},
     taught_crossings::{CrossingRatio, ReferenceCrossings},
 };
 use serde_json::{Value, json};
@@ -181,7 +181,7 @@ fn follow(
     let pose = CameraPose::alone(Some(view.height_m));
     let mut tracker = Tracker::new(&[pose], settings)?;
     let crossings = Crossings::new(sequence, &view);
-    let mut counter = LineCounter::new(crossings.lines.clone())?;
+    let mut counter = LineCounter::new(crossings.lines.clone(), LineState::default());
     let annotated = |frame: &Frame| !frame.truth.is_empty();
     let first = sequence.frames.iter().position(annotated).unwrap_or(0);
     let last = sequence.frames.iter().rposition(annotated).unwrap_or(0);
