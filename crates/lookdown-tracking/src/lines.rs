@@ -6,6 +6,7 @@
 
 use std::collections::BTreeMap;
 
+use lookdown_lens::geometry::polygon;
 use nalgebra::{Point2, Vector2};
 use serde::{Deserialize, Serialize};
 
@@ -173,23 +174,17 @@ fn signed_crossings(points: &[[f64; 2]], from: [f64; 2], to: [f64; 2]) -> i32 {
 
 /// Returns true when `point` lies to the right of a walk from `start` to `end`.
 fn is_right(start: [f64; 2], end: [f64; 2], point: [f64; 2]) -> bool {
-    let along = Vector2::from(end) - Vector2::from(start);
-    let to_point = Vector2::from(point) - Vector2::from(start);
-    along.perp(&to_point) > 0.0
+    let [start, end, point] = [start, end, point].map(Vector2::from);
+    (end - start).perp(&(point - start)) > 0.0
 }
 
 /// Returns the distance of a point from the polyline, its ends included.
 fn distance(points: &[[f64; 2]], point: [f64; 2]) -> f64 {
-    let point = Point2::from(point);
-    let segments = points.windows(2);
-    segments
-        .map(|pair| {
-            let start = Point2::from(pair[0]);
-            let along = Point2::from(pair[1]) - start;
-            let share = (point - start).dot(&along) / along.norm_squared();
-            (point - (start + along * share.clamp(0.0, 1.0))).norm()
-        })
-        .fold(f64::INFINITY, f64::min)
+    let edges = points
+        .windows(2)
+        .map(|pair| [pair[0], pair[1]].map(Point2::from));
+    let distances = edges.map(|edge| polygon::distance(edge, point.into()));
+    distances.fold(f64::INFINITY, f64::min)
 }
 
 #[cfg(test)]
