@@ -99,7 +99,7 @@ impl Follower {
 
     fn update(&mut self, camera: usize, at_s: f64, persons: &[Observation]) {
         self.tracker
-            .update(camera, at_s, persons)
+            .update(f64::INFINITY, camera, at_s, persons)
             .expect("reports in order");
         self.crossings
             .extend(self.line.update(self.tracker.tracks()));

@@ -190,7 +190,7 @@ fn follow(
     for (at, frame) in sequence.frames.iter().enumerate().step_by(step) {
         let at_s = f64::from(frame.number) / circle.frames_per_s;
         let (boxes, persons) = persons(&view, frame);
-        tracker.update(0, at_s, &persons)?;
+        tracker.update(f64::INFINITY, 0, at_s, &persons)?;
         let crossed = counter.update(tracker.tracks()).into_iter();
         counted.extend(crossed.map(|one| (one.line, lines::sign(one.direction), one.at_s)));
         let tracks = continued(&tracker, 0, at_s, &boxes)?;

@@ -89,7 +89,9 @@ fn a_tracked_walk_is_counted_once() {
     let mut found = Vec::new();
     for frame in 0..60 {
         let at_s = f64::from(frame) / 10.0;
-        tracker.update(0, at_s, &[person(at_s - 3.0, 1.0)]).unwrap();
+        tracker
+            .update(f64::INFINITY, 0, at_s, &[person(at_s - 3.0, 1.0)])
+            .unwrap();
         found.extend(counter.update(tracker.tracks()));
     }
     assert_eq!(found.len(), 1);
@@ -103,7 +105,9 @@ fn a_resumed_counter_completes_a_pending_crossing() {
     let mut sum = 0;
     for frame in 0..60 {
         let at_s = f64::from(frame) / 10.0;
-        tracker.update(0, at_s, &[person(at_s - 3.0, 1.0)]).unwrap();
+        tracker
+            .update(f64::INFINITY, 0, at_s, &[person(at_s - 3.0, 1.0)])
+            .unwrap();
         sum += counter.update(tracker.tracks()).len();
         let text = serde_json::to_string(&counter.state).unwrap();
         let state = serde_json::from_str(&text).unwrap();
@@ -119,7 +123,9 @@ fn the_state_of_ended_tracks_is_dropped() {
     for frame in 0..200 {
         let persons = [person(1.0, 1.0)];
         let persons = if frame < 20 { &persons[..] } else { &[] };
-        tracker.update(0, f64::from(frame) / 5.0, persons).unwrap();
+        tracker
+            .update(f64::INFINITY, 0, f64::from(frame) / 5.0, persons)
+            .unwrap();
         counter.update(tracker.tracks());
     }
     assert!(counter.state.tracks.is_empty());

@@ -55,7 +55,7 @@ fn a_track_that_ends_inside_leaves() {
         let at_s = f64::from(frame) / 5.0;
         let persons = [person(1.0, 1.0)];
         let persons = if frame < 20 { &persons[..] } else { &[] };
-        tracker.update(0, at_s, persons).unwrap();
+        tracker.update(f64::INFINITY, 0, at_s, persons).unwrap();
         events.extend(counter.update(tracker.tracks()));
         if frame == 19 {
             assert_eq!(counter.occupancy(), [1]);
@@ -78,7 +78,12 @@ fn a_resumed_counter_keeps_its_visits() {
     let mut events = 0;
     for frame in 0..20 {
         tracker
-            .update(0, f64::from(frame) / 5.0, &[person(1.0, 1.0)])
+            .update(
+                f64::INFINITY,
+                0,
+                f64::from(frame) / 5.0,
+                &[person(1.0, 1.0)],
+            )
             .unwrap();
         events += counter.update(tracker.tracks()).len();
         let text = serde_json::to_string(&counter.state).unwrap();
