@@ -7,7 +7,7 @@ use nalgebra::{Rotation3, Unit, Vector2, Vector3};
 use super::{
     FrameCrop, Lens, Mount, Pixel, QuarterTurn,
     hull::{hull, middle},
-    pixels::{PixelConvention, cross_half_pixel},
+    pixels::to_corner_origin,
 };
 
 /// The share of a crop's side within which a person must lie to be wholly in it.
@@ -86,7 +86,7 @@ pub fn nadir_crop(lens: &Lens, mount: &Mount, side: u32) -> Option<FrameCrop> {
     (reach > 0.0).then(|| FrameCrop {
         turn: QuarterTurn::None,
         is_mirrored: false,
-        center: cross_half_pixel(center, PixelConvention::CornerOrigin),
+        center: to_corner_origin(center),
         scale: (f64::from(side) / (2.0 * reach)).min(MAX_SCALE),
         width: side,
         height: side,

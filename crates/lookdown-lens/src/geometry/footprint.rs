@@ -8,7 +8,7 @@ use super::{
     FrameCrop, Lens, Mount, Pixel, Ray, VirtualView,
     height_ratio::Extremities,
     hull::{hull, middle},
-    pixels::{PixelConvention, cross_half_pixel},
+    pixels::{to_corner_origin, to_pixel_center},
 };
 
 /// Points on an inscribed ellipse: more change the hull by less than 0.2 % of its size.
@@ -92,7 +92,7 @@ impl Footprint {
             let Some(in_frame) = seen.or_else(|| lens.project_to_rim(&ray)) else {
                 continue;
             };
-            outline.push(cross_half_pixel(in_frame, PixelConvention::CornerOrigin));
+            outline.push(to_corner_origin(in_frame));
             if index.is_multiple_of(RAY_STRIDE) {
                 // What was pulled to the rim is seen there.
                 rays.extend(match seen {
@@ -117,7 +117,7 @@ impl Footprint {
         let center = middle(frame_box);
         let half = Vector2::new(x_max - x_min, y_max - y_min) / 2.0;
         let ray = |point: &Pixel| {
-            let pixel = cross_half_pixel(*point, PixelConvention::PixelCenter);
+            let pixel = to_pixel_center(*point);
             lens.unproject(&pixel)
         };
         ray(&center)?;
@@ -160,7 +160,7 @@ fn corners([x_min, y_min, x_max, y_max]: [f64; 4]) -> [Pixel; 4] {
 
 /// The ray (camera frame) through a point of a view (corner-origin pixels).
 fn ray_through(point: Pixel, view: &VirtualView) -> Ray {
-    view.ray_in_camera(&cross_half_pixel(point, PixelConvention::PixelCenter))
+    view.ray_in_camera(&to_pixel_center(point))
 }
 
 /// An ellipse in the plane of a view, as rays (camera frame).
@@ -183,7 +183,7 @@ impl Ellipse {
         let center = Pixel::new(f64::midpoint(x_min, x_max), f64::midpoint(y_min, y_max));
         let half_width = (x_max - x_min) / 2.0;
         let half_height = (y_max - y_min) / 2.0;
-        let center_pixel = cross_half_pixel(center, PixelConvention::PixelCenter);
+        let center_pixel = to_pixel_center(center);
         let (up, along, across) = view
             .vertical_at(&center_pixel, mount)
             .and_then(|vertical| ellipse_axes(vertical, half_width, half_height))
