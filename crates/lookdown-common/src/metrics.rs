@@ -92,6 +92,7 @@ impl Kind for IntCounterVec {
     }
 }
 
+/// A histogram of durations if the name ends in `_seconds`, else of counts.
 impl Kind for HistogramVec {
     fn create(name: &str, help: &str, labels: &[&str]) -> Result<Self, Error> {
         let buckets: &[f64] = if name.ends_with("_seconds") {
