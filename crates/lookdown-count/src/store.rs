@@ -20,7 +20,7 @@ use lookdown_common::StoredFile;
 use parking_lot::Mutex;
 use rusqlite::Connection;
 
-pub(crate) use read::{HOUR_MINUTES, ReferenceCrossingCount, Span, Step, StoredCalibrations};
+pub(crate) use read::{HOUR_MINUTES, ReferenceHour, Span, Step, StoredCalibrations};
 
 /// First byte of the stored state of a scene.
 const STATE_VERSION: u8 = StoredFile::Tracks.version();

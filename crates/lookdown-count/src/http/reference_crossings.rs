@@ -19,7 +19,7 @@ use super::{
     time::timestamp,
 };
 use crate::{
-    store::{HOUR_MINUTES, ReferenceCrossingCount, Span},
+    store::{HOUR_MINUTES, ReferenceHour, Span},
     sums::{LineDirection, MINUTE_MS, Owner},
 };
 
@@ -30,6 +30,31 @@ const MAX_CROSSINGS: u64 = 10_000;
 
 /// The ratios of true to counted crossings by line.
 pub(super) type Ratios = BTreeMap<String, CrossingRatio>;
+
+/// The crossings of a line in a direction in an hour.
+#[derive(Serialize, ToSchema)]
+pub(super) struct ReferenceCrossingCount {
+    /// The begin of the hour.
+    from: Timestamp,
+    line: String,
+    direction: String,
+    /// The crossings that a person counted.
+    crossings: u64,
+    /// The crossings that the camera counted.
+    counted: u64,
+}
+
+impl From<ReferenceHour> for ReferenceCrossingCount {
+    fn from(hour: ReferenceHour) -> Self {
+        Self {
+            from: hour.from,
+            line: hour.line,
+            direction: hour.direction,
+            crossings: hour.crossings,
+            counted: hour.counted,
+        }
+    }
+}
 
 /// The reference crossings of a camera, and what they teach.
 #[derive(Serialize, ToSchema)]
@@ -60,12 +85,15 @@ pub(super) async fn list(
     let ratios = ratios(&hours).into_iter();
     Ok(Json(ReferenceCrossingList {
         ratios: ratios.map(|(line, of)| (line, of.ratio)).collect(),
-        crossings: hours,
+        crossings: hours
+            .into_iter()
+            .map(ReferenceCrossingCount::from)
+            .collect(),
     }))
 }
 
 /// Returns the ratios of lines with reference crossings.
-pub(super) fn ratios(hours: &[ReferenceCrossingCount]) -> Ratios {
+pub(super) fn ratios(hours: &[ReferenceHour]) -> Ratios {
     let mut times = BTreeMap::<_, BTreeMap<Timestamp, ReferenceCrossings>>::new();
     for hour in hours {
         let of_line = times.entry(hour.line.clone()).or_default();

@@ -5,8 +5,6 @@ use std::collections::BTreeMap;
 use jiff::Timestamp;
 use lookdown_tracking::heat_map::Cell;
 use rusqlite::{Connection, OptionalExtension, params};
-use serde::Serialize;
-use utoipa::ToSchema;
 
 use super::{STATE_VERSION, Store, StoreError};
 use crate::{
@@ -67,8 +65,7 @@ pub(crate) struct Step {
 }
 
 /// The crossings of a line in a direction in an hour.
-#[derive(Serialize, ToSchema)]
-pub(crate) struct ReferenceCrossingCount {
+pub(crate) struct ReferenceHour {
     /// The begin of the hour.
     pub(crate) from: Timestamp,
     pub(crate) line: String,
@@ -181,7 +178,7 @@ impl Store {
     pub(crate) fn reference_crossings(
         &self,
         camera: &str,
-    ) -> Result<Vec<ReferenceCrossingCount>, StoreError> {
+    ) -> Result<Vec<ReferenceHour>, StoreError> {
         let connection = self.reader.lock();
         let mut statement = connection.prepare_cached(
             "SELECT minute, line, direction, crossings, coalesce((SELECT sum(crossings) FROM crossings c
@@ -190,7 +187,7 @@ impl Store {
              FROM reference_crossings r WHERE camera = ?1 ORDER BY 1, 2, 3",
         )?;
         let rows = statement.query_map(params![camera, HOUR_MINUTES], |row| {
-            Ok(ReferenceCrossingCount {
+            Ok(ReferenceHour {
                 from: time_of(row.get::<_, i64>(0)? * MINUTE_MS),
                 line: row.get(1)?,
                 direction: row.get(2)?,
