@@ -1,9 +1,24 @@
 //! Errors: of writes to standard output, and as one sentence.
 
-use std::io;
+use std::{
+    fs,
+    io::{self, Write},
+    path::Path,
+};
+
+use anyhow::Context;
 
 /// The error of a write to standard output.
 pub(super) const UNWRITABLE: &str = "standard output cannot be written";
+
+/// Writes a text into the file of an option, or to standard output without a file.
+pub(super) fn write_or_print(option: &str, file: Option<&Path>, text: &str) -> anyhow::Result<()> {
+    match file {
+        Some(file) => fs::write(file, text)
+            .with_context(|| format!("{option}: {} cannot be written", file.display())),
+        None => write!(io::stdout(), "{text}").context(UNWRITABLE),
+    }
+}
 
 /// Returns true if the program that reads standard output has ended, such as `head`.
 pub(super) fn is_closed_pipe(error: &anyhow::Error) -> bool {

@@ -77,12 +77,7 @@ pub(super) fn run(arguments: &Arguments, commit: Option<&str>) -> anyhow::Result
         ("counts.path", arguments.store.as_deref()),
     ]);
     let source_of_settings = arguments.settings_file.source(file, &flags)?;
-    if source.is_none() && arguments.camera.is_given() {
-        bail!(
-            "flags of a single camera need a source: give its URL, or set them in the settings \
-             file, under [camera_defaults] or [[cameras]]"
-        );
-    }
+    arguments.camera.check_source(source)?;
     let camera = source.map(|source| arguments.camera.entry(source, Some(CAMERA)));
     let mut settings = source_of_settings.load()?;
     if let Some(port) = arguments.port {

@@ -18,7 +18,7 @@ use tokio::{
     time::timeout,
 };
 
-use super::{SettingsFile, async_runtime::run_async, output::UNWRITABLE};
+use super::{SettingsFile, async_runtime::run_async, output::UNWRITABLE, server_flags::given};
 use crate::{
     app::{App, Reloader, Sockets, assemble},
     settings::Settings,
@@ -49,10 +49,7 @@ pub(super) struct Arguments {
 
 /// Runs the server until a stop is requested, or checks that it could run.
 pub(super) fn run(arguments: &Arguments, commit: Option<&str>) -> anyhow::Result<ExitCode> {
-    let listen = arguments.listen.iter();
-    let flags: Vec<_> = listen
-        .map(|address| ("server.listen".to_owned(), address.clone()))
-        .collect();
+    let flags = given(&[("server.listen", arguments.listen.as_deref())]);
     let mut settings = arguments.settings_file.load_with(&flags)?;
     if let Some(port) = arguments.port {
         settings.server.listen.set_port(port);

@@ -4,7 +4,7 @@
 
 use std::{path::PathBuf, time::Duration};
 
-use anyhow::{Context, anyhow, bail};
+use anyhow::{Context, anyhow, bail, ensure};
 use clap::{Args, builder::PossibleValuesParser};
 use lookdown_common::{ServerClient, ServerEntry, read_body};
 use lookdown_detect::parameters::Profile;
@@ -147,8 +147,13 @@ impl CameraFlags {
         }
     }
 
-    /// Returns true if there is a flag that belongs to a single camera.
-    pub(super) fn is_given(&self) -> bool {
-        *self != Self::default()
+    /// Refuses flags without a source.
+    pub(super) fn check_source(&self, source: Option<&str>) -> anyhow::Result<()> {
+        ensure!(
+            source.is_some() || *self == Self::default(),
+            "flags of a single camera need a source: give its URL, or set them in the settings \
+             file, under [camera_defaults] or [[cameras]]"
+        );
+        Ok(())
     }
 }

@@ -46,6 +46,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         .settings_file
         .source(file, &arguments.server.settings())?;
     let loaded = settings.load()?;
+    arguments.camera.check_source(source)?;
     let origin = match source {
         Some(source) => {
             let entry = arguments.camera.entry(source, None);
@@ -57,10 +58,6 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
                 vec![entry.check("")?],
             )?)
         }
-        None if arguments.camera.is_given() => bail!(
-            "flags of a single camera need a source: give its URL, or set them in the settings \
-             file, under [camera_defaults] or [[cameras]]"
-        ),
         None if loaded.lists.cameras.is_empty() => bail!(
             "cameras: there is no camera: give the URL of one, or add a [[cameras]] table with a \
              url to the settings file"

@@ -7,10 +7,7 @@ use lookdown_calibration::{
     native::{SourcedValue, ValueSource},
 };
 use lookdown_lens::{
-    geometry::{
-        Lens, OrientedBox, Pixel, Ray,
-        pixels::{PixelConvention, cross_half_pixel},
-    },
+    geometry::{Lens, OrientedBox, Pixel, Ray, pixels::to_corner_origin},
     self_calibration::{FitUncertainty, KnownCamera, RoomFit},
 };
 use tempfile::TempDir;
@@ -50,7 +47,7 @@ fn standing(out_m: f64, azimuth: f64) -> OrientedBox {
     let (sin, cos) = azimuth.sin_cos();
     let ends = [0.0, 1.75].map(|up_m| -> Pixel {
         let ray = Ray::new(out_m * cos, out_m * sin, 3.0 - up_m);
-        cross_half_pixel(lens.project(&ray).unwrap(), PixelConvention::CornerOrigin)
+        to_corner_origin(lens.project(&ray).unwrap())
     });
     OrientedBox::averaging((ends[1] - ends[0]).normalize(), [(1.0, &ends[..])]).unwrap()
 }

@@ -4,10 +4,7 @@
 use std::f64::consts::PI;
 
 use lookdown_calibration::CameraGeometry;
-use lookdown_lens::geometry::{
-    OrientedBox, Pixel, Ray,
-    pixels::{PixelConvention, cross_half_pixel},
-};
+use lookdown_lens::geometry::{OrientedBox, Pixel, Ray, pixels::to_pixel_center};
 
 use super::view::Direction;
 
@@ -148,7 +145,7 @@ fn tilted(ray: Ray) -> Ray {
 fn seen(person: &OrientedBox, camera: &CameraGeometry) -> Option<Seen> {
     let from_camera = camera.mount.camera_from_floor();
     let ray_at = |point: Pixel| {
-        let pixel = cross_half_pixel(point, PixelConvention::PixelCenter);
+        let pixel = to_pixel_center(point);
         let ray = camera.lens.unproject(&pixel)?.normalize();
         Some(from_camera.inverse_transform_vector(&ray))
     };
@@ -170,7 +167,7 @@ mod tests {
     use std::f64::consts::FRAC_PI_2;
 
     use lookdown_calibration::Areas;
-    use lookdown_lens::geometry::{Lens, Mount};
+    use lookdown_lens::geometry::{Lens, Mount, pixels::to_corner_origin};
 
     use super::*;
     use crate::views::view::{View, ViewKind, box_in_view};
@@ -233,7 +230,7 @@ mod tests {
         let pixel = |[x, y]: [f64; 2]| {
             let middle = Ray::new(x, y, 3.07 - 0.95).normalize();
             let pixel = camera.lens.project(&middle).unwrap();
-            cross_half_pixel(pixel, PixelConvention::CornerOrigin)
+            to_corner_origin(pixel)
         };
         for walker in 0..5 {
             let (mut follower, mut seen, mut shown) = (Follower::default(), 0, 0);

@@ -10,7 +10,7 @@ use lookdown_detect::parameters::ParameterError;
 use lookdown_imaging::annotate::ZoneOutline;
 use lookdown_lens::geometry::{
     Mount, OrientedBox, Panorama, Pixel, VirtualView,
-    pixels::{PixelConvention, cross_half_pixel},
+    pixels::{to_corner_origin, to_pixel_center},
 };
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -273,13 +273,13 @@ impl Part {
     /// The point of the view at which the part shows a point of the frame, possibly beyond its
     /// borders; both in corner-origin pixels.
     fn project(&self, point: Pixel, camera: &CameraGeometry) -> Option<Pixel> {
-        let pixel = cross_half_pixel(point, PixelConvention::PixelCenter);
+        let pixel = to_pixel_center(point);
         let ray = camera.lens.unproject(&pixel)?;
         let point = match &self.projection {
             Projection::Pinhole(view) => view.project(&ray),
             Projection::Panorama(panorama) => panorama.project(&ray),
         };
-        let point = cross_half_pixel(point?, PixelConvention::CornerOrigin);
+        let point = to_corner_origin(point?);
         let [left, top] = self.origin.map(f64::from);
         Some(Pixel::new(point.x + left, point.y + top))
     }

@@ -8,8 +8,7 @@ use std::collections::BTreeMap;
 
 use lookdown_detect::detection::{BBox, FramePixels};
 use lookdown_eval::{
-    AnnotatedPerson, EvaluatedImage, GroundTruth, MatchingRule, PrecisionRecallCurve, ScoredBox,
-    Summary,
+    AnnotatedPerson, EvaluatedImage, GroundTruth, PrecisionRecallCurve, ScoredBox, Summary,
 };
 use serde::Deserialize;
 
@@ -112,14 +111,9 @@ fn curves_and_average_precisions_match_known_answers() {
     let fixture: Fixture =
         serde_json::from_str(include_str!("../fixtures/pipeline_ap.json")).unwrap();
     let images = images(&fixture.gt, &BTreeMap::new(), &fixture.detections);
-    for (name, rule, min_iou) in [
-        ("voc_matching_Ot0.5", MatchingRule::Voc, 0.5),
-        ("coco_matching_Ot0.5", MatchingRule::Coco, 0.5),
-        ("voc_matching_Ot0.75", MatchingRule::Voc, 0.75),
-        ("coco_matching_Ot0.75", MatchingRule::Coco, 0.75),
-    ] {
+    for (name, min_iou) in [("coco_matching_Ot0.5", 0.5), ("coco_matching_Ot0.75", 0.75)] {
         let known = &fixture.results[name];
-        let curve = PrecisionRecallCurve::from_images(&images, rule, min_iou).unwrap();
+        let curve = PrecisionRecallCurve::from_images(&images, min_iou).unwrap();
         assert_eq!(curve.points.len(), known.order.len());
         for (rank, point) in curve.points.iter().enumerate() {
             let score = fixture.detections[known.order[rank]].score;
@@ -139,7 +133,7 @@ fn the_summary_agrees_with_pycocotools() {
     let fixture: Fixture =
         serde_json::from_str(include_str!("../fixtures/pipeline_ap.json")).unwrap();
     let images = images(&fixture.gt, &BTreeMap::new(), &fixture.detections);
-    let summary = Summary::from_images(&images, MatchingRule::Coco).unwrap();
+    let summary = Summary::from_images(&images).unwrap();
     assert_eq!((summary.images, summary.persons), (8, fixture.n_gt));
     assert_agrees(&summary, &fixture.pycocotools_check);
 }
@@ -155,7 +149,7 @@ fn ignore_regions_and_equal_scores_count_as_in_pycocotools() {
         &fixture.ignore_regions,
         &fixture.detections,
     );
-    let summary = Summary::from_images(&images, MatchingRule::Coco).unwrap();
+    let summary = Summary::from_images(&images).unwrap();
     assert_agrees(&summary, &fixture.pycocotools);
 }
 
@@ -168,5 +162,5 @@ fn assert_agrees(summary: &Summary, known: &CocoAnswer) {
 #[test]
 fn a_data_set_without_persons_has_no_summary() {
     let empty = images(&BTreeMap::from([(0, Vec::new())]), &BTreeMap::new(), &[]);
-    assert!(Summary::from_images(&empty, MatchingRule::Voc).is_err());
+    assert!(Summary::from_images(&empty).is_err());
 }

@@ -5,8 +5,8 @@ use std::{collections::BTreeMap, path::PathBuf};
 
 use lookdown_detect::detection::BBox;
 use lookdown_eval::{
-    AnnotatedPerson, DataSetImage, EvaluatedImage, GroundTruth, ImageId, MatchingRule, Outline,
-    Region, RotatedBox, ScoredBox, Stratification, Summary,
+    AnnotatedPerson, DataSetImage, EvaluatedImage, GroundTruth, ImageId, Outline, Region,
+    RotatedBox, ScoredBox, Stratification, Summary,
 };
 use serde::Deserialize;
 
@@ -132,7 +132,7 @@ fn average_precision_of_rotated_boxes_agrees_with_pycocotools() {
         }
     });
     let images: Vec<_> = images.collect();
-    let summary = Summary::from_images(&images, MatchingRule::Coco).unwrap();
+    let summary = Summary::from_images(&images).unwrap();
     let known = &fixture.pycocotools;
     let ap = |ap: lookdown_eval::AveragePrecision| ap.coco_101_point;
     assert_within(TOLERANCE, ap(summary.ap50), known.ap50, "AP50");
@@ -209,7 +209,7 @@ fn strata_agree_with_area_ranges_of_pycocotools() {
         (Stratification::Distance, &fixture.distance),
         (Stratification::Size, &fixture.size),
     ] {
-        let strata = by.strata(&images, MatchingRule::Coco).unwrap();
+        let strata = by.strata(&images).unwrap();
         assert_eq!(strata.len(), known.len());
         for (stratum, known) in strata.iter().zip(known) {
             assert_eq!(stratum.persons, known.persons, "{}", stratum.name);

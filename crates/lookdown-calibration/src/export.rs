@@ -7,11 +7,7 @@ mod decimal;
 mod equivalents;
 mod opencv;
 
-use lookdown_lens::geometry::{
-    Pixel,
-    lens::LensModel,
-    pixels::{PixelConvention, cross_half_pixel},
-};
+use lookdown_lens::geometry::{Pixel, lens::LensModel, pixels::to_corner_origin};
 use strum::{EnumString, IntoStaticStr, VariantArray};
 
 use crate::native::{NativeCalibration, NativeMount};
@@ -155,7 +151,7 @@ fn write_colmap(calibration: &NativeCalibration) -> Option<String> {
             }
         }
     };
-    let center = cross_half_pixel(Pixel::new(cx, cy), PixelConvention::CornerOrigin);
+    let center = to_corner_origin(Pixel::new(cx, cy));
     let mut parameters = vec![fx, fy, center.x, center.y];
     parameters.extend(rest);
     Some(format!(

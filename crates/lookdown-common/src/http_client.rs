@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use http_body::Body as _;
 use reqwest::{
-    Body, RequestBuilder, Response, Url,
+    Body, Method, RequestBuilder, Response, Url,
     header::{AUTHORIZATION, CONTENT_LENGTH, HOST, HeaderMap, HeaderValue, RETRY_AFTER},
 };
 use secrecy::ExposeSecret;
@@ -77,19 +77,9 @@ impl ServerClient {
         self.client.get(url)
     }
 
-    /// Starts a PUT request.
-    pub fn put(&self, url: Url) -> RequestBuilder {
-        self.client.put(url)
-    }
-
-    /// Starts a POST request.
-    pub fn post(&self, url: Url) -> RequestBuilder {
-        self.client.post(url)
-    }
-
-    /// Starts a DELETE request.
-    pub fn delete(&self, url: Url) -> RequestBuilder {
-        self.client.delete(url)
+    /// Starts a request.
+    pub fn request(&self, method: Method, url: Url) -> RequestBuilder {
+        self.client.request(method, url)
     }
 
     /// Sends a request of this client.
@@ -106,7 +96,7 @@ impl ServerClient {
         let headers = request.headers_mut();
         headers.insert(HOST, HeaderValue::from_static("localhost"));
         headers.extend(length.map(|length| (CONTENT_LENGTH, HeaderValue::from(length))));
-        Ok(Response::from(server.answer(request).await))
+        Ok(Response::from((server.answer)(request).await))
     }
 
     /// Returns the scheme, the host and the port of the server.

@@ -22,7 +22,7 @@ use hyper_util::{
     rt::{TokioExecutor, TokioIo, TokioTimer},
 };
 use reqwest::{
-    Body, Client, RequestBuilder, Response, Url,
+    Body, Client, Method, RequestBuilder, Response, Url,
     header::{ACCEPT, HeaderValue},
 };
 use rustls::{
@@ -109,19 +109,9 @@ impl HttpClient {
         self.requests.get(url)
     }
 
-    /// Starts a PUT request.
-    pub fn put(&self, url: Url) -> RequestBuilder {
-        self.requests.put(url)
-    }
-
-    /// Starts a POST request.
-    pub fn post(&self, url: Url) -> RequestBuilder {
-        self.requests.post(url)
-    }
-
-    /// Starts a DELETE request.
-    pub fn delete(&self, url: Url) -> RequestBuilder {
-        self.requests.delete(url)
+    /// Starts a request.
+    pub fn request(&self, method: Method, url: Url) -> RequestBuilder {
+        self.requests.request(method, url)
     }
 
     /// Sends a request of this client. Its timeout includes the body of the response.

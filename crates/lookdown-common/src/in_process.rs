@@ -12,7 +12,7 @@ type Answer = Pin<Box<dyn Future<Output = Response<Body>> + Send>>;
 /// The requests to a server in the same process. They use no socket and no TLS.
 #[derive(Clone)]
 pub struct InProcess {
-    answer: Arc<dyn Fn(Request<Body>) -> Answer + Send + Sync>,
+    pub(crate) answer: Arc<dyn Fn(Request<Body>) -> Answer + Send + Sync>,
     /// The cameras of the process.
     pub own_cameras: OwnCameras,
 }
@@ -30,10 +30,6 @@ impl InProcess {
             answer: Arc::new(move |request| Box::pin(answer(request))),
             own_cameras,
         }
-    }
-
-    pub(crate) fn answer(&self, request: Request<Body>) -> Answer {
-        (self.answer)(request)
     }
 }
 

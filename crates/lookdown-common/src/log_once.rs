@@ -7,11 +7,7 @@ pub struct LogOnce(Option<String>);
 impl LogOnce {
     /// Returns true if this problem is to be logged: it is not the last one.
     pub fn should_log(&mut self, problem: &str) -> bool {
-        let is_new = self.0.as_deref() != Some(problem);
-        if is_new {
-            self.0 = Some(problem.to_owned());
-        }
-        is_new
+        self.0.replace(problem.to_owned()).as_deref() != Some(problem)
     }
 
     /// Clears the problem. Returns true if there was one.

@@ -1,8 +1,9 @@
 //! The declaration of metrics: `metric_set!` makes the struct and its registration from one list.
 
 use prometheus::{
-    Error, GaugeVec, HistogramOpts, HistogramVec, IntCounter, IntCounterVec, IntGauge, IntGaugeVec,
-    Opts, Registry, TextEncoder,
+    Error, HistogramOpts, HistogramVec, IntCounter, IntCounterVec, IntGauge, Opts, Registry,
+    TextEncoder,
+    core::{Atomic, GenericGaugeVec},
 };
 
 /// Upper bounds, seconds: from a very short stage of a frame to the longest wait of a request.
@@ -67,7 +68,7 @@ pub trait Kind: Sized {
     fn create(name: &str, help: &str, labels: &[&str]) -> Result<Self, Error>;
 }
 
-impl Kind for GaugeVec {
+impl<P: Atomic> Kind for GenericGaugeVec<P> {
     fn create(name: &str, help: &str, labels: &[&str]) -> Result<Self, Error> {
         Self::new(Opts::new(name, help), labels)
     }
@@ -86,12 +87,6 @@ impl Kind for IntGauge {
 }
 
 impl Kind for IntCounterVec {
-    fn create(name: &str, help: &str, labels: &[&str]) -> Result<Self, Error> {
-        Self::new(Opts::new(name, help), labels)
-    }
-}
-
-impl Kind for IntGaugeVec {
     fn create(name: &str, help: &str, labels: &[&str]) -> Result<Self, Error> {
         Self::new(Opts::new(name, help), labels)
     }

@@ -9,7 +9,7 @@ use reqwest::{StatusCode, header::ETAG};
 use crate::{
     definition::CameraDefinition,
     definition_key::DefinitionKey,
-    store::{Store, StoreError, StoredCalibrations},
+    store::{Store, StoredCalibrations},
 };
 
 /// Longest time for a calibration.
@@ -34,15 +34,6 @@ struct Known {
     bytes: usize,
     /// Number of its request: the oldest is forgotten first.
     request: u64,
-}
-
-/// The reason why a calibration is not known.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum CalibrationProblem {
-    #[error("{0}")]
-    Server(String),
-    #[error(transparent)]
-    Store(#[from] StoreError),
 }
 
 impl Calibrations {
@@ -75,13 +66,14 @@ impl Calibrations {
         })
     }
 
-    /// Requests the calibration of a key unless its revision is known.
+    /// Requests the calibration of a key unless its revision is known. An error is the problem of
+    /// the server or of the store.
     pub(crate) async fn update(
         &mut self,
         client: &ServerClient,
         store: &Store,
         key: &DefinitionKey,
-    ) -> Result<(), CalibrationProblem> {
+    ) -> Result<(), String> {
         let Some(id) = &key.calibration else {
             return Ok(());
         };
@@ -89,23 +81,15 @@ impl Calibrations {
         if known.is_some_and(|known| known.requested == key.revision) {
             return Ok(());
         }
-        let content = request(client, id)
-            .await
-            .map_err(CalibrationProblem::Server)?;
-        let calibration = match &content {
-            Some(content) => match parse(id, content) {
-                Ok(calibration) => Some(Arc::new(calibration)),
-                Err(problem) => {
-                    tracing::warn!("the calibration {id} of the server is not used: {problem}");
-                    None
-                }
-            },
-            None => None,
-        };
+        let content = request(client, id).await?;
+        let parsed = content.as_ref().map(|content| parse(id, content));
+        if let Some(Err(problem)) = &parsed {
+            tracing::warn!("the calibration {id} of the server is not used: {problem}");
+        }
         self.requests += 1;
         let known = Known {
             requested: key.revision.clone(),
-            calibration,
+            calibration: parsed.and_then(Result::ok).map(Arc::new),
             bytes: content.as_ref().map_or(0, Vec::len),
             request: self.requests,
         };
@@ -116,8 +100,8 @@ impl Calibrations {
             store.put_calibration(&id, &revision, content.as_deref(), &forgotten)
         });
         // A task that panicked is logged by the panic hook.
-        stored.await.unwrap_or(Ok(()))?;
-        Ok(())
+        let stored = stored.await.unwrap_or(Ok(()));
+        stored.map_err(|problem| problem.to_string())
     }
 
     /// Forgets the calibrations beyond the limits except one, and returns their IDs. Cameras that

@@ -88,27 +88,24 @@ impl CameraDefinition {
             is_on_site: placement.is_some(),
         };
         let id = calibration.id().as_str();
+        let warn_unless = |is_placed: bool, kind: &str, name: &str| {
+            if !is_placed {
+                tracing::warn!(
+                    "calibration {id}: the {kind} {name} is not on the floor of its site: draw it with floor_m"
+                );
+            }
+        };
         let lines = geometry.areas.lines.iter();
         let (lines, directions) = lines
             .filter_map(|line| {
                 let placed = planes.line(line, key.width);
-                if placed.is_none() {
-                    tracing::warn!(
-                        "calibration {id}: the line {} is not on the floor of its site: draw it with floor_m",
-                        line.name
-                    );
-                }
+                warn_unless(placed.is_some(), "line", &line.name);
                 Some((placed?, line.directions.clone()))
             })
             .unzip();
         let zones = geometry.areas.zones.iter().filter_map(|zone| {
             let placed = planes.zone(&zone.area);
-            if placed.is_none() {
-                tracing::warn!(
-                    "calibration {id}: the zone {} is not on the floor of its site: draw it with floor_m",
-                    zone.name
-                );
-            }
+            warn_unless(placed.is_some(), "zone", &zone.name);
             let (plane, area) = placed?;
             let name = zone.name.clone();
             Some(Zone { name, plane, area })

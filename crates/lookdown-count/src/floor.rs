@@ -186,7 +186,7 @@ fn zone_of(track: &Track, definition: &CameraDefinition, is_expected: bool) -> O
             floor.is_some_and(|floor| area.holds_within(Point2::new(floor.x_m, floor.y_m), NEAR_M))
         }
     };
-    let inside = zones().find(|zone| zone.holds(center, floor));
+    let inside = zones().find(|zone| zone.area.holds(center, floor));
     let near = || zones().find(|zone| !is_expected && is_near(&zone.area));
     Some(inside.or_else(near)?.name.clone())
 }

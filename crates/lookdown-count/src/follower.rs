@@ -14,7 +14,7 @@ use tokio::{
 
 use crate::{
     batch::Batch,
-    calibrations::{CalibrationProblem, Calibrations},
+    calibrations::Calibrations,
     counter::{Accepted, Counter},
     event_parser::{Event, EventParser, TooLarge},
     message::Message,
@@ -150,13 +150,7 @@ impl Follower {
                 updated = self.calibrations.update(&self.client, &self.store, &key) => updated,
                 () = stopped(&mut stop) => return Err(StreamError::stopped()),
             };
-            updated.map_err(|problem| StreamError {
-                message: match problem {
-                    CalibrationProblem::Server(problem) => problem,
-                    CalibrationProblem::Store(problem) => problem.to_string(),
-                },
-                retry_after: None,
-            })?;
+            updated.map_err(StreamError::new)?;
             self.calibrations.definition(key)
         };
         let mut counter = self.counter.lock();
@@ -215,7 +209,11 @@ impl Follower {
         }
         let batch = batch.unwrap_or_else(|| {
             let counter = self.counter.lock();
-            Batch::empty(counter.last_event, counter.stored_totals.clone())
+            Batch {
+                last_event: counter.last_event,
+                totals: counter.stored_totals.clone(),
+                ..Batch::default()
+            }
         });
         let batch = Arc::new((batch, messages, held));
         let mut backoff = Backoff::new(FIRST_PAUSE, LONGEST_PAUSE);

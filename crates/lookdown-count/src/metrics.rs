@@ -85,56 +85,48 @@ impl Metrics {
         ] {
             gauges.reset();
         }
+        let set = |gauge: &IntGaugeVec, labels: &[&str], value: i64| {
+            gauge.with_label_values(labels).set(value);
+        };
+        let add = |counter: &IntCounterVec, labels: &[&str], value: u64| {
+            counter.with_label_values(labels).inc_by(value);
+        };
         let number = |value: u64| i64::try_from(value).unwrap_or(i64::MAX);
         for camera in &snapshot.cameras {
             let name = camera.name.as_str();
             // No alert waits for the reports of a paused camera.
             if !camera.is_paused {
-                let last_report = self.last_report.with_label_values(&[name]);
-                last_report.set(camera.last_report_ms.div_euclid(1000));
+                let seconds = camera.last_report_ms.div_euclid(1000);
+                set(&self.last_report, &[name], seconds);
             }
             if let Some(persons) = camera.persons {
-                self.persons.with_label_values(&[name]).set(number(persons));
+                set(&self.persons, &[name], number(persons));
                 if !camera.lines.is_empty() {
                     let is_too_low = camera.too_low_since_ms.is_some();
-                    self.too_low
-                        .with_label_values(&[name])
-                        .set(is_too_low.into());
+                    set(&self.too_low, &[name], is_too_low.into());
                 }
             }
             if let Some(alerts) = &camera.floor_alerts {
                 let is_open = alerts.iter().any(|alert| !alert.is_acknowledged);
-                self.floor_alert
-                    .with_label_values(&[name])
-                    .set(is_open.into());
+                set(&self.floor_alert, &[name], is_open.into());
             }
             for line in &camera.lines {
                 let labels = [name, line.line.as_str(), line.direction.as_str()];
-                self.crossings
-                    .with_label_values(&labels)
-                    .inc_by(line.crossings);
+                add(&self.crossings, &labels, line.crossings);
             }
             for zone in &camera.zones {
                 let labels = [name, zone.zone.as_str()];
                 if let Some(persons) = zone.persons {
-                    self.zone_persons
-                        .with_label_values(&labels)
-                        .set(number(persons));
+                    set(&self.zone_persons, &labels, number(persons));
                 }
-                self.zone_entries
-                    .with_label_values(&labels)
-                    .inc_by(zone.entries);
+                add(&self.zone_entries, &labels, zone.entries);
                 let seconds = zone.person_ms / 1000;
-                self.zone_person_seconds
-                    .with_label_values(&labels)
-                    .inc_by(seconds);
+                add(&self.zone_person_seconds, &labels, seconds);
             }
         }
         for site in &snapshot.sites {
             if let Some(persons) = site.persons {
-                self.site_persons
-                    .with_label_values(&[&site.name])
-                    .set(number(persons));
+                set(&self.site_persons, &[&site.name], number(persons));
             }
         }
         // Writing to memory does not fail.

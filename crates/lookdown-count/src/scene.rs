@@ -156,7 +156,7 @@ impl Scene {
     ) -> Result<Vec<NamedCrossing>, RefusedReport> {
         let elapsed_s = self.cameras[camera].elapsed_s(time.now);
         self.tracker
-            .update_after(elapsed_s, camera, seconds(time.at_ms), persons)?;
+            .update(elapsed_s, camera, seconds(time.at_ms), persons)?;
         let tracks: Vec<&Track> = self.tracker.tracks().collect();
         let mut crossings = Vec::new();
         // A line at the edge of an area counts those who cross it from the margin.

@@ -10,7 +10,7 @@ use lookdown_common::text::one_line;
 use lookdown_tracking::{
     Track,
     lines::{Direction, LineCounter, LineState},
-    zones::{DEFAULT_HOLD_S, ZoneCounter, ZoneEvent, ZoneState},
+    zones::{ZoneCounter, ZoneEvent, ZoneState},
 };
 use serde::{Deserialize, Serialize};
 
@@ -85,8 +85,8 @@ impl SceneCamera {
     pub(crate) fn new(name: &str, definition: Arc<CameraDefinition>) -> Self {
         Self {
             name: name.to_owned(),
-            lines: line_counter(&definition, LineState::default()),
-            zones: zone_counter(&definition, ZoneState::default()),
+            lines: LineCounter::new(definition.lines.clone(), LineState::default()),
+            zones: ZoneCounter::new(definition.zones.clone(), ZoneState::default()),
             presence: Presence::default(),
             rate: FrameRate::default(),
             floor: Floor::default(),
@@ -104,8 +104,8 @@ impl SceneCamera {
         let mut zone_persons = state.zone_persons;
         zone_persons.resize(definition.zones.len(), 0);
         Self {
-            lines: line_counter(&definition, state.lines),
-            zones: zone_counter(&definition, state.zones),
+            lines: LineCounter::new(definition.lines.clone(), state.lines),
+            zones: ZoneCounter::new(definition.zones.clone(), state.zones),
             presence: state.presence,
             zone_persons,
             last_report: state.last_report,
@@ -220,9 +220,8 @@ impl SceneCamera {
             *sums.crossings.entry(key).or_default() += 1;
             named.push(NamedCrossing { of, at_ms });
         }
-        for event in self.zones.update(counted.iter().copied()) {
-            let (ZoneEvent::Entered { zone, at_s, .. } | ZoneEvent::Left { zone, at_s, .. }) =
-                event;
+        for (zone, event) in self.zones.update(counted.iter().copied()) {
+            let (ZoneEvent::Entered { at_s } | ZoneEvent::Left { at_s, .. }) = event;
             let minute = milliseconds(at_s).div_euclid(MINUTE_MS);
             let sum = sums.zones.entry((self.zone_of(zone), minute)).or_default();
             match event {
@@ -257,21 +256,6 @@ impl SceneCamera {
             }
         }
     }
-}
-
-// The definition was checked: counters accept it. Without it, nothing is counted.
-fn line_counter(definition: &CameraDefinition, state: LineState) -> LineCounter {
-    LineCounter::resumed(definition.lines.clone(), state).unwrap_or_else(|error| {
-        tracing::warn!("the lines of {:?} are not counted: {error}", definition.key);
-        LineCounter::default()
-    })
-}
-
-fn zone_counter(definition: &CameraDefinition, state: ZoneState) -> ZoneCounter {
-    ZoneCounter::resumed(definition.zones.clone(), DEFAULT_HOLD_S, state).unwrap_or_else(|error| {
-        tracing::warn!("the zones of {:?} are not counted: {error}", definition.key);
-        ZoneCounter::default()
-    })
 }
 
 /// Frames per second that lines need: fewer lose crossings and identities

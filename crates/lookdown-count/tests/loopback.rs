@@ -238,10 +238,8 @@ async fn crossings_that_a_person_counted_give_a_ratio_with_a_bar() {
         let hour = format!("/counts/hall/reference-crossings/{begin}");
         let change = async |method: &str, path: &str| {
             let url = format!("{}{path}", companion.url).parse().unwrap();
-            let request = match method {
-                "PUT" => companion.client.put(url),
-                _ => companion.client.delete(url),
-            };
+            let method = method.parse().unwrap();
+            let request = companion.client.request(method, url);
             let response = companion.client.send(request).await.unwrap();
             (response.status().as_u16(), response.text().await.unwrap())
         };

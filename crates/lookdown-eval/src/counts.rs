@@ -4,7 +4,7 @@
 
 use lookdown_lens::saturating::to_usize;
 
-use super::{EvaluatedImage, MatchingRule, Outcome, Region, precision_recall::count};
+use super::{EvaluatedImage, Outcome, Region, matching::outcomes, precision_recall::count};
 
 /// The score threshold of a detection that sets none.
 pub const DEFAULT_COUNT_THRESHOLD: f64 = 0.3;
@@ -59,10 +59,10 @@ pub struct CalibrationError {
 }
 
 impl Counts {
-    /// Matches the detections of `images` by `rule` at `O_t` = 0.5.
-    pub fn from_images<B: Region>(images: &[EvaluatedImage<B>], rule: MatchingRule) -> Self {
+    /// Matches the detections of `images` at `O_t` = 0.5.
+    pub fn from_images<B: Region>(images: &[EvaluatedImage<B>]) -> Self {
         let counted = images.iter().map(|image| {
-            let outcomes = rule.outcomes(&image.detections, &image.truth, MIN_IOU);
+            let outcomes = outcomes(&image.detections, &image.truth, MIN_IOU);
             let judged = image.detections.iter().zip(outcomes);
             CountedImage {
                 persons: image.truth.person_count(),

@@ -21,7 +21,7 @@ pub use average_precision::AveragePrecision;
 pub use counts::{CalibrationError, CountFigures, Counts, DEFAULT_COUNT_THRESHOLD};
 pub use data_set::{DataSet, DataSetImage, ImageId, ScoringMismatch};
 pub use ground_truth::{AnnotatedPerson, EvaluatedImage, GroundTruth, ScoredBox};
-pub use matching::{MatchingRule, Outcome};
+pub use matching::Outcome;
 pub use outline::{Outline, Scoring};
 pub use precision_recall::{OperatingPoint, PrecisionRecallCurve};
 pub use rotated_box::{Region, RotatedBox};

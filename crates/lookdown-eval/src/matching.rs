@@ -16,79 +16,32 @@ pub enum Outcome {
     Ignored,
 }
 
-/// The rule that selects the person for a detection. Detections are processed by descending score.
+/// Returns the outcome of each detection of one image, in the order of `detections`. A match needs
+/// at least `min_iou` (`O_t`).
 ///
-/// In both rules a detection is ignored if it matches a person that does not count. It is also
+/// Detections are processed by descending score, as in `pycocotools`. The unmatched person of
+/// greatest IoU decides, of equal ones the last. Persons that do not count are considered only if
+/// no counting person qualifies. A detection is ignored if it matches such a person. It is also
 /// ignored if no person decides it and at least the threshold's share of its area is in an ignore
 /// region.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum MatchingRule {
-    /// PASCAL VOC (Everingham et al., IJCV 2010): the person of greatest IoU decides, of equal ones
-    /// the first. If it has another detection, this one is a duplicate, a false positive. A person
-    /// that does not count may be matched any number of times.
-    Voc,
-    /// COCO (as in `pycocotools`): the unmatched person of greatest IoU decides, of equal ones the
-    /// last. Persons that do not count are considered only if no counting person qualifies.
-    Coco,
-}
-
-impl MatchingRule {
-    /// Returns the outcome of each detection of one image, in the order of `detections`. A match
-    /// needs at least `min_iou` (`O_t`).
-    pub fn outcomes<B: Region>(
-        self,
-        detections: &[ScoredBox<B>],
-        truth: &GroundTruth<B>,
-        min_iou: f64,
-    ) -> Vec<Outcome> {
-        let min_iou = match self {
-            Self::Voc => min_iou,
-            Self::Coco => min_iou.min(1.0 - COCO_MARGIN),
-        };
-        let mut order: Vec<usize> = (0..detections.len()).collect();
-        order.sort_by(|a, b| detections[*b].score.total_cmp(&detections[*a].score));
-
-        let mut found = vec![false; truth.persons.len()];
-        let mut outcomes = vec![Outcome::FalsePositive; detections.len()];
-        for index in order {
-            let bbox = &detections[index].bbox;
-            outcomes[index] = match self {
-                Self::Voc => voc_outcome(bbox, truth, min_iou, &mut found),
-                Self::Coco => coco_outcome(bbox, truth, min_iou, &mut found),
-            };
-        }
-        outcomes
-    }
-}
-
-fn voc_outcome<B: Region>(
-    bbox: &B,
+pub fn outcomes<B: Region>(
+    detections: &[ScoredBox<B>],
     truth: &GroundTruth<B>,
     min_iou: f64,
-    found: &mut [bool],
-) -> Outcome {
-    let mut nearest = None;
-    let mut greatest = f64::NEG_INFINITY;
-    for (index, person) in truth.persons.iter().enumerate() {
-        let iou = bbox.iou(&person.outline);
-        if iou >= min_iou && iou > greatest {
-            greatest = iou;
-            nearest = Some(index);
-        }
+) -> Vec<Outcome> {
+    let min_iou = min_iou.min(1.0 - COCO_MARGIN);
+    let mut order: Vec<usize> = (0..detections.len()).collect();
+    order.sort_by(|a, b| detections[*b].score.total_cmp(&detections[*a].score));
+
+    let mut found = vec![false; truth.persons.len()];
+    let mut outcomes = vec![Outcome::FalsePositive; detections.len()];
+    for index in order {
+        outcomes[index] = outcome(&detections[index].bbox, truth, min_iou, &mut found);
     }
-    match nearest {
-        Some(person) if !truth.persons[person].counts => Outcome::Ignored,
-        Some(person) if found[person] => Outcome::FalsePositive,
-        Some(person) => {
-            found[person] = true;
-            Outcome::TruePositive
-        }
-        None if greatest_share_in_ignore_region(bbox, truth) >= min_iou => Outcome::Ignored,
-        None => Outcome::FalsePositive,
-    }
+    outcomes
 }
 
-fn coco_outcome<B: Region>(
+fn outcome<B: Region>(
     bbox: &B,
     truth: &GroundTruth<B>,
     min_iou: f64,

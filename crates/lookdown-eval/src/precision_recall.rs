@@ -2,7 +2,7 @@
 
 use std::num::NonZeroUsize;
 
-use super::{EvaluatedImage, MatchingRule, Outcome, Region};
+use super::{EvaluatedImage, Outcome, Region, matching::outcomes};
 
 /// Precision and recall over all images after each detection, by descending score. Detections of
 /// equal score are ordered by image, then by position.
@@ -28,14 +28,10 @@ pub struct OperatingPoint {
 impl PrecisionRecallCurve {
     /// Returns the curve at `O_t` = `min_iou`. `None` if no person counts, as recall is undefined
     /// then.
-    pub fn from_images<B: Region>(
-        images: &[EvaluatedImage<B>],
-        rule: MatchingRule,
-        min_iou: f64,
-    ) -> Option<Self> {
+    pub fn from_images<B: Region>(images: &[EvaluatedImage<B>], min_iou: f64) -> Option<Self> {
         let persons = images.iter().map(|image| image.truth.person_count()).sum();
         let outcomes = images.iter().flat_map(|image| {
-            let outcomes = rule.outcomes(&image.detections, &image.truth, min_iou);
+            let outcomes = outcomes(&image.detections, &image.truth, min_iou);
             let scores = image.detections.iter().map(|detection| detection.score);
             scores.zip(outcomes)
         });

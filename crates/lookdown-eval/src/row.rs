@@ -10,12 +10,9 @@ use lookdown_detect::{
 use lookdown_lens::geometry::OrientedBox;
 
 use super::{
-    Counts, DataSet, EvaluatedImage, MatchingRule, NoPersons, NoStrata, Outline,
-    PrecisionRecallCurve, ScoredBox, Stratification, Stratum, Summary,
+    Counts, DataSet, EvaluatedImage, NoPersons, NoStrata, Outline, PrecisionRecallCurve, ScoredBox,
+    Stratification, Stratum, Summary,
 };
-
-/// The rule that matches detections with the ground truth.
-const RULE: MatchingRule = MatchingRule::Coco;
 
 /// A person detected in an image of a data set.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -101,9 +98,9 @@ impl DetectedRow {
     /// [`NoPersons`] if no person counts.
     pub fn evaluate(&self, data_set: &DataSet) -> Result<EvaluatedRow, NoPersons> {
         let images = self.evaluated_images(data_set);
-        let curve = |min_iou| PrecisionRecallCurve::from_images(&images, RULE, min_iou);
+        let curve = |min_iou| PrecisionRecallCurve::from_images(&images, min_iou);
         Ok(EvaluatedRow {
-            summary: Summary::from_images(&images, RULE)?,
+            summary: Summary::from_images(&images)?,
             curve_at_50: curve(0.5).ok_or(NoPersons)?,
             curve_at_75: curve(0.75).ok_or(NoPersons)?,
         })
@@ -111,7 +108,7 @@ impl DetectedRow {
 
     /// Counts the persons of each image. The data set may have no persons.
     pub fn counts(&self, data_set: &DataSet) -> Counts {
-        Counts::from_images(&self.evaluated_images(data_set), RULE)
+        Counts::from_images(&self.evaluated_images(data_set))
     }
 
     /// Scores the row against the persons of each stratum of its data set.
@@ -121,7 +118,7 @@ impl DetectedRow {
     pub fn strata(&self, data_set: &DataSet, by: Stratification) -> Result<Vec<Stratum>, NoStrata> {
         let images = self.evaluated_images(data_set);
         let images: Vec<_> = data_set.images.iter().zip(&images).collect();
-        by.strata(&images, RULE)
+        by.strata(&images)
     }
 
     fn evaluated_images(&self, data_set: &DataSet) -> Vec<EvaluatedImage<Outline>> {

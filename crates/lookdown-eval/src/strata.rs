@@ -7,8 +7,8 @@
 use strum::{EnumString, IntoStaticStr, VariantArray};
 
 use super::{
-    AnnotatedPerson, AveragePrecision, DataSetImage, EvaluatedImage, GroundTruth, MatchingRule,
-    Outcome, Outline, PrecisionRecallCurve, ScoredBox,
+    AnnotatedPerson, AveragePrecision, DataSetImage, EvaluatedImage, GroundTruth, Outcome, Outline,
+    PrecisionRecallCurve, ScoredBox, matching::outcomes,
 };
 
 /// `O_t` of the figures.
@@ -81,7 +81,6 @@ impl Stratification {
     pub fn strata(
         self,
         images: &[(&DataSetImage, &EvaluatedImage<Outline>)],
-        rule: MatchingRule,
     ) -> Result<Vec<Stratum>, NoStrata> {
         let images: Vec<_> = images
             .iter()
@@ -97,7 +96,7 @@ impl Stratification {
             });
         }
         let ranges = self.ranges().iter();
-        Ok(ranges.map(|range| range.stratum(&images, rule)).collect())
+        Ok(ranges.map(|range| range.stratum(&images)).collect())
     }
 
     fn ranges(self) -> &'static [Range] {
@@ -186,14 +185,14 @@ impl Range {
         (self.from..self.until).contains(&value)
     }
 
-    fn stratum(&self, images: &[Measured<'_>], rule: MatchingRule) -> Stratum {
+    fn stratum(&self, images: &[Measured<'_>]) -> Stratum {
         let mut persons = 0;
-        let mut outcomes = Vec::new();
+        let mut scored = Vec::new();
         for measured in images {
             let truth = self.truth(measured);
             persons += truth.person_count();
             let detections = &measured.image.detections;
-            let of_image = rule.outcomes(detections, &truth, MIN_IOU);
+            let of_image = outcomes(detections, &truth, MIN_IOU);
             for ((detection, value), outcome) in
                 detections.iter().zip(&measured.detections).zip(of_image)
             {
@@ -203,10 +202,10 @@ impl Range {
                     Outcome::FalsePositive if elsewhere => Outcome::Ignored,
                     outcome => outcome,
                 };
-                outcomes.push((detection.score, outcome));
+                scored.push((detection.score, outcome));
             }
         }
-        let curve = PrecisionRecallCurve::from_outcomes(outcomes.into_iter(), persons);
+        let curve = PrecisionRecallCurve::from_outcomes(scored.into_iter(), persons);
         Stratum {
             name: self.name,
             persons,

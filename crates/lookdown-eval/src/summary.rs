@@ -1,6 +1,6 @@
 //! The figures of a whole data set.
 
-use super::{AveragePrecision, EvaluatedImage, MatchingRule, PrecisionRecallCurve, Region};
+use super::{AveragePrecision, EvaluatedImage, PrecisionRecallCurve, Region};
 
 /// No person counts in any image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -33,17 +33,13 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// Returns the figures of `images`, matched by `rule`.
+    /// Returns the figures of `images`, matched as in `pycocotools`.
     ///
     /// # Errors
     /// [`NoPersons`] if no person counts.
-    pub fn from_images<B: Region>(
-        images: &[EvaluatedImage<B>],
-        rule: MatchingRule,
-    ) -> Result<Self, NoPersons> {
+    pub fn from_images<B: Region>(images: &[EvaluatedImage<B>]) -> Result<Self, NoPersons> {
         let curve_at = |percent: u8| {
-            PrecisionRecallCurve::from_images(images, rule, f64::from(percent) / 100.0)
-                .ok_or(NoPersons)
+            PrecisionRecallCurve::from_images(images, f64::from(percent) / 100.0).ok_or(NoPersons)
         };
         let average_at = |percent| Ok(curve_at(percent)?.average_precision());
         let at_50 = curve_at(50)?;

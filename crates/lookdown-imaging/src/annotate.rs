@@ -18,7 +18,7 @@ use super::frame::Frame;
 pub use area_sketch::{
     ZoneOutline, sketch_areas, sketch_foot_filter, sketch_line_outlines, sketch_lines,
 };
-use canvas::{Outline, Rgb, Stroke};
+use canvas::{Rgb, Stroke};
 pub use caption::Caption;
 pub use conceal::{Concealment, conceal};
 pub use effort::Cancelled;
@@ -130,13 +130,13 @@ pub fn annotate_unless(
             continue;
         };
         let shadow_width = line_width + 2.0 * (0.5 * line_width).max(1.2);
-        let shadow = Outline::new(main, shadow_width);
+        let shadow = Stroke::around(main, shadow_width);
         effort.spend(shadow.draw(frame, SHADOW, SHADOW_OPACITY));
         if let (Some(_), Some(aligned)) = (oriented, aligned) {
-            let thin = Outline::new(aligned, line_width * 0.4);
+            let thin = Stroke::around(aligned, line_width * 0.4);
             effort.spend(thin.draw(frame, *color, THIN_OPACITY));
         }
-        effort.spend(Outline::new(main, line_width).draw(frame, *color, 1.0));
+        effort.spend(Stroke::around(main, line_width).draw(frame, *color, 1.0));
     }
     let caption = caption::draw(frame, &drawing.caption);
     let names: Vec<_> = drawing.zones.iter().filter_map(ZoneOutline::mark).collect();

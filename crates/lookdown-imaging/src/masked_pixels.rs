@@ -6,7 +6,7 @@ use std::ops::Range;
 use lookdown_lens::{
     geometry::{
         Pixel, Polygon,
-        pixels::{PixelConvention, cross_half_pixel},
+        pixels::to_corner_origin,
         polygon::{Edge, crossing},
     },
     saturating::to_u32,
@@ -61,7 +61,7 @@ impl MaskedPixels {
 
     /// Returns true if the pixel that contains a position (pixel centers) is masked.
     pub fn hides_position(&self, position: Pixel) -> bool {
-        let position = cross_half_pixel(position, PixelConvention::CornerOrigin);
+        let position = to_corner_origin(position);
         position.x >= 0.0
             && position.y >= 0.0
             && self.hides(to_u32(position.x.floor()), to_u32(position.y.floor()))

@@ -13,6 +13,7 @@ pub mod foot_filter;
 pub mod footprint;
 pub mod frame_crop;
 pub mod height_ratio;
+pub mod hull;
 pub mod lens;
 pub mod mount;
 pub mod oriented_box;

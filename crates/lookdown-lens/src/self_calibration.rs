@@ -26,8 +26,9 @@ mod visible_people;
 
 pub use camera_height::{CameraHeight, HeightRefusal};
 pub use edge_curve::EdgeCurve;
-pub use fit::{CLEARLY_EXPLAINED, CircleGuess, RoomFit};
+pub use fit::{CLEARLY_EXPLAINED, RoomFit};
 pub use known_camera::{FieldOfView, FieldOfViewError, IdealLens, KnownCamera};
 pub use level_from_people::LevelFromPeople;
+pub use prior::CircleGuess;
 pub use refusal::FitRefusal;
 pub use uncertainty::FitUncertainty;

@@ -4,10 +4,7 @@ use std::sync::Arc;
 
 use lookdown_calibration::Calibration;
 use lookdown_detect::pipeline::PlannedView;
-use lookdown_lens::geometry::{
-    Pixel,
-    pixels::{PixelConvention, cross_half_pixel},
-};
+use lookdown_lens::geometry::{Pixel, pixels::to_pixel_center};
 use numpy::ndarray::{Array2, arr1, arr2};
 use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
@@ -60,7 +57,7 @@ impl PyView {
         let corner_origin = &self.planned.outline;
         let pixels: Vec<_> = corner_origin
             .iter()
-            .map(|&at| cross_half_pixel(at, PixelConvention::PixelCenter))
+            .map(|&at| to_pixel_center(at))
             .map(|at| [at.x, at.y])
             .collect();
         arr2(&pixels).into_pyarray(py)

@@ -6,15 +6,11 @@
 
 use std::collections::BTreeMap;
 
+use lookdown_lens::geometry::polygon;
 use nalgebra::{Point2, Vector2};
 use serde::{Deserialize, Serialize};
 
 use crate::{Plane, TailPoint, Track, TrackId};
-
-/// Most points of a line.
-pub const MAX_LINE_POINTS: usize = 64;
-/// Most lines of a counter.
-pub const MAX_LINES: usize = 64;
 
 /// The direction of a crossing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -34,7 +30,7 @@ pub struct Line {
     pub name: String,
     /// The plane of the points.
     pub plane: Plane,
-    /// The points in order, 2 to [`MAX_LINE_POINTS`].
+    /// The points in order, at least 2.
     pub points: Vec<[f64; 2]>,
     /// Half the width of the hysteresis band, in the unit of the plane: meters or pixels.
     pub band: f64,
@@ -55,11 +51,6 @@ pub struct Crossing {
     /// Time at which the person was beyond the band, seconds since the Unix epoch.
     pub at_s: f64,
 }
-
-/// Lines that cannot be counted.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{0}")]
-pub struct LineError(String);
 
 /// The lines over the tracks of one tracker.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -89,28 +80,12 @@ struct Approach {
 }
 
 impl LineCounter {
-    /// Returns a counter of these lines.
-    ///
-    /// # Errors
-    /// [`LineError`] for a line that cannot be counted.
-    pub fn new(lines: Vec<Line>) -> Result<Self, LineError> {
-        Self::resumed(lines, LineState::default())
-    }
-
-    /// Returns a counter of the lines that `state` was kept for.
-    ///
-    /// # Errors
-    /// [`LineError`] for a line that cannot be counted.
-    pub fn resumed(lines: Vec<Line>, mut state: LineState) -> Result<Self, LineError> {
-        if lines.len() > MAX_LINES {
-            let problem = format!("there are {} lines: give at most {MAX_LINES}", lines.len());
-            return Err(LineError(problem));
-        }
-        lines.iter().try_for_each(Line::check)?;
+    /// Returns a counter of the lines that `state` was kept for, or with an empty one a new counter.
+    pub fn new(lines: Vec<Line>, mut state: LineState) -> Self {
         state
             .tracks
             .retain(|_, approaches| approaches.len() == lines.len());
-        Ok(Self { lines, state })
+        Self { lines, state }
     }
 
     /// Returns the crossings since the last call. `tracks` are all confirmed tracks of the tracker,
@@ -175,24 +150,6 @@ impl Approach {
     }
 }
 
-impl Line {
-    fn check(&self) -> Result<(), LineError> {
-        let (count, band) = (self.points.len(), self.band);
-        let problem = if !(2..=MAX_LINE_POINTS).contains(&count) {
-            format!("has {count} points: give 2 to {MAX_LINE_POINTS}")
-        } else if !self.points.iter().flatten().all(|part| part.is_finite()) {
-            "has a coordinate that is not finite: give numbers".to_owned()
-        } else if self.points.windows(2).any(|pair| pair[0] == pair[1]) {
-            "has the same point twice in a row: leave one out".to_owned()
-        } else if !(band > 0.0 && band.is_finite()) {
-            format!("has the band {band}: give a number above 0")
-        } else {
-            return Ok(());
-        };
-        Err(LineError(format!("line `{}` {problem}", self.name)))
-    }
-}
-
 /// Returns the crossings of the step `from` – `to` through the polyline to the right-hand side of a
 /// walk along it (x right, y down), minus those to the left.
 ///
@@ -217,23 +174,17 @@ fn signed_crossings(points: &[[f64; 2]], from: [f64; 2], to: [f64; 2]) -> i32 {
 
 /// Returns true when `point` lies to the right of a walk from `start` to `end`.
 fn is_right(start: [f64; 2], end: [f64; 2], point: [f64; 2]) -> bool {
-    let along = Vector2::from(end) - Vector2::from(start);
-    let to_point = Vector2::from(point) - Vector2::from(start);
-    along.perp(&to_point) > 0.0
+    let [start, end, point] = [start, end, point].map(Vector2::from);
+    (end - start).perp(&(point - start)) > 0.0
 }
 
 /// Returns the distance of a point from the polyline, its ends included.
 fn distance(points: &[[f64; 2]], point: [f64; 2]) -> f64 {
-    let point = Point2::from(point);
-    let segments = points.windows(2);
-    segments
-        .map(|pair| {
-            let start = Point2::from(pair[0]);
-            let along = Point2::from(pair[1]) - start;
-            let share = (point - start).dot(&along) / along.norm_squared();
-            (point - (start + along * share.clamp(0.0, 1.0))).norm()
-        })
-        .fold(f64::INFINITY, f64::min)
+    let edges = points
+        .windows(2)
+        .map(|pair| [pair[0], pair[1]].map(Point2::from));
+    let distances = edges.map(|edge| polygon::distance(edge, point.into()));
+    distances.fold(f64::INFINITY, f64::min)
 }
 
 #[cfg(test)]

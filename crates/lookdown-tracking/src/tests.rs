@@ -22,7 +22,7 @@ fn walk(tracker: &mut Tracker, frames: std::ops::Range<u32>, seen: impl Fn(u32) 
         let at_s = f64::from(frame) / 5.0;
         let persons = [person(at_s - 3.0, 1.0)];
         let persons = if seen(frame) { &persons[..] } else { &[] };
-        tracker.update(0, at_s, persons).unwrap();
+        tracker.update(f64::INFINITY, 0, at_s, persons).unwrap();
     }
 }
 
@@ -53,7 +53,9 @@ fn person_who_sits_keeps_the_track_after_a_minute() {
             let persons = [person(place, 1.0)];
             let is_missed = (10..70).contains(&second);
             let shown = if is_missed { &[] } else { &persons[..] };
-            tracker.update(0, f64::from(second), shown).unwrap();
+            tracker
+                .update(f64::INFINITY, 0, f64::from(second), shown)
+                .unwrap();
         }
         assert_eq!(ids(&tracker), [id], "{x}");
     }
@@ -65,7 +67,11 @@ fn a_track_ends_when_its_person_is_gone() {
     walk(&mut tracker, 0..10, |_| true);
     let mut ended = Vec::new();
     for frame in 10..40 {
-        ended.extend(tracker.update(0, f64::from(frame) / 5.0, &[]).unwrap());
+        ended.extend(
+            tracker
+                .update(f64::INFINITY, 0, f64::from(frame) / 5.0, &[])
+                .unwrap(),
+        );
     }
     assert_eq!(ended.len(), 1);
     assert_eq!(ended[0].seen_s, 9.0 / 5.0);
@@ -75,7 +81,9 @@ fn a_track_ends_when_its_person_is_gone() {
 #[test]
 fn a_single_detection_confirms_no_track() {
     let mut tracker = floor_tracker();
-    tracker.update(0, 0.0, &[person(1.0, 1.0)]).unwrap();
+    tracker
+        .update(f64::INFINITY, 0, 0.0, &[person(1.0, 1.0)])
+        .unwrap();
     assert_eq!(ids(&tracker), [0; 0]);
 }
 
@@ -85,14 +93,18 @@ fn low_scores_continue_tracks_but_start_none() {
     let low = |at_s: f64| with_score(at_s - 3.0, 1.0, 0.2);
     for frame in 0..20 {
         let at_s = f64::from(frame) / 5.0;
-        tracker.update(0, at_s, &[low(at_s)]).unwrap();
+        tracker
+            .update(f64::INFINITY, 0, at_s, &[low(at_s)])
+            .unwrap();
     }
     assert_eq!(ids(&tracker), [0; 0]);
     let mut tracker = floor_tracker();
     walk(&mut tracker, 0..10, |_| true);
     for frame in 10..15 {
         let at_s = f64::from(frame) / 5.0;
-        tracker.update(0, at_s, &[low(at_s)]).unwrap();
+        tracker
+            .update(f64::INFINITY, 0, at_s, &[low(at_s)])
+            .unwrap();
     }
     assert_eq!(tracker.tracks().next().unwrap().seen_s, 14.0 / 5.0);
 }
@@ -105,7 +117,7 @@ fn a_weak_thing_that_stands_still_is_no_person() {
         let at_s = f64::from(frame) / 5.0;
         // A poster, now and then as clear as a person.
         let poster = with_score(2.0, 2.0, if frame % 10 == 0 { 0.6 } else { 0.3 });
-        ended.extend(tracker.update(0, at_s, &[poster]).unwrap());
+        ended.extend(tracker.update(f64::INFINITY, 0, at_s, &[poster]).unwrap());
         assert_eq!(ids(&tracker), [0; 0], "{at_s}");
     }
     assert_eq!(ended, []);
@@ -117,7 +129,7 @@ fn a_weak_person_who_walks_is_one() {
     for frame in 0..30 {
         let at_s = f64::from(frame) / 5.0;
         let person = with_score(at_s - 3.0, 1.0, 0.36);
-        tracker.update(0, at_s, &[person]).unwrap();
+        tracker.update(f64::INFINITY, 0, at_s, &[person]).unwrap();
     }
     assert_eq!(ids(&tracker), [1]);
 }
@@ -131,7 +143,7 @@ fn a_track_that_stays_on_a_weak_thing_ends() {
     for frame in 15..150 {
         let at_s = f64::from(frame) / 5.0;
         let poster = with_score(-0.2, 1.0, 0.2);
-        ended.extend(tracker.update(0, at_s, &[poster]).unwrap());
+        ended.extend(tracker.update(f64::INFINITY, 0, at_s, &[poster]).unwrap());
     }
     assert_eq!(ended.len(), 1);
     assert_eq!(ids(&tracker), [0; 0]);
@@ -143,7 +155,7 @@ fn persons_who_pass_each_other_keep_their_tracks() {
     for frame in 0..30 {
         let at_s = f64::from(frame) / 5.0;
         let persons = [person(at_s - 3.0, 0.4), person(3.0 - at_s, -0.4)];
-        tracker.update(0, at_s, &persons).unwrap();
+        tracker.update(f64::INFINITY, 0, at_s, &persons).unwrap();
     }
     let places: Vec<_> = tracker.tracks().map(floor_of).collect();
     assert_eq!(places.len(), 2);
@@ -158,7 +170,7 @@ fn without_a_height_persons_are_tracked_by_bearing() {
     for frame in 0..30 {
         let at_s = f64::from(frame) / 5.0;
         tracker
-            .update(0, at_s, &[person(at_s - 3.0, 0.01)])
+            .update(f64::INFINITY, 0, at_s, &[person(at_s - 3.0, 0.01)])
             .unwrap();
     }
     assert_eq!(ids(&tracker), [1]);
@@ -180,8 +192,11 @@ fn refused_reports_change_nothing() {
     walk(&mut tracker, 0..10, |_| true);
     let before = tracker.clone();
     let persons = [person(0.0, 0.0)];
-    let refused =
-        |tracker: &mut Tracker, camera, at_s| tracker.update(camera, at_s, &persons).unwrap_err();
+    let refused = |tracker: &mut Tracker, camera, at_s| {
+        tracker
+            .update(f64::INFINITY, camera, at_s, &persons)
+            .unwrap_err()
+    };
     assert_eq!(
         refused(&mut tracker, 1, 9.0),
         RefusedReport::UnknownCamera(1)
@@ -204,7 +219,9 @@ fn persons_without_finite_numbers_are_ignored() {
                 ..person(0.0, 0.0)
             },
         ];
-        tracker.update(0, f64::from(frame), &persons).unwrap();
+        tracker
+            .update(f64::INFINITY, 0, f64::from(frame), &persons)
+            .unwrap();
     }
     assert_eq!(ids(&tracker), [0; 0]);
 }
@@ -272,7 +289,12 @@ fn a_person_under_two_cameras_is_one_track() {
         let at_s = f64::from(u32::try_from(frame).unwrap()) / 10.0;
         let place = [at_s - 2.0, 0.5];
         tracker
-            .update(camera, at_s, &[seen_by(&poses[camera], place)])
+            .update(
+                f64::INFINITY,
+                camera,
+                at_s,
+                &[seen_by(&poses[camera], place)],
+            )
             .unwrap();
     }
     assert_eq!(ids(&tracker), [1]);
@@ -288,7 +310,12 @@ fn cameras_that_place_a_person_apart_make_one_track() {
         let at_s = f64::from(u32::try_from(frame).unwrap()) / 5.0;
         let place = if camera == 0 { [0.0, 0.0] } else { [-1.0, 0.0] };
         tracker
-            .update(camera, at_s, &[seen_by(&poses[camera], place)])
+            .update(
+                f64::INFINITY,
+                camera,
+                at_s,
+                &[seen_by(&poses[camera], place)],
+            )
             .unwrap();
         assert!(ids(&tracker).iter().all(|&id| id == 1), "{frame}");
     }
@@ -306,7 +333,7 @@ fn a_confirmed_track_ends_after_max_unseen_s() {
         let at_s = f64::from(frame) / 5.0;
         let persons = [person(1.0, 1.0)];
         let shown = if at_s <= 2.0 { &persons[..] } else { &[] };
-        tracker.update(0, at_s, shown).unwrap();
+        tracker.update(f64::INFINITY, 0, at_s, shown).unwrap();
         let remains = (0.5..=8.0).contains(&at_s);
         assert!(ids(&tracker).is_empty() != remains || at_s < 0.5, "{at_s}");
     }
@@ -319,20 +346,31 @@ fn reports_of_another_camera_may_be_late() {
         let at_s = f64::from(frame) / 5.0;
         let place = |at_s: f64| [at_s - 2.0, 0.5];
         tracker
-            .update(0, at_s, &[seen_by(&poses[0], place(at_s))])
+            .update(f64::INFINITY, 0, at_s, &[seen_by(&poses[0], place(at_s))])
             .unwrap();
         let late_s = at_s - 0.7;
         tracker
-            .update(1, late_s, &[seen_by(&poses[1], place(late_s))])
+            .update(
+                f64::INFINITY,
+                1,
+                late_s,
+                &[seen_by(&poses[1], place(late_s))],
+            )
             .unwrap();
     }
     assert_eq!(ids(&tracker), [1]);
     let [x, _] = floor_of(tracker.tracks().next().unwrap());
     assert!((x - 1.8).abs() < 0.2, "{x}");
-    assert_eq!(tracker.update(1, 0.9, &[]), Err(RefusedReport::OutOfOrder));
+    assert_eq!(
+        tracker.update(f64::INFINITY, 1, 0.9, &[]),
+        Err(RefusedReport::OutOfOrder)
+    );
     let (mut tracker, _) = site();
-    tracker.update(0, 100.0, &[]).unwrap();
-    assert_eq!(tracker.update(1, 50.0, &[]), Err(RefusedReport::Late(50.0)));
+    tracker.update(f64::INFINITY, 0, 100.0, &[]).unwrap();
+    assert_eq!(
+        tracker.update(f64::INFINITY, 1, 50.0, &[]),
+        Err(RefusedReport::Late(50.0))
+    );
 }
 
 #[test]
@@ -346,12 +384,19 @@ fn only_tracks_in_sight_of_a_camera_are_missed() {
     let mut tracker = Tracker::new(&poses, TrackerSettings::default()).unwrap();
     for frame in 0..10 {
         tracker
-            .update(0, f64::from(frame) / 5.0, &[person(1.0, 1.0)])
+            .update(
+                f64::INFINITY,
+                0,
+                f64::from(frame) / 5.0,
+                &[person(1.0, 1.0)],
+            )
             .unwrap();
     }
     // The first camera stalls; the other one reports an empty floor far away.
     for frame in 10..40 {
-        tracker.update(1, f64::from(frame) / 5.0, &[]).unwrap();
+        tracker
+            .update(f64::INFINITY, 1, f64::from(frame) / 5.0, &[])
+            .unwrap();
     }
     assert_eq!(ids(&tracker), [1]);
 }
@@ -367,7 +412,7 @@ fn tracks_and_their_histories_are_bounded() {
         let at_s = f64::from(frame) / 5.0;
         let places = (0..320).map(|n| person(f64::from(n % 20) - 10.0, f64::from(n / 20) - 10.0));
         tracker
-            .update(0, at_s, &places.collect::<Vec<_>>())
+            .update(f64::INFINITY, 0, at_s, &places.collect::<Vec<_>>())
             .unwrap();
     }
     assert_eq!(tracker.tracks().count(), 20);
@@ -393,11 +438,11 @@ proptest! {
         for (frame, persons) in (0_u32..).zip(&frames) {
             let at_s = f64::from(frame) / 2.0;
             let persons: Vec<_> = persons.iter().map(|&(x, y, s)| with_score(x, y, s)).collect();
-            straight.update(0, at_s, &persons).unwrap();
+            straight.update(f64::INFINITY, 0, at_s, &persons).unwrap();
             let mut other = persons.clone();
             other.rotate_left(turn % persons.len().max(1));
             other.reverse();
-            shuffled.update(0, at_s, &other).unwrap();
+            shuffled.update(f64::INFINITY, 0, at_s, &other).unwrap();
             let states = |tracker: &Tracker| -> Vec<_> {
                 let tracks = tracker.tracks();
                 tracks.map(|t| (t.id, t.place(Plane::FloorM), t.velocity_m_s(), t.seen_s)).collect()
@@ -416,7 +461,7 @@ proptest! {
         let mut ended = std::collections::BTreeSet::new();
         for (frame, (x, y)) in (0_u32..).zip(places) {
             let persons = [person(x, y)];
-            for track in tracker.update(0, f64::from(frame), &persons).unwrap() {
+            for track in tracker.update(f64::INFINITY, 0, f64::from(frame), &persons).unwrap() {
                 ended.insert(track.id.0);
             }
             let present = ids(&tracker);

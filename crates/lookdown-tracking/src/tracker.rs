@@ -121,19 +121,6 @@ impl Tracker {
         Some(&mut self.cameras.get_mut(camera)?.furniture)
     }
 
-    /// Updates the tracks as [`Tracker::update_after`] does, with the time between the reports.
-    ///
-    /// # Errors
-    /// As for [`Tracker::update_after`].
-    pub fn update(
-        &mut self,
-        camera: usize,
-        at_s: f64,
-        persons: &[Observation],
-    ) -> Result<Vec<Track>, RefusedReport> {
-        self.update_after(f64::INFINITY, camera, at_s, persons)
-    }
-
     /// Updates the tracks with the persons of one frame of the camera number `camera`, captured at
     /// `at_s` (seconds since the Unix epoch). Returns the confirmed tracks that ended.
     ///
@@ -146,7 +133,7 @@ impl Tracker {
     /// # Errors
     /// [`RefusedReport`] for an unknown camera, a time that is not finite, or a report that is too
     /// old. Nothing changes then.
-    pub fn update_after(
+    pub fn update(
         &mut self,
         elapsed_s: f64,
         camera: usize,

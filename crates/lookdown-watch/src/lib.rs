@@ -32,7 +32,7 @@ pub use camera::{Camera, Transport, VideoOptions};
 pub use config::{CameraEntry, MAX_CAMERAS, WatchEntry, WatchOptions};
 pub use credentials::Credentials;
 pub use frame::{Frame, FrameError, ImageFormat, MAX_FRAME_BYTES};
-pub use location::{InvalidLocation, Location};
+pub use location::Location;
 pub use metrics::{CameraState, Metrics};
 pub use metrics_server::serve_metrics;
 pub use operating_point::{Choice, OperatingPoints};

@@ -22,40 +22,21 @@ pub enum Location {
     StandardInput,
 }
 
-/// The reason why a text is not a location. The text is not repeated: it may hold a password.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum InvalidLocation {
-    /// Not a URL.
-    #[error(
-        "it is not a valid URL: give it as scheme://host/path, with special characters percent-encoded"
-    )]
-    InvalidUrl,
-    /// An unknown scheme.
-    #[error(
-        "its scheme is unknown: use http, https, rtsp or rtsps, a folder, a video file, or - for standard input"
-    )]
-    UnknownScheme,
-    /// No such file.
-    #[error(
-        "there is no such file or folder: give a URL with its scheme, an existing path, or - for standard input"
-    )]
-    NoSuchFile,
-    /// A pipe, a socket or a device.
-    #[error("it is not a regular file or a folder: give a file, a folder, or - for a pipe")]
-    NotAFile,
-}
+const INVALID_URL: &str = "it is not a valid URL: give it as scheme://host/path, with special \
+                           characters percent-encoded";
 
 impl Location {
     /// Parses a location, and separates the credentials of a URL.
     ///
     /// # Errors
-    /// [`InvalidLocation`].
-    pub fn parse(text: &str) -> Result<(Self, Option<Credentials>), InvalidLocation> {
+    /// The reason why the text is not a location. It does not repeat the text, which may hold a
+    /// password.
+    pub fn parse(text: &str) -> Result<(Self, Option<Credentials>), &'static str> {
         if text == "-" {
             return Ok((Self::StandardInput, None));
         }
         if text.contains("://") {
-            let url = Url::parse(text).map_err(|_| InvalidLocation::InvalidUrl)?;
+            let url = Url::parse(text).map_err(|_| INVALID_URL)?;
             return Self::from_url(url);
         }
         let path = PathBuf::from(text);
@@ -64,13 +45,16 @@ impl Location {
         } else if path.is_file() {
             Ok((Self::Video(path), None))
         } else if path.exists() {
-            Err(InvalidLocation::NotAFile)
+            Err("it is not a regular file or a folder: give a file, a folder, or - for a pipe")
         } else {
-            Err(InvalidLocation::NoSuchFile)
+            Err(
+                "there is no such file or folder: give a URL with its scheme, an existing path, or - \
+                 for standard input",
+            )
         }
     }
 
-    fn from_url(mut url: Url) -> Result<(Self, Option<Credentials>), InvalidLocation> {
+    fn from_url(mut url: Url) -> Result<(Self, Option<Credentials>), &'static str> {
         let decoded = |text: &str| percent_decode_str(text).decode_utf8_lossy().into_owned();
         let credentials = match (url.username(), url.password()) {
             ("", None) => None,
@@ -80,14 +64,19 @@ impl Location {
             }),
         };
         if url.host().is_none() {
-            return Err(InvalidLocation::InvalidUrl);
+            return Err(INVALID_URL);
         }
         // A URL with a host can have or lose both.
         let _ = (url.set_username(""), url.set_password(None));
         let location = match url.scheme() {
             "http" | "https" => Self::Http(url),
             "rtsp" | "rtsps" => Self::Rtsp(url),
-            _ => return Err(InvalidLocation::UnknownScheme),
+            _ => {
+                return Err(
+                    "its scheme is unknown: use http, https, rtsp or rtsps, a folder, a video file, or \
+                     - for standard input",
+                );
+            }
         };
         Ok((location, credentials))
     }
@@ -156,9 +145,13 @@ mod tests {
             parse(file.to_str().unwrap()),
             Ok(Location::Video(_))
         ));
-        assert_eq!(parse("/dev/null"), Err(InvalidLocation::NotAFile));
-        assert_eq!(parse("/nowhere"), Err(InvalidLocation::NoSuchFile));
-        assert_eq!(parse("ftp://camera/x"), Err(InvalidLocation::UnknownScheme));
-        assert_eq!(parse("rtsp://"), Err(InvalidLocation::InvalidUrl));
+        for (text, problem) in [
+            ("/dev/null", "it is not a regular file"),
+            ("/nowhere", "there is no such file or folder"),
+            ("ftp://camera/x", "its scheme is unknown"),
+            ("rtsp://", "it is not a valid URL"),
+        ] {
+            assert!(parse(text).unwrap_err().starts_with(problem), "{text}");
+        }
     }
 }

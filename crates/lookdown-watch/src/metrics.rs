@@ -68,16 +68,12 @@ pub(crate) struct CameraMetrics {
     /// Frames without a report, in the order of the reasons.
     failed: Vec<IntCounter>,
     pub(crate) reconnects: IntCounter,
-    /// The source, without credentials.
-    source: String,
-    rate: Mutex<Option<Rate>>,
-    choice: Mutex<Option<Choice>>,
-    warning: Mutex<Option<String>>,
-    problem: Mutex<Option<String>>,
+    /// The state, without the age of the last frame.
+    state: Mutex<CameraState>,
 }
 
 /// The state of a camera.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct CameraState {
     /// Its name.
     pub name: String,
@@ -124,11 +120,11 @@ impl Metrics {
             skipped: of(&series.skipped),
             failed: failed.collect(),
             reconnects: of(&series.reconnects),
-            source,
-            rate: Mutex::default(),
-            choice: Mutex::default(),
-            warning: Mutex::default(),
-            problem: Mutex::default(),
+            state: Mutex::new(CameraState {
+                name: camera.to_owned(),
+                source,
+                ..CameraState::default()
+            }),
         });
         let mut cameras = self.cameras.lock();
         cameras.retain(|other| other.camera != camera);
@@ -164,16 +160,12 @@ impl Metrics {
     pub fn states(&self) -> Vec<CameraState> {
         let cameras = self.cameras.lock();
         let states = cameras.iter().map(|camera| {
-            let choice = camera.choice.lock().clone();
-            let warning = camera.warning.lock().clone();
+            let state = camera.state.lock().clone();
+            let of_choice = state.choice.as_ref().and_then(Choice::warning);
             CameraState {
-                name: camera.camera.clone(),
-                source: camera.source.clone(),
                 last_frame_age: camera.last_frame.lock().elapsed(),
-                rate: *camera.rate.lock(),
-                warning: warning.or_else(|| choice.as_ref()?.warning()),
-                choice,
-                problem: camera.problem.lock().clone(),
+                warning: state.warning.or(of_choice),
+                ..state
             }
         });
         states.collect()
@@ -196,7 +188,7 @@ impl Metrics {
 impl CameraMetrics {
     pub(crate) fn received(&self, frame: &Frame) {
         *self.last_frame.lock() = frame.received;
-        *self.problem.lock() = None;
+        self.state.lock().problem = None;
         self.received.inc();
         self.viewers.offer(&self.camera, frame);
     }
@@ -220,13 +212,13 @@ impl CameraMetrics {
 
     /// Stores the rate of a minute.
     pub(crate) fn measured(&self, rate: Rate, warning: Option<String>) {
-        *self.rate.lock() = Some(rate);
-        *self.warning.lock() = warning;
+        let mut state = self.state.lock();
+        (state.rate, state.warning) = (Some(rate), warning);
     }
 
     /// Stores the profile and the rate in use. Logs a change.
     pub(crate) fn chose(&self, choice: Choice) {
-        let mut last = self.choice.lock();
+        let last = &mut self.state.lock().choice;
         if last.as_ref().is_none_or(|last| !last.is_same(&choice)) {
             tracing::info!("{choice}");
         }
@@ -235,7 +227,7 @@ impl CameraMetrics {
 
     /// Stores the reason why the source gives no frames.
     pub(crate) fn ended(&self, problem: &str) {
-        *self.problem.lock() = Some(problem.to_owned());
+        self.state.lock().problem = Some(problem.to_owned());
     }
 }
 

@@ -115,7 +115,7 @@ impl Relay {
         let relay = async {
             loop {
                 let mut to_ffmpeg = BytesMut::new();
-                while let Some(unit) = next_unit(&mut from_ffmpeg).map_err(too_long)? {
+                while let Some(unit) = next_unit(&mut from_ffmpeg)? {
                     match unit {
                         Unit::Packet(packet) => to_camera.extend_from_slice(&packet),
                         Unit::Message(message) => {
@@ -123,7 +123,7 @@ impl Relay {
                         }
                     }
                 }
-                while let Some(unit) = next_unit(&mut from_camera).map_err(too_long)? {
+                while let Some(unit) = next_unit(&mut from_camera)? {
                     match unit {
                         Unit::Packet(packet) => to_ffmpeg.extend_from_slice(&packet),
                         Unit::Message(message) => {
@@ -179,10 +179,6 @@ impl Relay {
             Ok(()) => std::future::pending().await,
         }
     }
-}
-
-fn too_long(error: message::TooLong) -> SourceError {
-    SourceError::Stream(error.to_string())
 }
 
 async fn connect(url: &Url) -> std::io::Result<(Box<dyn Connection>, IpAddr)> {

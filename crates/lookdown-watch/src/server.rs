@@ -6,7 +6,7 @@ use std::{
 };
 
 use lookdown_common::{ClientError, ServerClient, ServerOptions, read_body, retry_after};
-use reqwest::{Response, StatusCode, Url, header::CONTENT_TYPE};
+use reqwest::{Method, Response, StatusCode, Url, header::CONTENT_TYPE};
 use serde::Deserialize;
 
 use crate::{Camera, Frame, operating_point::FinishedSearch};
@@ -77,7 +77,10 @@ impl Server {
             .extend_pairs(profile.map(|profile| ("profile", profile)))
             .append_pair("captured_at", &frame.captured_at.to_string());
         let began = Instant::now();
-        let request = self.client.post(url).timeout(REPORT_TIMEOUT);
+        let request = self
+            .client
+            .request(Method::POST, url)
+            .timeout(REPORT_TIMEOUT);
         let request = request.header(CONTENT_TYPE, frame.format.media_type());
         match self.client.send(request.body(frame.image.clone())).await {
             Ok(response) => self.answer(response, began).await,

@@ -1,5 +1,7 @@
 //! A place for one value, in which the newest value replaces the one before.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use parking_lot::Mutex;
 use tokio::sync::Notify;
 
@@ -7,23 +9,16 @@ use tokio::sync::Notify;
 /// never delays the writer.
 #[derive(Debug)]
 pub(crate) struct Slot<T> {
-    content: Mutex<Content<T>>,
+    value: Mutex<Option<T>>,
+    is_closed: AtomicBool,
     changed: Notify,
-}
-
-#[derive(Debug)]
-struct Content<T> {
-    value: Option<T>,
-    is_closed: bool,
 }
 
 impl<T> Default for Slot<T> {
     fn default() -> Self {
         Self {
-            content: Mutex::new(Content {
-                value: None,
-                is_closed: false,
-            }),
+            value: Mutex::default(),
+            is_closed: AtomicBool::default(),
             changed: Notify::new(),
         }
     }
@@ -32,19 +27,19 @@ impl<T> Default for Slot<T> {
 impl<T> Slot<T> {
     /// Stores a value. Returns the value that it replaces.
     pub(crate) fn put(&self, value: T) -> Option<T> {
-        let replaced = self.content.lock().value.replace(value);
+        let replaced = self.value.lock().replace(value);
         self.changed.notify_one();
         replaced
     }
 
     /// Drops the value.
     pub(crate) fn clear(&self) {
-        self.content.lock().value = None;
+        *self.value.lock() = None;
     }
 
     /// Announces that no value follows.
     pub(crate) fn close(&self) {
-        self.content.lock().is_closed = true;
+        self.is_closed.store(true, Ordering::Release);
         self.changed.notify_one();
     }
 
@@ -53,14 +48,11 @@ impl<T> Slot<T> {
     pub(crate) async fn take(&self) -> Option<T> {
         loop {
             let changed = self.changed.notified();
-            {
-                let mut content = self.content.lock();
-                if let Some(value) = content.value.take() {
-                    return Some(value);
-                }
-                if content.is_closed {
-                    return None;
-                }
+            // Read before the value: no value follows then.
+            let is_closed = self.is_closed.load(Ordering::Acquire);
+            let value = self.value.lock().take();
+            if value.is_some() || is_closed {
+                return value;
             }
             changed.await;
         }

@@ -2,7 +2,7 @@
 
 use lookdown_tracking::{
     CameraPose, Observation, Plane, Track, TrackId, Tracker, TrackerSettings, Walk,
-    lines::{Crossing, DEFAULT_BAND_M, Direction, Line, LineCounter},
+    lines::{Crossing, DEFAULT_BAND_M, Direction, Line, LineCounter, LineState},
     relative_pose,
 };
 use nalgebra::Vector2;
@@ -91,7 +91,7 @@ impl Follower {
     fn new(poses: &[CameraPose], line: Line, settings: &TrackerSettings) -> Self {
         Self {
             tracker: Tracker::new(poses, *settings).expect("valid cameras"),
-            line: LineCounter::new(vec![line]).expect("a valid line"),
+            line: LineCounter::new(vec![line], LineState::default()),
             crossings: Vec::new(),
             walks: BTreeMap::new(),
         }
@@ -99,7 +99,7 @@ impl Follower {
 
     fn update(&mut self, camera: usize, at_s: f64, persons: &[Observation]) {
         self.tracker
-            .update(camera, at_s, persons)
+            .update(f64::INFINITY, camera, at_s, persons)
             .expect("reports in order");
         self.crossings
             .extend(self.line.update(self.tracker.tracks()));

@@ -54,7 +54,7 @@ impl Site {
             let mut people = BTreeSet::new();
             for (camera, frame) in frames {
                 let (boxes, persons) = persons(&self.views[camera], frame);
-                tracker.update(camera, at_s, &persons)?;
+                tracker.update(f64::INFINITY, camera, at_s, &persons)?;
                 let tracks = continued(&tracker, camera, at_s, &boxes)?;
                 steps.push(step_of(frame, &tracks));
                 people.extend(frame.truth.iter().map(|(_, id)| *id));
@@ -122,7 +122,7 @@ impl Site {
         let mut walks: BTreeMap<_, Walk> = BTreeMap::new();
         for frame in &sequence.frames {
             let at_s = f64::from(frame.number) / sequence.circle.frames_per_s;
-            tracker.update(0, at_s, &persons(view, frame).1)?;
+            tracker.update(f64::INFINITY, 0, at_s, &persons(view, frame).1)?;
             for track in tracker
                 .tracks()
                 .filter(|track| track.counts() && track.seen_s == at_s)

@@ -26,7 +26,7 @@ use std::{
 use anyhow::{Context, Result, bail};
 use lookdown_tracking::{
     CameraPose, Observation, Tracker, TrackerSettings,
-    lines::LineCounter,
+    lines::{LineCounter, LineState},
     taught_crossings::{CrossingRatio, ReferenceCrossings},
 };
 use serde_json::{Value, json};
@@ -181,7 +181,7 @@ fn follow(
     let pose = CameraPose::alone(Some(view.height_m));
     let mut tracker = Tracker::new(&[pose], settings)?;
     let crossings = Crossings::new(sequence, &view);
-    let mut counter = LineCounter::new(crossings.lines.clone())?;
+    let mut counter = LineCounter::new(crossings.lines.clone(), LineState::default());
     let annotated = |frame: &Frame| !frame.truth.is_empty();
     let first = sequence.frames.iter().position(annotated).unwrap_or(0);
     let last = sequence.frames.iter().rposition(annotated).unwrap_or(0);
@@ -190,7 +190,7 @@ fn follow(
     for (at, frame) in sequence.frames.iter().enumerate().step_by(step) {
         let at_s = f64::from(frame.number) / circle.frames_per_s;
         let (boxes, persons) = persons(&view, frame);
-        tracker.update(0, at_s, &persons)?;
+        tracker.update(f64::INFINITY, 0, at_s, &persons)?;
         let crossed = counter.update(tracker.tracks()).into_iter();
         counted.extend(crossed.map(|one| (one.line, lines::sign(one.direction), one.at_s)));
         let tracks = continued(&tracker, 0, at_s, &boxes)?;

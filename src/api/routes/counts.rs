@@ -117,12 +117,11 @@ async fn answer(state: &ApiState, mut request: Request) -> Result<Response, Prob
 /// Returns the request to another host.
 fn outgoing(client: &ServerClient, request: &Request) -> Result<RequestBuilder, Problem> {
     let url = url(client, request.uri())?;
-    let outgoing = match *request.method() {
-        Method::PUT => client.put(url),
-        Method::DELETE => client.delete(url),
-        _ => client.get(url),
+    let method = match request.method() {
+        &Method::HEAD => Method::GET,
+        method => method.clone(),
     };
-    let mut outgoing = outgoing.timeout(TIMEOUT);
+    let mut outgoing = client.request(method, url).timeout(TIMEOUT);
     for name in [ACCEPT, IF_NONE_MATCH] {
         if let Some(value) = request.headers().get(&name) {
             outgoing = outgoing.header(name, value);

@@ -13,7 +13,7 @@ use super::{CalibrationEntry, load::LoadedFile, samples::sample};
 use crate::metrics::Metrics;
 
 /// All calibrations at one moment; never changed, only replaced.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Snapshot {
     /// The files, by the ID in their names.
     pub(super) files: BTreeMap<CalibrationId, Arc<LoadedFile>>,
@@ -75,10 +75,8 @@ impl Snapshot {
     /// Returns the same snapshot with the reason why the store cannot be read.
     pub(super) fn with_store_problem(&self, problem: String) -> Self {
         Self {
-            files: self.files.clone(),
-            by_id: self.by_id.clone(),
-            revision: self.revision.clone(),
             store_problem: Some(problem),
+            ..self.clone()
         }
     }
 

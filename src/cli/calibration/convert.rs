@@ -6,8 +6,8 @@ use anyhow::Context;
 use clap::Args;
 use lookdown_calibration::export::Target;
 
-use super::source::{Source, write_content};
-use crate::cli::parameters::one_of;
+use super::source::Source;
+use crate::cli::{output::write_or_print, parameters::one_of};
 
 /// Arguments of `lookdown calibration convert`.
 #[derive(Debug, Args)]
@@ -36,6 +36,6 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     for note in notes.chain(exported.lost) {
         eprintln!("lookdown: {path}: {note}");
     }
-    write_content(&exported.content, arguments.out.as_deref())?;
+    write_or_print("--out", arguments.out.as_deref(), &exported.content)?;
     Ok(ExitCode::SUCCESS)
 }

@@ -4,11 +4,7 @@
 //!
 //! The output files of calibrations.
 
-use std::{
-    fs,
-    io::{self, Write},
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
 use clap::Args;
@@ -26,7 +22,7 @@ use lookdown_imaging::{
     decode::{DecodeLimits, decode},
 };
 
-use crate::{calibration_store::defaults, cli::output::UNWRITABLE};
+use crate::{calibration_store::defaults, cli::output::write_or_print};
 
 /// The arguments that select a file, and a camera of it.
 #[derive(Debug, Args)]
@@ -199,15 +195,5 @@ pub(super) fn write_native(
     calibration: &NativeCalibration,
     out: Option<&Path>,
 ) -> anyhow::Result<()> {
-    write_content(&Target::Native.write(calibration)?.content, out)
-}
-
-/// Writes the content of a calibration file into the file of `--out`, by default to standard
-/// output.
-pub(super) fn write_content(content: &str, out: Option<&Path>) -> anyhow::Result<()> {
-    match out {
-        Some(out) => fs::write(out, content)
-            .with_context(|| format!("--out: {} cannot be written", out.display())),
-        None => write!(io::stdout(), "{content}").context(UNWRITABLE),
-    }
+    write_or_print("--out", out, &Target::Native.write(calibration)?.content)
 }

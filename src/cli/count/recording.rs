@@ -1,8 +1,7 @@
 //! Counting of recordings: as fast as the machine can, without a server.
 
 use std::{
-    fs, io,
-    io::Write,
+    fs,
     num::NonZeroU32,
     path::{Path, PathBuf},
     process::ExitCode,
@@ -33,7 +32,7 @@ use crate::{
         annotate::AnnotatedVideo,
         async_runtime::for_this_thread,
         detect::stream::{interval, is_video},
-        output::UNWRITABLE,
+        output::write_or_print,
         parameters::{ParameterFlags, named_calibration},
         progress::Progress,
         server_flags::given,
@@ -192,7 +191,7 @@ pub(super) fn run(
     let step = flags.step_minutes.map_or(15, NonZeroU32::get);
     let csv = recording.csv(span, step)?;
     let csv = csv.context("--step-minutes: the CSV has too many values: give a longer step")?;
-    write(&csv, flags.csv.as_deref())?;
+    write_or_print("--csv", flags.csv.as_deref(), &csv)?;
     let crossings = recording.lines().into_iter();
     let crossings =
         crossings.map(|line| format!("{} {} {}", line.line, line.direction, line.crossings));
@@ -348,13 +347,4 @@ fn modified_at(path: &Path) -> anyhow::Result<Timestamp> {
 fn stem(path: &Path) -> String {
     let stem = path.file_stem().unwrap_or_default();
     stem.to_string_lossy().into_owned()
-}
-
-/// Writes the counts to a file or to standard output.
-fn write(csv: &str, path: Option<&Path>) -> anyhow::Result<()> {
-    match path {
-        Some(path) => fs::write(path, csv)
-            .with_context(|| format!("--csv: {} cannot be written", path.display())),
-        None => io::stdout().write_all(csv.as_bytes()).context(UNWRITABLE),
-    }
 }

@@ -142,30 +142,23 @@ impl StreamReader {
     /// Returns an error if the stream cannot be decoded further.
     pub(super) fn next_frame(&mut self) -> anyhow::Result<Option<StreamFrame>> {
         let name = &self.name;
-        let frame = match &mut self.frames {
+        let next = match &mut self.frames {
             Frames::Video(frames) => {
-                let frame = self.runtime.block_on(frames.next_frame());
-                frame.map(|frame| {
-                    frame.map(|(position, image)| StreamFrame {
-                        name: format!("{name}#t={:.3}", position.as_secs_f64()),
-                        image,
-                    })
-                })
+                let next = self.runtime.block_on(frames.next_frame());
+                let next = next.with_context(|| name.clone())?;
+                next.map(|(position, image)| (format!("t={:.3}", position.as_secs_f64()), image))
             }
             Frames::StandardInput { images, count } => {
-                let image = self.runtime.block_on(images.next_image());
-                image.map(|image| {
-                    image.map(|image| {
-                        *count += 1;
-                        StreamFrame {
-                            name: format!("{name}#{count}"),
-                            image,
-                        }
-                    })
-                })
+                *count += 1;
+                let next = self.runtime.block_on(images.next_image());
+                let next = next.with_context(|| name.clone())?;
+                next.map(|image| (count.to_string(), image))
             }
         };
-        frame.with_context(|| name.clone())
+        Ok(next.map(|(place, image)| StreamFrame {
+            name: format!("{name}#{place}"),
+            image,
+        }))
     }
 
     /// Ends the reader. A read of standard input may never end, so it is not waited for.

@@ -32,8 +32,8 @@ fn zones_and_masks_grow_with_the_frame_and_the_floor_does_not() {
     let areas = calibration.for_frame(1600, 1200).unwrap().areas;
     let names: Vec<_> = areas.zones.iter().map(|zone| zone.name.as_str()).collect();
     assert_eq!(names, ["till-1", "door"]);
-    assert!(areas.zones[0].holds(Pixel::new(550.0, 220.0), None));
-    assert!(!areas.zones[0].holds(Pixel::new(275.0, 110.0), None));
+    assert!(areas.zones[0].area.holds(Pixel::new(550.0, 220.0), None));
+    assert!(!areas.zones[0].area.holds(Pixel::new(275.0, 110.0), None));
     let ZoneArea::Floor(floor) = &areas.zones[1].area else {
         panic!("the second zone is one of the floor");
     };

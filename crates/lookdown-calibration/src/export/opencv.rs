@@ -26,20 +26,9 @@ pub(super) fn write(calibration: &NativeCalibration) -> Option<String> {
         "%YAML:1.0\n---\nimage_width: {}\nimage_height: {}\n{said}\n",
         calibration.image.width, calibration.image.height
     );
-    matrix(
-        &mut content,
-        "camera_matrix",
-        3,
-        3,
-        &camera_matrix(pinhole, skew),
-    );
-    matrix(
-        &mut content,
-        "distortion_coefficients",
-        1,
-        coefficients.len(),
-        &coefficients,
-    );
+    let camera_matrix = camera_matrix(pinhole, skew);
+    matrix(&mut content, "camera_matrix", 3, &camera_matrix);
+    matrix(&mut content, "distortion_coefficients", 1, &coefficients);
     Some(content)
 }
 
@@ -48,7 +37,8 @@ pub(super) fn camera_matrix([fx, fy, cx, cy]: Pinhole, skew: f64) -> [f64; 9] {
     [fx, skew, cx, 0.0, fy, cy, 0.0, 0.0, 1.0]
 }
 
-fn matrix(content: &mut String, name: &str, rows: usize, columns: usize, data: &[f64]) {
+fn matrix(content: &mut String, name: &str, rows: usize, data: &[f64]) {
+    let columns = data.len() / rows;
     // Writing to a String cannot fail.
     let _ = write!(
         content,

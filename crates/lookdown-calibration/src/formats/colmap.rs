@@ -13,7 +13,7 @@ use crate::native::NativeImage;
 use lookdown_lens::geometry::{
     Pixel,
     lens::{Equidistant, Eucm, Fov, KannalaBrandt, LensModel, Rectilinear},
-    pixels::{PixelConvention, cross_half_pixel},
+    pixels::to_pixel_center,
 };
 
 pub(super) fn read(text: &str) -> Vec<FileCamera> {
@@ -54,7 +54,7 @@ fn read_camera(words: &[&str]) -> Result<Camera, FormatError> {
 
 fn lens(model: &str, parameters: &[f64]) -> Result<LensModel, FormatError> {
     let pinhole = |fx, fy, cx, cy| {
-        let center = cross_half_pixel(Pixel::new(cx, cy), PixelConvention::PixelCenter);
+        let center = to_pixel_center(Pixel::new(cx, cy));
         [fx, fy, center.x, center.y]
     };
     Ok(match (model, parameters) {

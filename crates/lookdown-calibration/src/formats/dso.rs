@@ -13,7 +13,7 @@ use crate::native::NativeImage;
 use lookdown_lens::geometry::{
     Pixel,
     lens::{Fov, KannalaBrandt, LensModel, Rectilinear},
-    pixels::{PixelConvention, cross_half_pixel},
+    pixels::to_pixel_center,
 };
 
 /// Returns true for a text that begins with a model and the size of the frames.
@@ -54,7 +54,7 @@ fn lens(model: &str, numbers: &[f64], image: NativeImage) -> Result<LensModel, F
     let pinhole = if cx < 1.0 && cy < 1.0 {
         let (width, height) = (f64::from(image.width), f64::from(image.height));
         let center = Pixel::new(cx * width, cy * height);
-        let center = cross_half_pixel(center, PixelConvention::PixelCenter);
+        let center = to_pixel_center(center);
         [fx * width, fy * height, center.x, center.y]
     } else {
         [fx, fy, cx, cy]

@@ -15,7 +15,7 @@ use super::{
 use lookdown_lens::geometry::{
     Pixel,
     lens::{KannalaBrandt, Rectilinear},
-    pixels::{PixelConvention, cross_half_pixel},
+    pixels::to_pixel_center,
 };
 
 /// The fields that make a camera; each is that of the file, else that of the frame.
@@ -63,7 +63,7 @@ fn read_camera<'a>(with: impl Fn(&str) -> &'a Fields<'a>) -> Result<Camera, Form
         fx
     };
     let center = Pixel::new(number("cx")?, number("cy")?);
-    let center = cross_half_pixel(center, PixelConvention::PixelCenter);
+    let center = to_pixel_center(center);
     let pinhole = [fx, fy, center.x, center.y];
     let image = with("w").image("w", "h")?;
     let k = ["k1", "k2", "k3", "k4"].map(|key| with(key).number_or(key, 0.0));

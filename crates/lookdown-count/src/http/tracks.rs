@@ -19,7 +19,7 @@ use super::{
 };
 use crate::{
     counter::Counter,
-    now::time_of,
+    now::{milliseconds, time_of},
     scene::Scene,
     scene_camera::SceneCamera,
     snapshot::{LineSnapshot, ZoneSnapshot},
@@ -215,7 +215,9 @@ fn zone_rows(camera: &SceneCamera, current: &[ZoneSnapshot]) -> Vec<ZoneRow> {
         let mut drawn = geometry.areas.zones.iter();
         let drawn = drawn.find(|drawn| drawn.name == zone.zone);
         let outline = drawn.map(|zone| {
-            let outline = zone.outline(&geometry.lens, &geometry.mount, OUTLINE_SEGMENTS);
+            let outline = zone
+                .area
+                .outline(&geometry.lens, &geometry.mount, OUTLINE_SEGMENTS);
             let seen = outline.into_iter().flatten();
             seen.map(|point| rounded([point.x, point.y]))
                 .collect::<Vec<_>>()
@@ -256,8 +258,8 @@ fn row(track: &Track, camera: Option<&SceneCamera>) -> TrackRow {
         id: track.id.0,
         posture: track.posture().0.name(),
         posture_probability: (track.posture().1 * 100.0).round() / 100.0,
-        first_seen: time(track.first_seen_s),
-        last_seen: time(track.seen_s),
+        first_seen: time_of(milliseconds(track.first_seen_s)),
+        last_seen: time_of(milliseconds(track.seen_s)),
         floor_m: floor_m.map(rounded),
         velocity_m_s: track.velocity_m_s().map(rounded),
         frame_px: camera
@@ -266,10 +268,4 @@ fn row(track: &Track, camera: Option<&SceneCamera>) -> TrackRow {
         tail: tail.map(rounded).collect(),
         tail_px,
     }
-}
-
-fn time(seconds: f64) -> Timestamp {
-    #[expect(clippy::cast_possible_truncation, reason = "times of reports")]
-    let milliseconds = (seconds * 1000.0).round() as i64;
-    time_of(milliseconds)
 }

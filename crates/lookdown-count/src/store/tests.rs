@@ -4,7 +4,7 @@ use super::*;
 use crate::{
     batch::Batch,
     message::Message,
-    sums::{DAY_MS, LineDirection, MINUTE_MS, Owner, PresenceSum, Sums, Totals, ZoneOf, ZoneSum},
+    sums::{DAY_MS, LineDirection, MINUTE_MS, Owner, PresenceSum, Sums, ZoneOf, ZoneSum},
     time_span::TimeSpan,
 };
 
@@ -17,7 +17,10 @@ fn door() -> LineDirection {
 }
 
 fn batch(minute: i64, last_event: u64) -> Batch {
-    let mut batch = Batch::empty(last_event, Totals::default());
+    let mut batch = Batch {
+        last_event,
+        ..Batch::default()
+    };
     let hall = Owner::Camera("hall".to_owned());
     let presence = PresenceSum {
         known_ms: 30_000,
@@ -234,7 +237,10 @@ fn messages_stay_until_they_are_removed() {
     for _ in 0..2 {
         store
             .commit(
-                &Batch::empty(1, Totals::default()),
+                &Batch {
+                    last_event: 1,
+                    ..Batch::default()
+                },
                 std::slice::from_ref(&message),
                 None,
             )

@@ -9,7 +9,7 @@ use std::{
 use base64::{Engine as _, engine::general_purpose::STANDARD};
 use jiff::Timestamp;
 use lookdown_common::{ClientError, HttpClient, LogOnce, ServerClient, text::with_causes};
-use reqwest::{StatusCode, Url, header::CONTENT_TYPE};
+use reqwest::{Method, StatusCode, Url, header::CONTENT_TYPE};
 use serde_json::{Value, json};
 use tokio::{
     sync::mpsc::{self, error::TrySendError},
@@ -193,7 +193,7 @@ impl Receiver {
         let signature = self.key.sign(id, timestamp_s, body);
         let request = self
             .client
-            .post(self.url.clone())
+            .request(Method::POST, self.url.clone())
             .timeout(TIMEOUT)
             .header(CONTENT_TYPE, "application/json")
             .header("webhook-id", id)

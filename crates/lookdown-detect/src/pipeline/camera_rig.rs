@@ -7,10 +7,8 @@ use std::sync::Arc;
 use lookdown_calibration::CameraGeometry;
 use lookdown_imaging::{Frame, Letterbox, MaskedPixels, NetworkInput, RemapTable};
 use lookdown_lens::geometry::{
-    BackProjection, Footprint, FrameCrop, Pixel, ViewPlan, VirtualView,
-    crop_placement::CropTarget,
-    foot_filter::AreaReach,
-    pixels::{PixelConvention, cross_half_pixel},
+    BackProjection, Footprint, FrameCrop, Pixel, ViewPlan, VirtualView, crop_placement::CropTarget,
+    foot_filter::AreaReach, pixels::to_pixel_center,
 };
 
 use super::{
@@ -96,7 +94,7 @@ impl CameraRig {
         let rays: Vec<_> = targets
             .iter()
             .filter_map(|target| {
-                let pixel = cross_half_pixel(target.center(), PixelConvention::PixelCenter);
+                let pixel = to_pixel_center(target.center());
                 lens.unproject(&pixel)
             })
             .collect();
@@ -179,7 +177,7 @@ impl CameraRig {
 
     /// Returns true if a position in the frame (corner-origin) can show a person who counts.
     pub(super) fn shows(&self, position: Pixel) -> bool {
-        let pixel = cross_half_pixel(position, PixelConvention::PixelCenter);
+        let pixel = to_pixel_center(position);
         let reach = self.hidden.reach.as_ref();
         self.geometry.lens.unproject(&pixel).is_some()
             && reach.is_none_or(|reach| reach.holds(position))

@@ -11,13 +11,12 @@ use std::{
 
 use jiff::Timestamp;
 use lookdown_lens::geometry::{
-    OrientedBox, crop_placement::CropTarget, oriented_box::vertical_in_frame,
+    OrientedBox, crop_placement::CropTarget, hull::middle, oriented_box::vertical_in_frame,
 };
 use lookdown_tracking::{
     follow::{FollowedPeople, FoundPerson, JOINED_CELLS, SEARCH_EVERY_S},
     taught,
 };
-use nalgebra::Point2;
 use parking_lot::Mutex;
 
 use super::{
@@ -199,16 +198,10 @@ impl FollowedFrame {
         let geometry = &rig.geometry;
         let expected = before.people.expected(moving, seconds(self.at));
         let mut targets: Vec<_> = expected
-            .map(|(person, bbox)| {
-                let center = Point2::new(
-                    f64::midpoint(bbox[0], bbox[2]),
-                    f64::midpoint(bbox[1], bbox[3]),
-                );
-                CropTarget {
-                    bbox,
-                    score: person.score,
-                    up: vertical_in_frame(center, &geometry.lens, &geometry.mount),
-                }
+            .map(|(person, bbox)| CropTarget {
+                bbox,
+                score: person.score,
+                up: vertical_in_frame(middle(bbox), &geometry.lens, &geometry.mount),
             })
             .collect();
         targets.sort_by(|a, b| b.score.total_cmp(&a.score));
@@ -319,8 +312,6 @@ fn seconds(at: Timestamp) -> f64 {
 
 /// Returns the cells of a frame whose middle can show a person.
 fn visible_cells(signature: &FrameSignature, rig: &CameraRig) -> Arc<[bool]> {
-    let middles = signature.cells().map(|[x_min, y_min, x_max, y_max]| {
-        Point2::new(f64::midpoint(x_min, x_max), f64::midpoint(y_min, y_max))
-    });
-    middles.map(|middle| rig.shows(middle)).collect()
+    let cells = signature.cells();
+    cells.map(|cell| rig.shows(middle(cell))).collect()
 }

@@ -1,9 +1,6 @@
 //! The outlines of views and crops in the frame.
 
-use lookdown_lens::geometry::{
-    FrameCrop, Lens, Pixel, VirtualView,
-    pixels::{PixelConvention, cross_half_pixel},
-};
+use lookdown_lens::geometry::{FrameCrop, Lens, Pixel, VirtualView, pixels::to_corner_origin};
 
 /// Points of an outline along each side of a view.
 const POINTS_PER_SIDE: u32 = 16;
@@ -13,7 +10,7 @@ const POINTS_PER_SIDE: u32 = 16;
 pub(super) fn view_outline(view: &VirtualView, lens: &Lens) -> Vec<Pixel> {
     let rays = view.border_rays(POINTS_PER_SIDE);
     rays.filter_map(|ray| lens.project_to_rim(&ray))
-        .map(|pixel| cross_half_pixel(pixel, PixelConvention::CornerOrigin))
+        .map(to_corner_origin)
         .collect()
 }
 

@@ -2,9 +2,7 @@
 
 use lookdown_calibration::Calibration;
 use lookdown_lens::geometry::{
-    Lens, Pixel, Polygon, VirtualView,
-    foot_filter::AreaReach,
-    pixels::{PixelConvention, cross_half_pixel},
+    Lens, Pixel, Polygon, VirtualView, foot_filter::AreaReach, pixels::to_corner_origin,
     view_plan::Coverage,
 };
 
@@ -64,7 +62,7 @@ impl PlannedView {
         let nodes = (0..=cells).flat_map(|row| (0..=cells).map(move |column| [column, row]));
         let nodes = nodes.map(|at| {
             let seen = node(&self.view, lens, cells, at)?;
-            Some(cross_half_pixel(seen, PixelConvention::CornerOrigin))
+            Some(to_corner_origin(seen))
         });
         nodes.collect()
     }
@@ -88,7 +86,7 @@ impl Engine {
         let areas = &calibration.areas().foot_filter;
         let reach = AreaReach::new(areas, lens, calibration.mount(), image_width, image_height);
         let counts = |pixel: Pixel| {
-            let at = cross_half_pixel(pixel, PixelConvention::CornerOrigin);
+            let at = to_corner_origin(pixel);
             !masked.hides_position(pixel) && reach.as_ref().is_none_or(|reach| reach.holds(at))
         };
         let plan = profile.view_plan();

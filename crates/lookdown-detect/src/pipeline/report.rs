@@ -186,7 +186,7 @@ impl Person {
         foot: Pixel,
         floor: Option<FloorPosition>,
     ) -> Option<Vec<String>> {
-        let holding = zones.iter().filter(|zone| zone.holds(foot, floor));
+        let holding = zones.iter().filter(|zone| zone.area.holds(foot, floor));
         let names = holding.map(|zone| zone.name.clone());
         (!zones.is_empty()).then(|| names.collect())
     }

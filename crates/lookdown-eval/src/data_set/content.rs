@@ -4,10 +4,7 @@ use std::{path::PathBuf, sync::Arc};
 
 use lookdown_calibration::Calibration;
 use lookdown_detect::detection::{BBox, FramePixels};
-use lookdown_lens::geometry::{
-    Lens, OrientedBox, Pixel,
-    pixels::{PixelConvention, cross_half_pixel},
-};
+use lookdown_lens::geometry::{Lens, OrientedBox, Pixel, pixels::to_pixel_center};
 
 use super::{ImageId, ScoringMismatch};
 use crate::{AnnotatedPerson, GroundTruth, Outline, Scoring};
@@ -131,7 +128,7 @@ impl DataSetImage {
             return Some((from_center / (width.min(height) / 2.0)).min(1.0) * 90.0);
         };
         let camera = calibration.for_frame(width, height).ok()?;
-        let pixel = cross_half_pixel([x, y].into(), PixelConvention::PixelCenter);
+        let pixel = to_pixel_center([x, y].into());
         Some(off_axis(&camera.lens, &pixel).to_degrees())
     }
 }

@@ -3,9 +3,9 @@
 use lookdown_detect::detection::{BBox, FramePixels};
 
 use super::{
-    GroundTruth, MatchingRule,
+    GroundTruth,
     Outcome::{self, FalsePositive, Ignored, TruePositive},
-    ScoredBox,
+    ScoredBox, outcomes,
 };
 use crate::AnnotatedPerson;
 
@@ -22,11 +22,7 @@ fn truth(persons: &[FrameBox], ignore_regions: &[FrameBox]) -> GroundTruth<Frame
     }
 }
 
-fn outcomes(
-    rule: MatchingRule,
-    detections: &[(FrameBox, f64)],
-    truth: &GroundTruth<FrameBox>,
-) -> Vec<Outcome> {
+fn matched(detections: &[(FrameBox, f64)], truth: &GroundTruth<FrameBox>) -> Vec<Outcome> {
     let detections: Vec<_> = detections
         .iter()
         .map(|(bbox, score)| ScoredBox {
@@ -34,59 +30,35 @@ fn outcomes(
             score: *score,
         })
         .collect();
-    rule.outcomes(&detections, truth, 0.5)
+    outcomes(&detections, truth, 0.5)
 }
-
-const BOTH: [MatchingRule; 2] = [MatchingRule::Voc, MatchingRule::Coco];
 
 #[test]
 fn the_second_detection_of_a_person_is_wrong() {
     let truth = truth(&[row(0.0, 10.0)], &[]);
     let detections = [(row(0.0, 10.0), 0.4), (row(1.0, 10.0), 0.9)];
-    for rule in BOTH {
-        assert_eq!(
-            outcomes(rule, &detections, &truth),
-            [FalsePositive, TruePositive]
-        );
-    }
+    assert_eq!(matched(&detections, &truth), [FalsePositive, TruePositive]);
 }
 
 #[test]
 fn equal_scores_make_the_earlier_detection_right() {
     let truth = truth(&[row(0.0, 10.0)], &[]);
     let detections = [(row(2.0, 10.0), 0.5), (row(0.0, 10.0), 0.5)];
-    for rule in BOTH {
-        assert_eq!(
-            outcomes(rule, &detections, &truth),
-            [TruePositive, FalsePositive]
-        );
-    }
+    assert_eq!(matched(&detections, &truth), [TruePositive, FalsePositive]);
 }
 
 #[test]
-fn only_coco_matches_a_duplicate_with_the_next_person() {
+fn a_duplicate_matches_the_next_person() {
     let truth = truth(&[row(0.0, 10.0), row(3.0, 13.0)], &[]);
     // Both overlap the first person most, and the second person sufficiently.
     let detections = [(row(0.0, 10.0), 0.9), (row(1.0, 11.0), 0.8)];
-    assert_eq!(
-        outcomes(MatchingRule::Voc, &detections, &truth),
-        [TruePositive, FalsePositive]
-    );
-    assert_eq!(
-        outcomes(MatchingRule::Coco, &detections, &truth),
-        [TruePositive, TruePositive]
-    );
+    assert_eq!(matched(&detections, &truth), [TruePositive, TruePositive]);
 }
 
 #[test]
 fn an_overlap_of_exactly_the_threshold_is_a_match() {
     let truth = truth(&[row(0.0, 10.0)], &[]);
-    for rule in BOTH {
-        assert_eq!(
-            outcomes(rule, &[(row(0.0, 5.0), 0.9)], &truth),
-            [TruePositive]
-        );
-    }
+    assert_eq!(matched(&[(row(0.0, 5.0), 0.9)], &truth), [TruePositive]);
 }
 
 #[test]
@@ -97,68 +69,41 @@ fn any_number_of_detections_may_lie_in_an_ignore_region() {
         (row(195.0, 205.0), 0.8),
         (row(196.0, 206.0), 0.7),
     ];
-    for rule in BOTH {
-        assert_eq!(
-            outcomes(rule, &detections, &truth),
-            [Ignored, Ignored, FalsePositive]
-        );
-    }
+    assert_eq!(
+        matched(&detections, &truth),
+        [Ignored, Ignored, FalsePositive]
+    );
 }
 
 #[test]
 fn a_person_in_an_ignore_region_is_still_found() {
     let truth = truth(&[row(0.0, 10.0)], &[row(0.0, 100.0)]);
-    for rule in BOTH {
-        assert_eq!(
-            outcomes(rule, &[(row(0.0, 10.0), 0.9)], &truth),
-            [TruePositive]
-        );
-    }
+    assert_eq!(matched(&[(row(0.0, 10.0), 0.9)], &truth), [TruePositive]);
 }
 
 #[test]
-fn duplicates_in_ignore_regions_are_ignored_by_coco_only() {
+fn duplicates_in_ignore_regions_are_ignored() {
     let truth = truth(&[row(0.0, 10.0)], &[row(0.0, 100.0)]);
     let detections = [(row(0.0, 10.0), 0.9), (row(0.0, 10.0), 0.8)];
-    assert_eq!(
-        outcomes(MatchingRule::Coco, &detections, &truth),
-        [TruePositive, Ignored]
-    );
-    assert_eq!(
-        outcomes(MatchingRule::Voc, &detections, &truth),
-        [TruePositive, FalsePositive]
-    );
+    assert_eq!(matched(&detections, &truth), [TruePositive, Ignored]);
 }
 
 #[test]
-fn equal_overlaps_match_the_first_in_voc_and_the_last_in_coco() {
+fn equal_overlaps_match_the_last_person() {
     let (first, last) = (row(0.0, 10.0), row(4.0, 14.0));
     let truth = truth(&[first, last], &[]);
-    let between = row(2.0, 12.0);
-    for (rule, taken) in [(MatchingRule::Voc, first), (MatchingRule::Coco, last)] {
-        let detections = [(between, 0.9), (taken, 0.8)];
-        assert_eq!(
-            outcomes(rule, &detections, &truth),
-            [TruePositive, FalsePositive]
-        );
-    }
+    let detections = [(row(2.0, 12.0), 0.9), (last, 0.8)];
+    assert_eq!(matched(&detections, &truth), [TruePositive, FalsePositive]);
 }
 
 #[test]
-fn at_a_threshold_of_1_coco_tolerates_rounding() {
+fn a_threshold_of_1_tolerates_rounding() {
     let truth = truth(&[row(0.0, 10.0)], &[]);
     let nearly = [ScoredBox {
         bbox: row(0.0, 10.0 - 5e-10),
         score: 0.9,
     }];
-    assert_eq!(
-        MatchingRule::Coco.outcomes(&nearly, &truth, 1.0),
-        [TruePositive]
-    );
-    assert_eq!(
-        MatchingRule::Voc.outcomes(&nearly, &truth, 1.0),
-        [FalsePositive]
-    );
+    assert_eq!(outcomes(&nearly, &truth, 1.0), [TruePositive]);
 }
 
 fn uncounted(outline: FrameBox) -> AnnotatedPerson<FrameBox> {
@@ -173,25 +118,14 @@ fn detections_of_uncounted_persons_are_ignored() {
     let mut truth = truth(&[], &[]);
     truth.persons.push(uncounted(row(0.0, 10.0)));
     let twice = [(row(0.0, 10.0), 0.9), (row(1.0, 10.0), 0.8)];
-    // In COCO each person, counting or not, matches one detection.
-    assert_eq!(
-        outcomes(MatchingRule::Voc, &twice, &truth),
-        [Ignored, Ignored]
-    );
-    assert_eq!(
-        outcomes(MatchingRule::Coco, &twice, &truth),
-        [Ignored, FalsePositive]
-    );
+    // Each person, counting or not, matches one detection.
+    assert_eq!(matched(&twice, &truth), [Ignored, FalsePositive]);
 }
 
 #[test]
-fn coco_prefers_counted_persons_to_nearer_uncounted_ones() {
+fn counted_persons_are_preferred_to_nearer_uncounted_ones() {
     let mut truth = truth(&[row(2.0, 12.0)], &[]);
     truth.persons.push(uncounted(row(0.0, 10.0)));
     let between = [(row(0.0, 10.0), 0.9)];
-    assert_eq!(
-        outcomes(MatchingRule::Coco, &between, &truth),
-        [TruePositive]
-    );
-    assert_eq!(outcomes(MatchingRule::Voc, &between, &truth), [Ignored]);
+    assert_eq!(matched(&between, &truth), [TruePositive]);
 }

@@ -5,9 +5,10 @@ use nalgebra::Vector2;
 
 use super::*;
 use crate::{
-    GroundTruth, MatchingRule,
+    GroundTruth,
     Outcome::{FalsePositive, TruePositive},
     ScoredBox,
+    matching::outcomes,
 };
 
 fn boxed(corners: [f64; 4]) -> Outline {
@@ -56,6 +57,6 @@ fn each_box_matches_one_person_whose_head_it_contains() {
         score,
     };
     let detections = [around(32.0, 0.9), around(33.0, 0.8), around(32.5, 0.7)];
-    let outcomes = MatchingRule::Coco.outcomes(&detections, &truth, 0.75);
+    let outcomes = outcomes(&detections, &truth, 0.75);
     assert_eq!(outcomes, [TruePositive, TruePositive, FalsePositive]);
 }

@@ -42,8 +42,7 @@ fn image(
 }
 
 fn strata(by: Stratification, image: &EvaluatedImage<Outline>) -> Vec<Stratum> {
-    by.strata(&[(&place(Some([600, 600])), image)], MatchingRule::Coco)
-        .unwrap()
+    by.strata(&[(&place(Some([600, 600])), image)]).unwrap()
 }
 
 fn ap50(stratum: &Stratum) -> Option<f64> {
@@ -97,9 +96,7 @@ fn strata_without_data_are_refused() {
     let person = square(300.0, 300.0, 40.0);
     let boxes = image([person.into()], []);
     let refusal = |by: Stratification, size, image: &EvaluatedImage<Outline>| {
-        by.strata(&[(&place(size), image)], MatchingRule::Coco)
-            .unwrap_err()
-            .to_string()
+        by.strata(&[(&place(size), image)]).unwrap_err().to_string()
     };
     let visibility = refusal(Stratification::Visibility, Some([600, 600]), &boxes);
     assert!(visibility.contains("visible_fraction"), "{visibility}");

@@ -1,6 +1,8 @@
 //! Zones and masks drawn into a frame of their camera.
 
-use lookdown_lens::geometry::{CountingLine, FootFilter, Lens, Mount, Pixel, Polygon, Zone};
+use lookdown_lens::geometry::{
+    CountingLine, FootFilter, Lens, Mount, Pixel, Polygon, Zone, hull::hull,
+};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -33,7 +35,7 @@ pub struct ZoneOutline {
 impl ZoneOutline {
     /// The outline of a zone given in frame pixels, or on the floor and projected through `lens`.
     pub fn new(zone: &Zone, lens: &Lens, mount: &Mount) -> Self {
-        Self::in_pieces(&zone.name, &zone.outline(lens, mount, POINTS_PER_EDGE))
+        Self::in_pieces(&zone.name, &zone.area.outline(lens, mount, POINTS_PER_EDGE))
     }
 
     /// A counting line given in frame pixels, or on the floor and projected through `lens`.
@@ -67,15 +69,7 @@ impl ZoneOutline {
     /// A mark with its name at its bounding box, or `None` when no part of it is visible.
     pub(super) fn mark(&self) -> Option<Mark> {
         let points = self.lines.iter().flatten().map(|&[x, y]| [x, y, x, y]);
-        let bbox = points.reduce(|a, b| {
-            [
-                a[0].min(b[0]),
-                a[1].min(b[1]),
-                a[2].max(b[2]),
-                a[3].max(b[3]),
-            ]
-        })?;
-        let mark = Mark::new(bbox, &self.name);
+        let mark = Mark::new(points.reduce(hull)?, &self.name);
         mark.is_drawable().then_some(mark)
     }
 }

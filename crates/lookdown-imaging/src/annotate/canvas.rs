@@ -29,33 +29,44 @@ pub(super) fn pixels(from: f64, to: f64, length: u32) -> Range<u32> {
     bound(from)..bound(to)
 }
 
-/// The outline of a quadrilateral with round joints.
-pub(super) struct Outline {
-    corners: [[f64; 2]; 4],
+/// Straight lines with round ends and joints.
+pub(super) struct Stroke<const EDGES: usize> {
+    edges: [[[f64; 2]; 2]; EDGES],
     half_width: f64,
 }
 
-impl Outline {
-    /// An outline of `width` pixels along four corners.
-    pub(super) fn new(corners: [[f64; 2]; 4], width: f64) -> Self {
+impl Stroke<1> {
+    /// A line of `width` pixels between two points.
+    pub(super) fn new(from: [f64; 2], to: [f64; 2], width: f64) -> Self {
         Self {
-            corners,
+            edges: [[from, to]],
             half_width: width / 2.0,
         }
     }
+}
 
-    /// Paints the outline, each pixel once, so that translucent lines stay even at their joints.
+impl Stroke<4> {
+    /// An outline of `width` pixels along four corners.
+    pub(super) fn around([a, b, c, d]: [[f64; 2]; 4], width: f64) -> Self {
+        Self {
+            edges: [[a, b], [b, c], [c, d], [d, a]],
+            half_width: width / 2.0,
+        }
+    }
+}
+
+impl<const EDGES: usize> Stroke<EDGES> {
+    /// Paints the lines, each pixel once, so that translucent lines stay even at their joints.
     /// Returns the number of painted pixels.
     pub(super) fn draw(&self, frame: &mut Frame, color: Rgb, opacity: f64) -> u64 {
         let mut painted_pixels = 0;
         let reach = self.half_width + 0.5;
-        let rows = self.corners.map(|corner| corner[1]);
-        let top = rows.into_iter().fold(f64::INFINITY, f64::min) - reach;
-        let bottom = rows.into_iter().fold(f64::NEG_INFINITY, f64::max) + reach;
-        let edges = self.edges();
+        let rows = self.edges.as_flattened().iter().map(|end| end[1]);
+        let top = rows.clone().fold(f64::INFINITY, f64::min) - reach;
+        let bottom = rows.fold(f64::NEG_INFINITY, f64::max) + reach;
         for y in pixels(top, bottom, frame.height()) {
             let row = f64::from(y) + 0.5;
-            let mut spans = edges.map(|edge| {
+            let mut spans = self.edges.map(|edge| {
                 let [from, to] = edge_span(edge, row, reach).unwrap_or_default();
                 (pixels(from, to, frame.width()), edge)
             });
@@ -76,45 +87,6 @@ impl Outline {
                     blend(frame, x, y, color, opacity * coverage);
                     painted_pixels += 1;
                 }
-            }
-        }
-        painted_pixels
-    }
-
-    fn edges(&self) -> [[[f64; 2]; 2]; 4] {
-        let [a, b, c, d] = self.corners;
-        [[a, b], [b, c], [c, d], [d, a]]
-    }
-}
-
-/// A straight line with round ends.
-pub(super) struct Stroke {
-    edge: [[f64; 2]; 2],
-    half_width: f64,
-}
-
-impl Stroke {
-    /// A line of `width` pixels between two points.
-    pub(super) fn new(from: [f64; 2], to: [f64; 2], width: f64) -> Self {
-        Self {
-            edge: [from, to],
-            half_width: width / 2.0,
-        }
-    }
-
-    /// Paints the line. Returns the number of painted pixels.
-    pub(super) fn draw(&self, frame: &mut Frame, color: Rgb, opacity: f64) -> u64 {
-        let mut painted_pixels = 0;
-        let reach = self.half_width + 0.5;
-        let [[_, from], [_, to]] = self.edge;
-        for y in pixels(from.min(to) - reach, from.max(to) + reach, frame.height()) {
-            let row = f64::from(y) + 0.5;
-            let [left, right] = edge_span(self.edge, row, reach).unwrap_or_default();
-            for x in pixels(left, right, frame.width()) {
-                let distance = squared_edge_distance(self.edge, [f64::from(x) + 0.5, row]).sqrt();
-                let coverage = reach - distance;
-                blend(frame, x, y, color, opacity * coverage.clamp(0.0, 1.0));
-                painted_pixels += 1;
             }
         }
         painted_pixels

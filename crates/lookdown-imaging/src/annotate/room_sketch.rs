@@ -7,10 +7,7 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use lookdown_lens::{
-    geometry::{
-        Lens, Mount, Pixel, Ray, VirtualView,
-        pixels::{PixelConvention, cross_half_pixel},
-    },
+    geometry::{Lens, Mount, Pixel, Ray, VirtualView, pixels::to_corner_origin},
     self_calibration::EdgeCurve,
 };
 
@@ -48,7 +45,7 @@ pub fn sketch_room(frame: &mut Frame, edges: &[Vec<&EdgeCurve>; 3], lens: &Lens,
     let horizon = horizon(mount).map(|ray| lens.project(&ray));
     draw_curve(frame, horizon, HORIZON, 1.5 * width);
     if let Some(nadir) = lens.project(&mount.nadir()) {
-        let center = cross_half_pixel(nadir, PixelConvention::CornerOrigin);
+        let center = to_corner_origin(nadir);
         disk(center, 4.0 * width).draw(frame, SHADOW, SHADOW_OPACITY);
         disk(center, 2.5 * width).draw(frame, NADIR, 1.0);
     }
@@ -150,7 +147,7 @@ fn draw_curve(
     let mut previous = None;
     for point in points {
         let point = point.map(|point| {
-            let corner_origin = cross_half_pixel(point, PixelConvention::CornerOrigin);
+            let corner_origin = to_corner_origin(point);
             [corner_origin.x, corner_origin.y]
         });
         if let (Some(from), Some(to)) = (previous, point) {

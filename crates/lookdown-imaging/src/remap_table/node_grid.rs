@@ -3,7 +3,7 @@
 
 use lookdown_lens::geometry::{
     FrameCrop, Lens, Panorama, Pixel, VirtualView,
-    pixels::{PixelConvention, cross_half_pixel},
+    pixels::{to_corner_origin, to_pixel_center},
 };
 
 use super::{block_size::NODE_STEP, visibility::Visibility};
@@ -51,9 +51,9 @@ impl NodeGrid {
     pub(super) fn for_crop(crop: &FrameCrop) -> Self {
         let size = [crop.width, crop.height];
         Self::from_positions(size, Visibility::everywhere(size), |pixel| {
-            let position = cross_half_pixel(*pixel, PixelConvention::CornerOrigin);
+            let position = to_corner_origin(*pixel);
             let position = crop.frame_from_crop(&position);
-            cross_half_pixel(position, PixelConvention::PixelCenter)
+            to_pixel_center(position)
         })
     }
 

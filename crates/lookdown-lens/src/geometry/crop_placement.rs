@@ -6,7 +6,8 @@ use nalgebra::{Rotation3, Unit, Vector2, Vector3};
 
 use super::{
     FrameCrop, Lens, Mount, Pixel, QuarterTurn,
-    pixels::{PixelConvention, cross_half_pixel},
+    hull::{hull, middle},
+    pixels::to_corner_origin,
 };
 
 /// The share of a crop's side within which a person must lie to be wholly in it.
@@ -40,15 +41,17 @@ pub struct CropTarget {
 impl CropTarget {
     /// Returns the middle of the box.
     pub fn center(&self) -> Pixel {
-        let [x_min, y_min, x_max, y_max] = self.bbox;
-        Pixel::new(f64::midpoint(x_min, x_max), f64::midpoint(y_min, y_max))
+        middle(self.bbox)
     }
 
     /// The larger side.
     fn extent(&self) -> f64 {
-        let [x_min, y_min, x_max, y_max] = self.bbox;
-        (x_max - x_min).max(y_max - y_min).max(MIN_EXTENT)
+        larger_side(self.bbox).max(MIN_EXTENT)
     }
+}
+
+fn larger_side([x_min, y_min, x_max, y_max]: [f64; 4]) -> f64 {
+    (x_max - x_min).max(y_max - y_min)
 }
 
 /// Places up to `most` crops of `side` × `side` pixels.
@@ -83,7 +86,7 @@ pub fn nadir_crop(lens: &Lens, mount: &Mount, side: u32) -> Option<FrameCrop> {
     (reach > 0.0).then(|| FrameCrop {
         turn: QuarterTurn::None,
         is_mirrored: false,
-        center: cross_half_pixel(center, PixelConvention::CornerOrigin),
+        center: to_corner_origin(center),
         scale: (f64::from(side) / (2.0 * reach)).min(MAX_SCALE),
         width: side,
         height: side,
@@ -102,18 +105,18 @@ fn crop_around(first: &CropTarget, others: &[&CropTarget], fill: f64, side: u32)
     };
     let reach = WITHIN * f64::from(side) / crop.scale;
     let may_share = |target: &&&CropTarget| {
-        suits(&crop, target, fill) && joint(first.bbox, target.bbox).fits(reach)
+        suits(&crop, target, fill) && larger_side(hull(first.bbox, target.bbox)) <= reach
     };
     let neighbors = others.iter().filter(may_share).take(MAX_NEIGHBORS);
     let neighbors: Vec<&CropTarget> = neighbors.copied().collect();
-    crop.center = best_hull(first, &neighbors, reach).middle();
+    crop.center = middle(best_hull(first, &neighbors, reach));
     crop
 }
 
 /// The hull of `first` and of those neighbors that, within a square of side `reach`, have the
 /// greatest sum of scores. The square may be moved until the hull touches its left and upper
 /// sides, so that these need only be tried where boxes begin.
-fn best_hull(first: &CropTarget, neighbors: &[&CropTarget], reach: f64) -> Hull {
+fn best_hull(first: &CropTarget, neighbors: &[&CropTarget], reach: f64) -> [f64; 4] {
     let begins = |axis: usize| {
         let all = neighbors.iter().map(|target| target.bbox[axis]);
         let all = all.chain([first.bbox[axis]]);
@@ -123,16 +126,16 @@ fn best_hull(first: &CropTarget, neighbors: &[&CropTarget], reach: f64) -> Hull 
         };
         all.filter(holds_first).collect::<Vec<f64>>()
     };
-    let mut best = (0.0, Hull(first.bbox));
+    let mut best = (0.0, first.bbox);
     for &left in &begins(0) {
         for &top in &begins(1) {
             let is_within = |target: &&&CropTarget| {
                 let [x_min, y_min, x_max, y_max] = target.bbox;
                 left <= x_min && x_max <= left + reach && top <= y_min && y_max <= top + reach
             };
-            let mut found = (0.0, Hull(first.bbox));
+            let mut found = (0.0, first.bbox);
             for target in neighbors.iter().filter(is_within) {
-                found = (found.0 + target.score, joint(found.1.0, target.bbox));
+                found = (found.0 + target.score, hull(found.1, target.bbox));
             }
             if found.0 > best.0 {
                 best = found;
@@ -153,31 +156,6 @@ fn shows(crop: &FrameCrop, target: &CropTarget) -> bool {
     let reach = WITHIN * f64::from(crop.width) / crop.scale / 2.0 + 1e-6;
     let offsets = [0, 1, 2, 3].map(|side| target.bbox[side] - crop.center[side % 2]);
     offsets.iter().all(|offset| offset.abs() <= reach)
-}
-
-/// A box around several.
-#[derive(Clone, Copy)]
-struct Hull([f64; 4]);
-
-impl Hull {
-    fn middle(self) -> Pixel {
-        let [x_min, y_min, x_max, y_max] = self.0;
-        Pixel::new(f64::midpoint(x_min, x_max), f64::midpoint(y_min, y_max))
-    }
-
-    fn fits(self, reach: f64) -> bool {
-        let [x_min, y_min, x_max, y_max] = self.0;
-        x_max - x_min <= reach && y_max - y_min <= reach
-    }
-}
-
-fn joint(one: [f64; 4], other: [f64; 4]) -> Hull {
-    Hull([
-        one[0].min(other[0]),
-        one[1].min(other[1]),
-        one[2].max(other[2]),
-        one[3].max(other[3]),
-    ])
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use super::{
     Lens, Mount, Pixel, Ray,
-    pixels::{PixelConvention, cross_half_pixel},
+    pixels::{to_corner_origin, to_pixel_center},
 };
 
 /// Rays flatter than this above the floor (cosine of the angle from straight down) hit it too far
@@ -30,7 +30,7 @@ pub struct FloorPosition {
 
 /// The bearing of `point` (corner-origin frame pixels); `None` outside the lens image.
 pub fn bearing(point: Pixel, lens: &Lens) -> Option<Bearing> {
-    let ray = lens.unproject(&cross_half_pixel(point, PixelConvention::PixelCenter))?;
+    let ray = lens.unproject(&to_pixel_center(point))?;
     Some(Bearing {
         azimuth: ray.y.atan2(ray.x).rem_euclid(std::f64::consts::TAU),
         off_axis: ray.x.hypot(ray.y).atan2(ray.z),
@@ -42,7 +42,7 @@ pub fn bearing(point: Pixel, lens: &Lens) -> Option<Bearing> {
 /// fall.
 pub fn floor_position(point: Pixel, lens: &Lens, mount: &Mount) -> Option<FloorPosition> {
     let height_m = mount.height_m()?;
-    let ray = lens.unproject(&cross_half_pixel(point, PixelConvention::PixelCenter))?;
+    let ray = lens.unproject(&to_pixel_center(point))?;
     let levelled = mount.camera_from_floor().inverse_transform_vector(&ray);
     (levelled.z >= MIN_DOWNWARD_COSINE).then(|| FloorPosition {
         x_m: height_m * levelled.x / levelled.z,
@@ -55,7 +55,7 @@ pub fn floor_position(point: Pixel, lens: &Lens, mount: &Mount) -> Option<FloorP
 pub fn pixel_of(place: FloorPosition, lens: &Lens, mount: &Mount) -> Option<Pixel> {
     let levelled = Ray::new(place.x_m, place.y_m, mount.height_m()?);
     let pixel = lens.project(&(mount.camera_from_floor() * levelled))?;
-    Some(cross_half_pixel(pixel, PixelConvention::CornerOrigin))
+    Some(to_corner_origin(pixel))
 }
 
 #[cfg(test)]

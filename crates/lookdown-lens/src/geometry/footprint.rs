@@ -7,7 +7,8 @@ use nalgebra::Vector2;
 use super::{
     FrameCrop, Lens, Mount, Pixel, Ray, VirtualView,
     height_ratio::Extremities,
-    pixels::{PixelConvention, cross_half_pixel},
+    hull::{hull, middle},
+    pixels::{to_corner_origin, to_pixel_center},
 };
 
 /// Points on an inscribed ellipse: more change the hull by less than 0.2 % of its size.
@@ -91,7 +92,7 @@ impl Footprint {
             let Some(in_frame) = seen.or_else(|| lens.project_to_rim(&ray)) else {
                 continue;
             };
-            outline.push(cross_half_pixel(in_frame, PixelConvention::CornerOrigin));
+            outline.push(to_corner_origin(in_frame));
             if index.is_multiple_of(RAY_STRIDE) {
                 // What was pulled to the rim is seen there.
                 rays.extend(match seen {
@@ -112,11 +113,11 @@ impl Footprint {
     /// the outline is the inscribed ellipse, which touches all four sides. `None` when the middle
     /// of the box lies beyond the lens image.
     pub fn from_crop_box(crop_box: [f64; 4], crop: &FrameCrop, lens: &Lens) -> Option<Self> {
-        let [x_min, y_min, x_max, y_max] = crop.frame_box(crop_box);
-        let center = Pixel::new(f64::midpoint(x_min, x_max), f64::midpoint(y_min, y_max));
+        let frame_box @ [x_min, y_min, x_max, y_max] = crop.frame_box(crop_box);
+        let center = middle(frame_box);
         let half = Vector2::new(x_max - x_min, y_max - y_min) / 2.0;
         let ray = |point: &Pixel| {
-            let pixel = cross_half_pixel(*point, PixelConvention::PixelCenter);
+            let pixel = to_pixel_center(*point);
             lens.unproject(&pixel)
         };
         ray(&center)?;
@@ -143,16 +144,8 @@ impl Footprint {
     /// The axis-parallel hull `[x_min, y_min, x_max, y_max]`, corner-origin frame pixels.
     pub fn bounds(&self) -> [f64; 4] {
         let first = self.outline[0];
-        self.outline
-            .iter()
-            .fold([first.x, first.y, first.x, first.y], |hull, point| {
-                [
-                    hull[0].min(point.x),
-                    hull[1].min(point.y),
-                    hull[2].max(point.x),
-                    hull[3].max(point.y),
-                ]
-            })
+        let points = self.outline.iter().map(|at| [at.x, at.y, at.x, at.y]);
+        points.fold([first.x, first.y, first.x, first.y], hull)
     }
 }
 
@@ -167,7 +160,7 @@ fn corners([x_min, y_min, x_max, y_max]: [f64; 4]) -> [Pixel; 4] {
 
 /// The ray (camera frame) through a point of a view (corner-origin pixels).
 fn ray_through(point: Pixel, view: &VirtualView) -> Ray {
-    view.ray_in_camera(&cross_half_pixel(point, PixelConvention::PixelCenter))
+    view.ray_in_camera(&to_pixel_center(point))
 }
 
 /// An ellipse in the plane of a view, as rays (camera frame).
@@ -190,7 +183,7 @@ impl Ellipse {
         let center = Pixel::new(f64::midpoint(x_min, x_max), f64::midpoint(y_min, y_max));
         let half_width = (x_max - x_min) / 2.0;
         let half_height = (y_max - y_min) / 2.0;
-        let center_pixel = cross_half_pixel(center, PixelConvention::PixelCenter);
+        let center_pixel = to_pixel_center(center);
         let (up, along, across) = view
             .vertical_at(&center_pixel, mount)
             .and_then(|vertical| ellipse_axes(vertical, half_width, half_height))

@@ -2,10 +2,7 @@
 
 use nalgebra::Vector2;
 
-use super::{
-    Lens, Mount, Pixel,
-    pixels::{PixelConvention, cross_half_pixel},
-};
+use super::{Lens, Mount, Pixel, pixels::to_pixel_center};
 
 /// Step along the vertical, in units of the ray, for the direction of up in the frame.
 const VERTICAL_STEP: f64 = 1e-4;
@@ -138,7 +135,7 @@ impl OrientedBox {
 /// (corner-origin) rises; image up where the camera looks along the vertical.
 pub fn vertical_in_frame(point: Pixel, lens: &Lens, mount: &Mount) -> Vector2<f64> {
     let image_up = Vector2::new(0.0, -1.0);
-    let pixel = cross_half_pixel(point, PixelConvention::PixelCenter);
+    let pixel = to_pixel_center(point);
     let Some(ray) = lens.unproject(&pixel) else {
         return image_up;
     };

@@ -4,10 +4,7 @@
 //! down, the head is `H (1 − tan f / tan t)` above the floor. An error of both angles moves it by
 //! `H / (cos² f tan t)` and `H tan f / sin² t` per radian.
 
-use super::{
-    Lens, Mount, OrientedBox, Pixel, Ray,
-    pixels::{PixelConvention, cross_half_pixel},
-};
+use super::{Lens, Mount, OrientedBox, Pixel, Ray, pixels::to_pixel_center};
 
 /// Standard deviation of the angle of either end of a box, with the bias of boxes, which are a
 /// little larger than people: 61 boxes of standing people of the rendered development set.
@@ -34,7 +31,7 @@ impl PersonHeight {
     pub fn new(person: &OrientedBox, lens: &Lens, mount: &Mount) -> Option<Self> {
         let camera_m = mount.height_m()?;
         let nadir = mount.nadir();
-        let ray = |end: Pixel| lens.unproject(&cross_half_pixel(end, PixelConvention::PixelCenter));
+        let ray = |end: Pixel| lens.unproject(&to_pixel_center(end));
         let foot = ray(person.foot())?;
         let head = ray(person.center + person.up * (person.height / 2.0))?;
         let horizontal = |ray: &Ray| ray - nadir * ray.dot(&nadir);

@@ -194,7 +194,7 @@ pub fn crossing([a, b]: Edge, y: f64) -> Option<f64> {
 }
 
 /// The distance of a point from an edge.
-fn distance([a, b]: Edge, point: Point2<f64>) -> f64 {
+pub fn distance([a, b]: Edge, point: Point2<f64>) -> f64 {
     let along = b - a;
     let share = (point - a).dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE);
     (a + along * share.clamp(0.0, 1.0) - point).norm()

@@ -11,10 +11,7 @@ use std::sync::OnceLock;
 
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Lens, Mount, OrientedBox, Pixel, Ray,
-    pixels::{PixelConvention, cross_half_pixel},
-};
+use super::{Lens, Mount, OrientedBox, Pixel, Ray, pixels::to_pixel_center};
 
 /// The posture of a person.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, strum::IntoStaticStr)]
@@ -148,7 +145,7 @@ impl BoxAngles {
     /// Returns the angles of a box; `None` where a side is outside the lens image, or the floor is
     /// too far away.
     pub fn new(person: &OrientedBox, lens: &Lens, mount: &Mount) -> Option<Self> {
-        let ray = |end: Pixel| lens.unproject(&cross_half_pixel(end, PixelConvention::PixelCenter));
+        let ray = |end: Pixel| lens.unproject(&to_pixel_center(end));
         let aside = nalgebra::Vector2::new(-person.up.y, person.up.x) * (person.width / 2.0);
         let center = ray(person.center)?.normalize();
         let [foot, head] = [

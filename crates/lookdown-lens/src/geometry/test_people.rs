@@ -1,9 +1,6 @@
 //! Boxes of people for tests.
 
-use super::{
-    Lens, OrientedBox, Pixel, Ray,
-    pixels::{PixelConvention, cross_half_pixel},
-};
+use super::{Lens, OrientedBox, Pixel, Ray, pixels::to_corner_origin};
 
 /// Returns the box of a person of `height_m` who stands `out_m` away in the direction `azimuth`
 /// from the point below a camera at `camera_m` that looks straight down.
@@ -16,7 +13,7 @@ pub(crate) fn standing(
     let (sin, cos) = azimuth.sin_cos();
     let ends = [0.0, height_m].map(|up_m| -> Pixel {
         let ray = Ray::new(out_m * cos, out_m * sin, camera_m - up_m);
-        cross_half_pixel(lens.project(&ray).unwrap(), PixelConvention::CornerOrigin)
+        to_corner_origin(lens.project(&ray).unwrap())
     });
     OrientedBox::averaging((ends[1] - ends[0]).normalize(), [(1.0, &ends[..])]).unwrap()
 }

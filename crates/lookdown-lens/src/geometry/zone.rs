@@ -29,12 +29,6 @@ pub enum ZoneArea {
 }
 
 impl Zone {
-    /// Returns true when a person stands in it whose foot is seen at `foot` (corner-origin frame
-    /// pixels), which is `floor`. What meets no floor is in no zone of it.
-    pub fn holds(&self, foot: Pixel, floor: Option<FloorPosition>) -> bool {
-        self.area.holds(foot, floor)
-    }
-
     /// The same zone in frames `scale_x`, `scale_y` times as large; the floor stays as it is.
     pub fn scaled(&self, scale_x: f64, scale_y: f64) -> Self {
         Self {
@@ -43,18 +37,11 @@ impl Zone {
             ..*self
         }
     }
-
-    /// Points along its outline, `points_per_edge` on each edge and the first one once more at the
-    /// end, corner-origin frame pixels; `None` where the lens does not see the floor. Straight
-    /// edges on the floor are curves in the frame.
-    pub fn outline(&self, lens: &Lens, mount: &Mount, points_per_edge: u32) -> Vec<Option<Pixel>> {
-        self.area.outline(lens, mount, points_per_edge)
-    }
 }
 
 impl ZoneArea {
-    /// Returns true when it contains a foot at `foot` (corner-origin frame pixels), which is
-    /// `floor`.
+    /// Returns true when a person stands in it whose foot is seen at `foot` (corner-origin frame
+    /// pixels), which is `floor`. What meets no floor is in no area of it.
     pub fn holds(&self, foot: Pixel, floor: Option<FloorPosition>) -> bool {
         match self {
             Self::Frame(area) => area.holds(foot),
@@ -72,7 +59,9 @@ impl ZoneArea {
         }
     }
 
-    /// Points along its outline, as of [`Zone::outline`].
+    /// Points along its outline, `points_per_edge` on each edge and the first one once more at the
+    /// end, corner-origin frame pixels; `None` where the lens does not see the floor. Straight
+    /// edges on the floor are curves in the frame.
     pub fn outline(&self, lens: &Lens, mount: &Mount, points_per_edge: u32) -> Vec<Option<Pixel>> {
         let (Self::Frame(area) | Self::Floor(area)) = self;
         let along = area.edges().flat_map(|[a, b]| {
@@ -121,13 +110,13 @@ mod tests {
             x_m,
             y_m: 1.5,
         });
-        assert!(of_frame.holds(foot, None));
-        assert!(!of_floor.holds(foot, None));
-        assert!(of_floor.holds(foot, Some(place(1.5))));
-        assert!(!of_floor.holds(foot, Some(place(2.5))));
+        assert!(of_frame.area.holds(foot, None));
+        assert!(!of_floor.area.holds(foot, None));
+        assert!(of_floor.area.holds(foot, Some(place(1.5))));
+        assert!(!of_floor.area.holds(foot, Some(place(2.5))));
         // In frames of twice the size, pixels lie elsewhere, and the floor where it was.
-        assert!(!of_frame.scaled(2.0, 2.0).holds(foot, None));
-        assert!(of_frame.scaled(2.0, 2.0).holds(foot * 2.0, None));
+        assert!(!of_frame.scaled(2.0, 2.0).area.holds(foot, None));
+        assert!(of_frame.scaled(2.0, 2.0).area.holds(foot * 2.0, None));
         assert_eq!(of_floor.scaled(2.0, 2.0), of_floor);
     }
 
@@ -140,7 +129,7 @@ mod tests {
                 area: ZoneArea::Floor(square(0.5, -0.5, 2.0)),
                 is_lying_expected: false,
             };
-            let outline = zone.outline(&lens, &mount, 8);
+            let outline = zone.area.outline(&lens, &mount, 8);
             assert_eq!(outline.len(), 33);
             assert_eq!(outline.first(), outline.last());
             for point in outline {

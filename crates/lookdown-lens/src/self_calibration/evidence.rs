@@ -50,7 +50,7 @@ pub(super) fn evaluate(
     blur: f64,
     with_steps: bool,
 ) -> Option<Evaluation> {
-    let angles = Angles::from_camera(camera, prior.radius)?;
+    let angles = Angles::from_camera(camera, prior.circle.radius)?;
     let directions = camera.directions();
     let mut result = Evaluation {
         evidence: 0.0,

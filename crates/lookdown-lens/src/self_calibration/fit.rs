@@ -18,7 +18,7 @@ use super::{
     evidence::evaluate,
     known_camera::{IdealLens, KnownCamera},
     maxima::{Maximum, fine_maxima, maxima},
-    prior::Prior,
+    prior::{CircleGuess, Prior},
     refusal::FitRefusal,
     search::has_lens,
     uncertainty::{FitUncertainty, deviations, distance, loose_covariance, loose_curvature},
@@ -70,17 +70,6 @@ const CLUTTER_MISFIT: f64 = 4.0;
 const MAX_UNSEEN_THETA: f64 = 1.745;
 /// Precision of that angle, radians.
 const STEP_BEYOND: f64 = 0.001;
-
-/// A lens circle, detected or assumed.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CircleGuess {
-    /// Center in pixels.
-    pub center: [f64; 2],
-    /// Radius in pixels.
-    pub radius: f64,
-    /// Standard deviation of the optical center from it, pixels.
-    pub center_sigma: f64,
-}
 
 /// A camera from the edges of a room.
 #[derive(Debug, Clone, PartialEq)]
@@ -213,9 +202,7 @@ pub(super) fn prior(circle: &CircleGuess, known: KnownCamera) -> Prior {
         .field_of_view
         .map(|field| (field.max_theta(), KNOWN_RIM));
     Prior {
-        center: circle.center,
-        center_sigma: circle.center_sigma,
-        radius: circle.radius,
+        circle: *circle,
         k1: k1.map_or((-0.03, 0.15), |k1| (k1, 1e-4)),
         k2_sigma: if k1.is_some() { 1e-5 } else { K2_SIGMA },
         rim: rim.unwrap_or((FRAC_PI_2, 0.22)),
@@ -258,16 +245,11 @@ fn contradiction(
     if known.lens.is_none() && known.field_of_view.is_none() {
         return None;
     }
-    let circle = CircleGuess {
-        center: within.center,
-        radius: within.radius,
-        center_sigma: within.center_sigma,
-    };
     let free = KnownCamera {
         is_on_ceiling: known.is_on_ceiling,
         ..KnownCamera::default()
     };
-    let free = prior(&circle, free);
+    let free = prior(&within.circle, free);
     let others = fine_maxima([found.camera.clone()].into_iter(), curves, weight, &free);
     let other = others.first()?;
     let gain = other.evaluation.evidence - found.evaluation.evidence;
@@ -345,7 +327,7 @@ fn checked(
         focal: camera.focal,
         k: [k1, k2, k3, 0.0],
         center: camera.center,
-        max_theta: camera.theta(prior.radius).ok_or(ambiguous)?,
+        max_theta: camera.theta(prior.circle.radius).ok_or(ambiguous)?,
         directions: camera.directions(),
         explained,
         edges: curves.len(),

@@ -203,7 +203,7 @@ fn upright(
     let (candidates, beside): (Vec<Ray>, Vec<Ray>) = signed
         .filter(|direction| direction.z > -MAX_TILT.to_radians().cos())
         .partition(|direction| direction.angle(&Ray::z()) < MAX_TILT.to_radians());
-    let Some(angles) = Angles::from_camera(camera, prior.radius) else {
+    let Some(angles) = Angles::from_camera(camera, prior.circle.radius) else {
         return (camera.clone(), true);
     };
     let above = |direction: &Ray| share_above(direction, camera, &angles, curves, evaluation);

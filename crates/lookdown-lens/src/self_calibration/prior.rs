@@ -5,15 +5,22 @@ use super::{
     evaluation::Evaluation,
 };
 
+/// A lens circle, detected or assumed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CircleGuess {
+    /// Center in pixels.
+    pub center: [f64; 2],
+    /// Radius in pixels.
+    pub radius: f64,
+    /// Standard deviation of the optical center from it, pixels.
+    pub center_sigma: f64,
+}
+
 /// The assumptions before any curve is seen.
 #[derive(Debug, Clone)]
 pub(super) struct Prior {
-    /// Center of the lens circle in pixels.
-    pub center: [f64; 2],
-    /// Standard deviation of the optical center from it, pixels.
-    pub center_sigma: f64,
-    /// Radius up to which the curve must rise, pixels.
-    pub radius: f64,
+    /// The lens circle. The curve must rise up to its radius.
+    pub circle: CircleGuess,
     /// First coefficient of the shape and its standard deviation.
     pub k1: (f64, f64),
     /// Standard deviation of the second coefficient from that of an ideal lens.
@@ -40,12 +47,12 @@ impl Prior {
             }
         };
         for axis in 0..2 {
-            let off = camera.center[axis] - self.center[axis];
-            add(&[(3 + axis, 1.0)], off, self.center_sigma);
+            let off = camera.center[axis] - self.circle.center[axis];
+            add(&[(3 + axis, 1.0)], off, self.circle.center_sigma);
         }
         add(&[(2, 1.0)], camera.k2_offset, self.k2_sigma);
         add(&[(1, 1.0)], camera.k1 - self.k1.0, self.k1.1);
-        let theta = angles.theta(self.radius / camera.focal);
+        let theta = angles.theta(self.circle.radius / camera.focal);
         let (radius, slope) = camera.curve(theta);
         let ideal = ideal_shape_slope(camera.k1);
         let cube = theta.powi(3);

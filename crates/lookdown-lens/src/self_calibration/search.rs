@@ -45,7 +45,7 @@ fn lenses(prior: &Prior, known: KnownCamera) -> impl Iterator<Item = (RoomCamera
         .map_or(RIMS.map(f64::to_radians).to_vec(), |field| {
             vec![field.max_theta()]
         });
-    let (center, radius) = (prior.center, prior.radius);
+    let (center, radius) = (prior.circle.center, prior.circle.radius);
     let with = move |k1: f64, rim: f64| {
         let (at_rim, _) = curve(ideal_shape(k1), rim);
         let camera = RoomCamera {
@@ -68,7 +68,7 @@ fn lenses(prior: &Prior, known: KnownCamera) -> impl Iterator<Item = (RoomCamera
 /// Returns true if a lens has the known values.
 pub(super) fn has_lens(prior: &Prior, known: KnownCamera) -> bool {
     lenses(prior, known).any(|(camera, angles)| {
-        let rim = angles.theta(prior.radius / camera.focal);
+        let rim = angles.theta(prior.circle.radius / camera.focal);
         // A curve that turns back has the radius at a smaller angle, too.
         let is_at = |field: FieldOfView| (rim - field.max_theta()).abs() < 0.01;
         known.field_of_view.is_none_or(is_at)

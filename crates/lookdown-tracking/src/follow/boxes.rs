@@ -1,15 +1,5 @@
 //! Boxes `[x_min, y_min, x_max, y_max]`, pixels.
 
-/// Returns the box around two boxes.
-pub(super) fn hull(one: [f64; 4], other: [f64; 4]) -> [f64; 4] {
-    [
-        one[0].min(other[0]),
-        one[1].min(other[1]),
-        one[2].max(other[2]),
-        one[3].max(other[3]),
-    ]
-}
-
 /// Returns a box with a margin (pixels) on all sides.
 pub fn widened([x_min, y_min, x_max, y_max]: [f64; 4], margin: f64) -> [f64; 4] {
     [

@@ -1,9 +1,12 @@
 //! A followed person: its expected place, and its confirmation by a crop.
 
-use lookdown_lens::geometry::OrientedBox;
+use lookdown_lens::geometry::{
+    OrientedBox,
+    hull::{hull, middle},
+};
 use nalgebra::Vector2;
 
-use super::boxes::{hull, iou, widened};
+use super::boxes::{iou, widened};
 
 /// The margin around a person's box that belongs to the person, as a share of its larger side. It
 /// holds shadows and the next step.
@@ -122,7 +125,7 @@ impl<P: FoundPerson> Target<P> {
         if seconds <= 0.0 {
             return self.velocity;
         }
-        let moved = center(bounds) - center(&self.person.bounds());
+        let moved = middle(*bounds) - middle(self.person.bounds());
         (self.velocity + moved / seconds) / 2.0
     }
 
@@ -190,10 +193,6 @@ pub(super) fn targets_of<P: FoundPerson>(
     let missed = missed.filter(|(_, is_found)| !is_found);
     targets.extend(missed.filter_map(|(target, _)| target.missed(at_s)));
     targets
-}
-
-fn center([x_min, y_min, x_max, y_max]: &[f64; 4]) -> Vector2<f64> {
-    Vector2::new(f64::midpoint(*x_min, *x_max), f64::midpoint(*y_min, *y_max))
 }
 
 /// A person that was found in a frame.

@@ -32,7 +32,9 @@ fn thing(second: u64) -> Observation {
 fn report(tracker: &mut Tracker, seconds: std::ops::Range<u64>, of: impl Fn(u64) -> Observation) {
     for second in seconds {
         let at_s = second as f64;
-        tracker.update(0, at_s, &[of(second)]).unwrap();
+        tracker
+            .update(f64::INFINITY, 0, at_s, &[of(second)])
+            .unwrap();
     }
 }
 
@@ -207,7 +209,7 @@ proptest! {
         for (elapsed_s, jump_s) in reports {
             at_s += elapsed_s + jump_s;
             observed_s += if elapsed_s <= LONGEST_OBSERVED_S { elapsed_s } else { 0.0 };
-            tracker.update_after(elapsed_s, 0, at_s, &[seen([0.0, 0.0], [0.0, 0.0], 0.9)]).unwrap();
+            tracker.update(elapsed_s, 0, at_s, &[seen([0.0, 0.0], [0.0, 0.0], 0.9)]).unwrap();
             if observed_s < FURNITURE_AFTER_S {
                 prop_assert!(states(&tracker).iter().all(|state| *state == ThingState::Candidate));
             }

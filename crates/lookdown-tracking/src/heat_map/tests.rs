@@ -22,7 +22,9 @@ fn a_standing_person_heats_one_cell() {
     let mut heat_map = HeatMap::default();
     for frame in 0..50 {
         let at_s = 1000.0 + f64::from(frame) * 0.2;
-        tracker.update(0, at_s, &[person(1.1, -0.9)]).unwrap();
+        tracker
+            .update(f64::INFINITY, 0, at_s, &[person(1.1, -0.9)])
+            .unwrap();
         heat_map.update(tracker.tracks());
     }
     let cells = heat_map.take();

@@ -167,7 +167,6 @@ async fn read_stream(
     content_type: &str,
     sink: &Sink<'_>,
 ) -> Result<(), SourceError> {
-    let stream = |error: super::multipart::PartError| SourceError::Stream(error.to_string());
     let mut parts = PartReader::new(content_type, MAX_FRAME_BYTES);
     let mut memory = Reservation::default();
     let mut is_received = false;
@@ -179,7 +178,7 @@ async fn read_stream(
         let bytes = parts.buffered() + received.len();
         memory.resize(bytes).map_err(|_| SourceError::Memory)?;
         parts.push(&received);
-        while let Some(image) = parts.next_part().map_err(stream)? {
+        while let Some(image) = parts.next_part()? {
             // The sink counts damaged frames.
             is_received |= sink.accept(image).is_ok();
         }

@@ -9,7 +9,7 @@ use bytes::{Bytes, BytesMut};
 use lookdown_common::{JPEG_END, JPEG_START};
 use memchr::memmem;
 
-use crate::jpeg_splitter::JpegSplitter;
+use crate::{SourceError, jpeg_splitter::JpegSplitter};
 
 /// Most bytes of the headers of a part.
 const MAX_HEADER_BYTES: usize = 8 << 10;
@@ -39,19 +39,10 @@ enum State {
     Body(Option<usize>),
 }
 
-/// The remedy for a stream that does not follow its format.
-const OTHER: &str = "give the URL of a JPEG snapshot or RTSP";
-
-/// The reason why a stream is not read further.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub(crate) enum PartError {
-    #[error(
-        "a part of the camera's multipart stream has more than {MAX_HEADER_BYTES} bytes of headers: \
-         {OTHER}"
-    )]
-    LongHeaders,
-    #[error("a frame of the camera's multipart stream is too large: reduce its resolution")]
-    TooLarge,
+/// Returns the error of a frame that exceeds the limit.
+fn too_large() -> SourceError {
+    let problem = "a frame of the camera's multipart stream is too large: reduce its resolution";
+    SourceError::Stream(problem.to_owned())
 }
 
 impl PartReader {
@@ -94,8 +85,8 @@ impl PartReader {
     /// Returns the body of the next part, or `None` if more bytes are needed.
     ///
     /// # Errors
-    /// [`PartError`] if the stream cannot be read further.
-    pub(crate) fn next_part(&mut self) -> Result<Option<Bytes>, PartError> {
+    /// [`SourceError`] if the stream cannot be read further.
+    pub(crate) fn next_part(&mut self) -> Result<Option<Bytes>, SourceError> {
         if let Some(splitter) = &mut self.splitter {
             return Ok(splitter.next_file());
         }
@@ -165,7 +156,7 @@ impl PartReader {
         Some(start + line + 1)
     }
 
-    fn end_of_headers(&self) -> Result<Option<usize>, PartError> {
+    fn end_of_headers(&self) -> Result<Option<usize>, SourceError> {
         let head = &self.buffer[..self.buffer.len().min(MAX_HEADER_BYTES)];
         // A part without headers starts with the empty line.
         let end = match head {
@@ -178,12 +169,15 @@ impl PartReader {
             }
         };
         if end.is_none() && self.buffer.len() > MAX_HEADER_BYTES {
-            return Err(PartError::LongHeaders);
+            return Err(SourceError::Stream(format!(
+                "a part of the camera's multipart stream has more than {MAX_HEADER_BYTES} bytes of \
+                 headers: give the URL of a JPEG snapshot or RTSP"
+            )));
         }
         Ok(end)
     }
 
-    fn body_of_length(&mut self, length: usize) -> Result<Option<Bytes>, PartError> {
+    fn body_of_length(&mut self, length: usize) -> Result<Option<Bytes>, SourceError> {
         let is_jpeg = self.buffer.starts_with(&JPEG_START[..2]);
         if length > self.max_part_bytes && is_jpeg {
             self.state = State::Body(None);
@@ -192,7 +186,7 @@ impl PartReader {
         if length > self.max_part_bytes {
             let has_begun = self.buffer.len() >= 2;
             return if has_begun {
-                Err(PartError::TooLarge)
+                Err(too_large())
             } else {
                 Ok(None)
             };
@@ -217,10 +211,10 @@ impl PartReader {
         Ok(None)
     }
 
-    fn body_up_to_boundary(&mut self) -> Result<Option<Bytes>, PartError> {
+    fn body_up_to_boundary(&mut self) -> Result<Option<Bytes>, SourceError> {
         let found = self.find_boundary();
         if found.unwrap_or(self.searched) > self.max_part_bytes {
-            return Err(PartError::TooLarge);
+            return Err(too_large());
         }
         let Some(mut end) = found else {
             return Ok(None);
@@ -277,7 +271,7 @@ mod tests {
 
     const TYPE: &str = "multipart/x-mixed-replace; boundary=frame";
 
-    fn parts(content_type: &str, stream: &[u8], chunk: usize) -> Result<Vec<Bytes>, PartError> {
+    fn parts(content_type: &str, stream: &[u8], chunk: usize) -> Result<Vec<Bytes>, SourceError> {
         let mut reader = PartReader::new(content_type, 100);
         let mut parts = Vec::new();
         for bytes in stream.chunks(chunk) {
@@ -330,11 +324,12 @@ mod tests {
     #[test]
     fn large_parts_and_endless_headers_are_refused() {
         let declared = b"--frame\r\nContent-Length: 101\r\n\r\nxx";
-        assert_eq!(parts(TYPE, declared, 1), Err(PartError::TooLarge));
+        let problem = |stream, chunk| parts(TYPE, stream, chunk).unwrap_err().to_string();
+        assert!(problem(declared, 1).contains("is too large"));
         let endless = [b"--frame\r\n\r\n".as_slice(), &[b'x'; 500]].concat();
-        assert_eq!(parts(TYPE, &endless, 10), Err(PartError::TooLarge));
+        assert!(problem(&endless, 10).contains("is too large"));
         let headers = [b"--frame\r\n".as_slice(), &[b'x'; 9000]].concat();
-        assert_eq!(parts(TYPE, &headers, 1000), Err(PartError::LongHeaders));
+        assert!(problem(&headers, 1000).contains("bytes of headers"));
     }
 
     const JPEG: &[u8] = b"\xff\xd8\xff\xda\x00\x02xyz\xff\xd9";

@@ -51,7 +51,7 @@ fn steps(curve: &PrecisionRecallCurve) -> Vec<[f64; 2]> {
 mod tests {
     use lookdown_detect::detection::{BBox, FramePixels};
 
-    use lookdown_eval::{EvaluatedImage, GroundTruth, MatchingRule, ScoredBox};
+    use lookdown_eval::{EvaluatedImage, GroundTruth, ScoredBox};
 
     use super::*;
 
@@ -75,7 +75,7 @@ mod tests {
                 })
                 .collect(),
         };
-        let curve = PrecisionRecallCurve::from_images(&[image], MatchingRule::Coco, 0.5).unwrap();
+        let curve = PrecisionRecallCurve::from_images(&[image], 0.5).unwrap();
         let steps = steps(&curve);
         assert_eq!(steps, [[0.0, 1.0], [0.5, 1.0], [0.5, 0.6], [0.75, 0.6]]);
         let area: f64 = steps

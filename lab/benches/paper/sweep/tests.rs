@@ -1,7 +1,6 @@
 use lookdown_detect::detection::BBox;
 use lookdown_eval::{
-    EvaluatedImage, FoundPerson, GroundTruth, MatchingRule, PrecisionRecallCurve, RowName,
-    ScoredBox, Summary,
+    EvaluatedImage, FoundPerson, GroundTruth, PrecisionRecallCurve, RowName, ScoredBox, Summary,
 };
 
 use super::*;
@@ -62,10 +61,9 @@ fn swept() -> Vec<(DetectedRow, EvaluatedRow)> {
                 })
                 .collect(),
         }];
-        let curve =
-            |iou| PrecisionRecallCurve::from_images(&images, MatchingRule::Coco, iou).unwrap();
+        let curve = |iou| PrecisionRecallCurve::from_images(&images, iou).unwrap();
         let evaluated = EvaluatedRow {
-            summary: Summary::from_images(&images, MatchingRule::Coco).unwrap(),
+            summary: Summary::from_images(&images).unwrap(),
             curve_at_50: curve(0.5),
             curve_at_75: curve(0.75),
         };

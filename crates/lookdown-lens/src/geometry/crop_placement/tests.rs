@@ -1,7 +1,7 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::geometry::Ray;
+use crate::geometry::{Ray, pixels::to_pixel_center};
 
 const SIDE: u32 = 416;
 const FILL: f64 = 0.3;
@@ -101,7 +101,7 @@ fn reach_of_nadir_crop(tilt: f64) -> Option<(f64, f64)> {
     ];
     let angles = middles.map(|(x, y)| {
         let at = crop.frame_from_crop(&Pixel::new(x, y));
-        let ray = lens.unproject(&cross_half_pixel(at, PixelConvention::PixelCenter));
+        let ray = lens.unproject(&to_pixel_center(at));
         ray.unwrap().angle(&mount.nadir()).to_degrees()
     });
     Some((

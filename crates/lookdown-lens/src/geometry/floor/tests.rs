@@ -28,7 +28,7 @@ proptest! {
         let mount = Mount::new(Unit::new_normalize(Vector3::new(tilt_x, tilt_y, -1.0)), Some(height_m));
         let ray = mount.camera_from_floor() * Ray::new(x_m, y_m, height_m);
         if let Some(pixel) = lens().project(&ray) {
-            let corner = cross_half_pixel(pixel, PixelConvention::CornerOrigin);
+            let corner = to_corner_origin(pixel);
             let found = floor_position(corner, &lens(), &mount).expect("below the camera");
             prop_assert!((found.x_m - x_m).abs() < 1e-6 && (found.y_m - y_m).abs() < 1e-6);
         }

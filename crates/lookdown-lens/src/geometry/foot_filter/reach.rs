@@ -12,7 +12,7 @@ use nalgebra::{Point2, Vector2};
 use super::{FootFilter, MARGIN_M};
 use crate::geometry::{
     Lens, Mount, Pixel, Ray,
-    pixels::{PixelConvention, cross_half_pixel},
+    pixels::{to_corner_origin, to_pixel_center},
     zone::ZoneArea,
 };
 use crate::saturating::to_u32;
@@ -127,7 +127,7 @@ fn cell(position: f64, side: f64) -> u32 {
 
 /// Returns true if a position of the frame can show a person who stands near an area.
 fn may_show(filter: &FootFilter, at: Pixel, lens: &Lens, mount: &Mount) -> bool {
-    let Some(ray) = lens.unproject(&cross_half_pixel(at, PixelConvention::PixelCenter)) else {
+    let Some(ray) = lens.unproject(&to_pixel_center(at)) else {
         return false;
     };
     let levelled = mount.camera_from_floor().inverse_transform_vector(&ray);
@@ -171,7 +171,7 @@ fn is_near(
             let ray = mount.camera_from_floor() * Ray::new(place.x, place.y, 1.0);
             let pixel = lens.project(&ray).or_else(|| lens.project_to_rim(&ray));
             pixel.is_some_and(|pixel| {
-                let pixel = cross_half_pixel(pixel, PixelConvention::CornerOrigin);
+                let pixel = to_corner_origin(pixel);
                 area.holds_within(pixel, REACH_MARGINS * filter.margin_px)
             })
         }
@@ -228,7 +228,7 @@ mod tests {
             ] {
                 let reach = AreaReach::new(&room(vec![area]), &lens, &mount, 600, 600).unwrap();
                 if let Some(part) = part {
-                    let at = cross_half_pixel(part, PixelConvention::CornerOrigin);
+                    let at = to_corner_origin(part);
                     prop_assert!(reach.holds(at), "{at}");
                 }
             }

@@ -9,6 +9,7 @@ use super::*;
 use crate::geometry::{
     lens::{Equidistant, Equisolid, Stereographic},
     oriented_box::vertical_in_frame,
+    pixels::to_corner_origin,
 };
 
 /// Numbers that are the same on every machine (splitmix64, Steele et al., 2014).
@@ -205,10 +206,7 @@ impl Camera {
                     let x = out * azimuth.cos() + point.x * cos - point.y * sin;
                     let y = out * azimuth.sin() + point.x * sin + point.y * cos;
                     let ray = rotation * Ray::new(x, y, camera_m - point.z.max(0.0));
-                    outline.push(cross_half_pixel(
-                        self.lens.project(&ray)?,
-                        PixelConvention::CornerOrigin,
-                    ));
+                    outline.push(to_corner_origin(self.lens.project(&ray)?));
                 }
             }
         }
