@@ -80,7 +80,7 @@ struct Approach {
 }
 
 impl LineCounter {
-    /// Returns a counter of the lines that `state` was kept for, or with an empty one a new counter.
+    /// Returns a counter of the lines that `state` was kept for; with an empty one, a new counter.
     pub fn new(lines: Vec<Line>, mut state: LineState) -> Self {
         state
             .tracks

@@ -77,7 +77,7 @@ struct Visit {
 }
 
 impl ZoneCounter {
-    /// Returns a counter of the zones that `state` was kept for, or with an empty one a new counter.
+    /// Returns a counter of the zones that `state` was kept for; with an empty one, a new counter.
     pub fn new(zones: Vec<Zone>, mut state: ZoneState) -> Self {
         state.tracks.retain(|_, visits| visits.len() == zones.len());
         Self { zones, state }
