@@ -3,7 +3,7 @@
 //! [`Tracker`] turns [`Observation`]s into tracks, [`lines`] counts crossings, [`zones`] occupancy
 //! and dwell times, [`heat_map`] seconds of presence. [`furniture`] is what never moves. [`follow`]
 //! tells where to look for people between searches of a frame. [`taught`] is the number of a
-//! camera with its error bar.
+//! camera with its error bar, [`taught_crossings`] that of a line.
 
 mod assignment;
 mod camera;
