@@ -1,7 +1,7 @@
 //! The true number of crossings of a line, taught by times whose crossings a person counted, and
 //! its error bar.
 //!
-//! * **Ratio.** Given over counted crossings of those times, drawn to 1 by [`PRIOR_CROSSINGS`].
+//! * **Ratio.** Given over counted crossings of those times, drawn to 1 by `PRIOR_CROSSINGS`.
 //! * **Bar.** Of a Poisson number whose dispersion is estimated (McCullagh and Nelder,
 //!   "Generalized Linear Models", 1989, section 6.2.3), with the doubt about the ratio.
 //!

@@ -1,7 +1,8 @@
 //! Failures as problem documents (RFC 9457).
 //!
 //! A handler returns a [`Problem`]. The [envelope](super::envelope) writes it with a request ID and
-//! an ID of the occurrence, logs its cause and counts it. The [table](kind) declares the kinds.
+//! an ID of the occurrence, logs its cause and counts it. The table of
+//! [`lookdown_http::problem`] declares the kinds.
 
 mod calibration;
 mod pipeline;
