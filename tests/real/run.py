@@ -15,7 +15,7 @@ import unittest
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-ALONE = ("walks", "number", "page", "count", "views", "camera_hashing", "deb")
+ALONE = ("walks", "replicas", "number", "page", "count", "views", "camera_hashing", "deb")
 """Parts whose frames must be on time, and one that packs the files of the image."""
 for folder in (HERE, HERE.parent / "reliability", HERE.parents[1] / "lab/benches"):
     sys.path.insert(0, str(folder))
