@@ -112,8 +112,9 @@ impl KeyList {
         })?;
         let mut list = Self::default();
         for (name, row) in rows {
-            let line = line_at(row.span().start);
+            let start = row.span().start;
             if let Err(problem) = list.add_row(&name, row.into_inner()) {
+                let line = line_at(start);
                 list.problems.push(format!("line {line}: {problem}"));
             }
         }

@@ -71,14 +71,7 @@ impl Upload {
         state: &ApiState,
         use_of: fn(&str) -> Result<FieldUse, Problem>,
     ) -> Result<Self, Problem> {
-        let context = RequestContext::from_extensions(request.extensions())?;
-        let access = &state.options.access;
-        access.check(
-            request.headers(),
-            context.holder.as_ref(),
-            None,
-            Scope::Detect,
-        )?;
+        check_may_detect(&request, state)?;
         let uri = request.uri().clone();
         let mut upload = Self::receive(request, state, &state.uploads, use_of).await?;
         let mut parameters = query_parameters(&uri)?;
@@ -181,18 +174,20 @@ pub(in crate::api) struct ReceivedRequest {
     pub(in crate::api) arrived: Instant,
 }
 
+/// Checks that the key of a request may detect.
+fn check_may_detect(request: &Request, state: &ApiState) -> Result<(), Problem> {
+    let context = RequestContext::from_extensions(request.extensions())?;
+    let access = &state.options.access;
+    let holder = context.holder.as_ref();
+    access.check(request.headers(), holder, None, Scope::Detect)?;
+    Ok(())
+}
+
 impl FromRequest<ApiState> for ReceivedRequest {
     type Rejection = Problem;
 
     async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
-        let context = RequestContext::from_extensions(request.extensions())?;
-        let access = &state.options.access;
-        access.check(
-            request.headers(),
-            context.holder.as_ref(),
-            None,
-            Scope::Detect,
-        )?;
+        check_may_detect(&request, state)?;
         Self::receive(request, state, &state.uploads).await
     }
 }
