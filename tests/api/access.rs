@@ -209,6 +209,16 @@ async fn a_replaced_keys_file_revokes_the_old_key() {
     assert_eq!(reads_with(&service, "lasting").await, 200);
 }
 
+/// The lines of the log of all tests that name `file` and contain `reason`.
+fn reports_of(log: &str, file: &Path, reason: &str) -> Vec<String> {
+    let name = file.display().to_string();
+    let lines = log.lines();
+    lines
+        .filter(|line| line.contains(&name) && line.contains(reason))
+        .map(str::to_owned)
+        .collect()
+}
+
 #[tokio::test]
 async fn an_invalid_keys_file_keeps_the_keys_and_is_logged_once() {
     let folder = tempfile::tempdir().unwrap();
@@ -217,7 +227,6 @@ async fn an_invalid_keys_file_keeps_the_keys_and_is_logged_once() {
     let keys = Arc::new(AccessKeys::open("".parse().unwrap(), Some(&file)).unwrap());
     let service = service_with(&keys);
     let huge = "#".repeat(2 << 20);
-    let file_name = file.display().to_string();
     for (broken, reason) in [
         (format!("reader = {{ {READER}"), "line 1:"),
         ("\nreader = { scopes = [] }".to_owned(), "line 2:"),
@@ -227,12 +236,10 @@ async fn an_invalid_keys_file_keeps_the_keys_and_is_logged_once() {
         let log = Log::start();
         keys.refresh();
         keys.refresh();
-        let log = log.text();
-        let reports_it = |line: &&str| line.contains(&file_name) && line.contains(reason);
-        let reports: Vec<_> = log.lines().filter(reports_it).collect();
-        assert_eq!(reports.len(), 1, "{log}");
-        assert!(reports[0].contains("ERROR"), "{log}");
-        assert!(!log.contains(READER), "{log}");
+        let reports = reports_of(&log.text(), &file, reason);
+        assert_eq!(reports.len(), 1, "{reports:?}");
+        assert!(reports[0].contains("ERROR"), "{reports:?}");
+        assert!(!log.text().contains(READER));
         assert_eq!(reads_with(&service, READER).await, 200);
     }
     fs::remove_file(&file).unwrap();
@@ -254,8 +261,8 @@ async fn a_broken_line_of_a_key_takes_no_access_of_others() {
     let log = Log::start();
     keys.refresh();
     keys.refresh();
-    let log = log.text();
-    assert_eq!(log.matches("line 2:").count(), 1, "{log}");
+    let reports = reports_of(&log.text(), &file, "line 2:");
+    assert_eq!(reports.len(), 1, "{reports:?}");
     assert_eq!(reads_with(&service, READER).await, 401);
     assert_eq!(reads_with(&service, "other").await, 200);
 }
