@@ -1,4 +1,4 @@
-"""Runs the benchmarks: `run.py short|medium|full|tell [PART...]`, all parts by default.
+"""Runs the benchmarks: `run.py short|full|tell [PART...]`, all parts by default.
 
 Each part measures, keeps its figures in raw/, and RESULTS.md is written anew from all that is there; `tell` only
 does the latter.
@@ -8,7 +8,7 @@ import signal
 import sys
 import time
 
-from harness.effort import FULL, MEDIUM, SHORT
+from harness.effort import FULL, SHORT
 from harness.processes import BenchError
 from harness.results import measure, write
 from parts import cameras, dashboards, lifetime, limit, peers, remap, whole
@@ -22,7 +22,7 @@ PARTS = {
     "Many cameras": cameras,
     "Dashboards": dashboards,
 }
-EFFORTS = {effort.name: effort for effort in (SHORT, MEDIUM, FULL)}
+EFFORTS = {effort.name: effort for effort in (SHORT, FULL)}
 
 
 def main(arguments: list[str]) -> int:
@@ -33,7 +33,7 @@ def main(arguments: list[str]) -> int:
     wanted, *parts = arguments or [""]
     unknown = [name for name in parts if name not in named]
     if wanted not in (*EFFORTS, "tell") or unknown:
-        print(f"usage: run.py short|medium|full|tell [{'|'.join(named)}]...", file=sys.stderr)
+        print(f"usage: run.py short|full|tell [{'|'.join(named)}]...", file=sys.stderr)
         return 2
     try:
         for name in (parts or named) if wanted in EFFORTS else ():

@@ -32,25 +32,14 @@ class Effort:
 FULL = Effort(
     name="full",
     profiles=("fast", "balanced"),
-    seconds=30.0,
-    rounds=5,
-    tune_seconds=5.0,
+    seconds=15.0,
+    rounds=3,
+    tune_seconds=3.0,
     clients=(1, 4, 16),
     loads=(80, 120, 1000),
     peer_clients=16,
-    cameras=(1, 10, 100, 1000),
+    cameras=(1, 4, 100, 1000),
     frames=30,
-    starts=7,
-)
-
-MEDIUM = replace(
-    FULL,
-    name="medium",
-    seconds=10.0,
-    rounds=3,
-    tune_seconds=3.0,
-    cameras=(1, 100, 1000),
-    frames=15,
     starts=5,
 )
 
@@ -63,7 +52,7 @@ SHORT = replace(
     clients=(1, 4),
     loads=(80, 1000),
     peer_clients=4,
-    cameras=(1, 20),
+    cameras=(1, 4),
     frames=5,
     starts=3,
 )

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from statistics import median
 
 ABSENT = "–"
@@ -15,16 +15,11 @@ class Spread:
     median: float
     least: float
     greatest: float
-    count: int
-
-    def as_json(self) -> dict:
-        """The values for a raw file."""
-        return asdict(self)
 
 
 def spread(values: Sequence[float]) -> Spread:
     """Computes the spread of at least one value."""
-    return Spread(median(values), min(values), max(values), len(values))
+    return Spread(median(values), min(values), max(values))
 
 
 def ratios(ours: Sequence[float], theirs: Sequence[float]) -> Spread:
@@ -52,10 +47,9 @@ def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def spread_cell(spread: dict) -> str:
+def spread_cell(spread: Spread) -> str:
     """A median with its range."""
-    parts = (round_to(spread[name]) for name in ("median", "least", "greatest"))
-    return "{} ({} to {})".format(*parts)
+    return f"{round_to(spread.median)} ({round_to(spread.least)} to {round_to(spread.greatest)})"
 
 
 def _cell(value: object) -> str:

@@ -5,12 +5,12 @@ import json
 from collections.abc import Iterator
 from pathlib import Path
 
-from .frames import calibration
+from .frames import calibration, frame
 from .places import LOOKDOWN, SAMPLES
 from .processes import Server, free_ports, running
 
-MODEL = "nanodet_g_views_416"
-"""The model of the profiles `fast` and `balanced`."""
+MODEL, CROP_MODEL = "nanodet_g_views_416", "nanodet_g_fisheye_416"
+"""The models of the views and the crops on a CPU."""
 
 ROOMY = {
     "LIMITS__MAX_FRAMES_IN_FLIGHT": "512",
@@ -34,16 +34,25 @@ def lookdown(settings: dict[str, str] | None = None, calibrations: Path = SAMPLE
         yield server
 
 
-def detect(profile: str, camera: str = "office", model: str | None = None) -> str:
+def detect(profile: str, camera: str = "office") -> str:
     """Path and query of a detection."""
-    return f"/detect?calibration={camera}&profile={profile}" + (f"&model={model}" if model else "")
+    return f"/detect?calibration={camera}&profile={profile}"
 
 
-def report(server: Server, path: str, frame: Path) -> dict:
+def report(server: Server, path: str, image: Path) -> dict:
     """The report on a frame."""
-    return json.loads(server.post(path, frame.read_bytes()))
+    return json.loads(server.post(path, image.read_bytes()))
 
 
 def view_plan(server: Server, profile: str) -> dict:
     """The view plan of a frame of the office."""
     return json.loads(server.get(f"/calibrations/{calibration().stem}/views?profile={profile}"))
+
+
+def runs_of(server: Server, profile: str) -> tuple[int, int]:
+    """The runs for views and for crops of the frame of the office; this builds the remap tables of the camera."""
+    views = report(server, detect(profile), frame())["views"]
+    searched = len(view_plan(server, profile)["views"]) - sum(
+        count for name, count in views.items() if name != "inferred"
+    )
+    return searched, views["inferred"] - searched

@@ -18,9 +18,6 @@ def made() -> dict:
     return {
         "cpu": _lscpu("Model name"),
         "cores": len(os.sched_getaffinity(0)),
-        "memory_gib": os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30,
-        "system": f"{platform.system()} {platform.release()}, {platform.libc_ver()[0]} {platform.libc_ver()[1]}",
-        "rust": _said("rustc", "--version"),
         "onnx_runtime": pins["runtime"]["version"],
         "commit": _said("git", "rev-parse", "--short", "HEAD") + (", changed" if changed else ""),
         "date": datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC"),

@@ -4,11 +4,12 @@ import contextlib
 import itertools
 import os
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from .frames import calibration
-from .lookdown import MODEL
+from .lookdown import CROP_MODEL, MODEL
 from .places import PEERS, model, python_of
 from .processes import Server, free_ports, running
 
@@ -43,18 +44,15 @@ def settings() -> list[Setting]:
     return [Setting(*share, batch) for share, batch in itertools.product(dict.fromkeys(shares), (1, 8))]
 
 
-@contextlib.contextmanager
-def plain_python(setting: Setting, plan: Path, refine: str) -> Iterator[Server]:
+def plain_python(setting: Setting, plan: Path, refine: str, crops: int = 0) -> AbstractContextManager[Server]:
     """FastAPI, OpenCV and ONNX Runtime."""
-    with python_server("plain_python", setting, PLAN=plan, CALIBRATION=calibration(), REFINE=refine) as server:
-        yield server
+    own = {"CALIBRATION": calibration(), "CROP_MODEL": model(CROP_MODEL), "CROPS": crops}
+    return python_server("plain_python", setting, PLAN=plan, REFINE=refine, **own)
 
 
-@contextlib.contextmanager
-def slicer(setting: Setting, side: int) -> Iterator[Server]:
+def slicer(setting: Setting, side: int) -> AbstractContextManager[Server]:
     """`supervision`'s InferenceSlicer over the frame itself, in slices of so many pixels."""
-    with python_server("slicer", setting, SLICE=side) as server:
-        yield server
+    return python_server("slicer", setting, SLICE=side)
 
 
 @contextlib.contextmanager

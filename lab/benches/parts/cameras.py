@@ -43,20 +43,28 @@ def beside(effort: Effort, alone, only: str, count: int) -> dict:
                     paths = [detect(PROFILE, camera) for camera in asked]
                     late = load(server, paths, frame(), seconds=effort.seconds / 4)["succeeded"]
                     result[key].append(late["p50_ms"])
-    return {"count": count, "mib": (used - empty) / 2**20, **result}
+    return {"count": count, "mib": (used - empty) / 2**20, "mib_in_all": used / 2**20, **result}
 
 
 def tell(raw: dict) -> str:
     """The table as Markdown."""
-    return f"One client, `{PROFILE}`, medians; memory from before the first frame:\n\n" + table(
-        ("cameras", "memory, MiB", "one alone, ms", "one among them ÷ alone", "all in turns ÷ one alone"),
+    return f"One client, `{PROFILE}`, medians; memory of the server, and from before the first frame:\n\n" + table(
+        (
+            "cameras",
+            "memory, MiB",
+            "of it cameras",
+            "one alone, ms",
+            "one among them ÷ alone",
+            "all in turns ÷ one alone",
+        ),
         [
             (
                 row["count"],
+                round_to(row["mib_in_all"]),
                 round_to(row["mib"]),
                 round_to(spread(row["alone"]).median),
-                spread_cell(ratios(row["among"], row["alone"]).as_json()),
-                spread_cell(ratios(row["turns"], row["alone"]).as_json()),
+                spread_cell(ratios(row["among"], row["alone"])),
+                spread_cell(ratios(row["turns"], row["alone"])),
             )
             for row in raw["cameras"]
         ],

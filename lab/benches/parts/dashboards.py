@@ -169,9 +169,9 @@ def tell(raw: dict) -> str:
     answers = ", ".join(f"{count} × {status}" for status, count in sorted(raw["statuses"].items()))
     rows = [
         (f"{POLLERS} pollers, one poll a second each with its ETag: answers", answers),
-        ("**share of a core**, %", spread_cell(spread(raw["percent"]).as_json())),
-        ("HAProxy's for as many fixed responses, alternating, %", spread_cell(spread(raw["least_percent"]).as_json())),
-        ("ours ÷ HAProxy's", spread_cell(ratios(raw["percent"], raw["least_percent"]).as_json())),
+        ("**share of a core**, %", spread_cell(spread(raw["percent"]))),
+        ("HAProxy's for as many fixed responses, alternating, %", spread_cell(spread(raw["least_percent"]))),
+        ("ours ÷ HAProxy's", spread_cell(ratios(raw["percent"], raw["least_percent"]))),
         (f"{LISTENERS} event streams: reports received of {LISTENERS * (REPORTS + 1)}", listening["heard"]),
         ("memory for each, KiB", listening["kib_each"]),
         ("memory with all of them, MiB", listening["mib"]),

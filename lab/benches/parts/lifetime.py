@@ -30,12 +30,7 @@ def measure(effort: Effort) -> list[dict]:
 def tell(raw: list[dict]) -> str:
     """Both as Markdown."""
     rows = [
-        (f"start to ready, {CAMERAS} calibrations, s", cell([start["ready"] for start in raw])),
-        ("first frame of a camera, s", cell([start["first_frame"] for start in raw])),
+        (f"start to ready, {CAMERAS} calibrations, s", spread_cell(spread([start["ready"] for start in raw]))),
+        ("first frame of a camera, s", spread_cell(spread([start["first_frame"] for start in raw]))),
     ]
     return f"`{PROFILE}`:\n\n" + table(("", "median (range)"), rows)
-
-
-def cell(values: list[float]) -> str:
-    """A median with its range."""
-    return spread_cell(spread(values).as_json())

@@ -26,7 +26,7 @@ class Agreement(unittest.TestCase):
 class Figures(unittest.TestCase):
     def test_a_spread_is_the_median_with_its_range(self):
         found = spread([3.0, 1.0, 2.0, 9.0])
-        self.assertEqual((found.median, found.least, found.greatest, found.count), (2.5, 1.0, 9.0, 4))
+        self.assertEqual((found.median, found.least, found.greatest), (2.5, 1.0, 9.0))
 
     def test_ratios_are_taken_round_by_round(self):
         # A machine at half speed in the second round changes no ratio.
@@ -53,7 +53,7 @@ class Tables(unittest.TestCase):
             table(("what", "ms"), [("a", 1, 2)])
 
     def test_a_spread_shows_its_range(self):
-        self.assertEqual(spread_cell(spread([1.0, 2.0, 4.0]).as_json()), "2.00 (1.00 to 4.00)")
+        self.assertEqual(spread_cell(spread([1.0, 2.0, 4.0])), "2.00 (1.00 to 4.00)")
 
 
 class UsageOfProcesses(unittest.TestCase):

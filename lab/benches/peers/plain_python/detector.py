@@ -1,6 +1,7 @@
 """A typical person detector for fisheye frames: OpenCV's `remap`, ONNX Runtime, boxes mapped to the frame, suppression.
 
-Settings beside those of `app.py`: PLAN and CALIBRATION (files), REFINE (`nms` or `soft_nms`).
+Settings beside those of `app.py`: PLAN and CALIBRATION (files), REFINE (`nms` or `soft_nms`), CROPS (persons that are
+looked at again, each upright in a view of its own) and CROP_MODEL (a file).
 """
 
 import json
@@ -11,16 +12,19 @@ from pathlib import Path
 import cv2
 import numpy as np
 import onnxruntime
-from views import Lens, View
+from views import Lens, View, view_of_person
 
 SCORE = 0.3
 """The minimum score of a person. Boxes below it cannot become or change a person."""
+CROP_SCORE = 0.05
+"""The minimum score of a person who is looked at again."""
 
 
 def detector_of(settings: Mapping[str, str]) -> "Detector":
     """The detector of these settings."""
     return Detector(
-        settings["MODEL"],
+        (settings["MODEL"], settings["CROP_MODEL"]),
+        int(settings["CROPS"]),
         json.loads(Path(settings["PLAN"]).read_text()),
         json.loads(Path(settings["CALIBRATION"]).read_text()),
         settings["REFINE"],
@@ -32,34 +36,44 @@ def detector_of(settings: Mapping[str, str]) -> "Detector":
 class Detector:
     """Finds persons in the frames of one camera."""
 
-    def __init__(self, model: str, plan: dict, calibration: dict, refine: str, threads: int, batch: int):
+    def __init__(
+        self, models: tuple[str, str], crops: int, plan: dict, calibration: dict, refine: str, threads: int, batch: int
+    ):
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = threads
-        self.session = onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
-        self.size = self.session.get_inputs()[0].shape[2]
-        self.plan, self.calibration, self.batch = plan["views"], calibration, batch
+        self.sessions = [onnxruntime.InferenceSession(model, options) for model in models[: 1 + bool(crops)]]
+        self.size = self.sessions[0].get_inputs()[0].shape[2]
+        self.crops, self.plan, self.calibration, self.batch = crops, plan["views"], calibration, batch
         self.refine = {"nms": nms, "soft_nms": soft_nms}[refine]
-        self.views: dict[int, list[View]] = {}
+        self.views: dict[int, tuple[Lens, list[View]]] = {}
         self.making = threading.Lock()
 
     def detect(self, jpeg: bytes) -> list[dict]:
         """The persons in a frame."""
         frame = cv2.cvtColor(cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
-        views = self.views_for(frame.shape[1])
-        boxes, scores = [], []
-        for start in range(0, len(views), self.batch):
-            some = views[start : start + self.batch]
-            found = self.session.run(["boxes", "scores"], {"images": self.tensor(frame, some)})
-            for view, view_boxes, view_scores in zip(some, *found):
-                good = view_scores >= SCORE
-                boxes.append(view.boxes_in_frame(view_boxes[good]))
-                scores.append(view_scores[good])
-        boxes, scores = np.concatenate(boxes), np.concatenate(scores).astype(float)
-        usable = np.isfinite(boxes).all(axis=1)
+        lens, views = self.views_for(frame.shape[1])
+        found = self.boxes_in(self.sessions[0], frame, views, CROP_SCORE if self.crops else SCORE)
+        if self.crops:
+            likely = sorted(nms(found[:, :4], found[:, 4]), key=lambda person: -person[1])[: self.crops]
+            crops = [View(view_of_person(box, lens), self.size, lens) for box, _ in likely]
+            found = np.concatenate([found, self.boxes_in(self.sessions[1], frame, crops, SCORE)])
+        found = found[found[:, 4] >= SCORE]
         return [
             {"box": dict(zip(("x_min", "y_min", "x_max", "y_max"), box.tolist())), "score": score}
-            for box, score in self.refine(boxes[usable], scores[usable])
+            for box, score in self.refine(found[:, :4], found[:, 4])
         ]
+
+    def boxes_in(self, session, frame: np.ndarray, views: list[View], least: float) -> np.ndarray:
+        """The boxes `[n, 5]` of views in the frame, with their scores."""
+        rows = [np.empty((0, 5))]
+        for start in range(0, len(views), self.batch):
+            some = views[start : start + self.batch]
+            found = session.run(["boxes", "scores"], {"images": self.tensor(frame, some)})
+            for view, boxes, scores in zip(some, *found):
+                good = scores >= least
+                rows.append(np.column_stack([view.boxes_in_frame(boxes[good]), scores[good]]))
+        rows = np.concatenate(rows)
+        return rows[np.isfinite(rows).all(axis=1)]
 
     def tensor(self, frame: np.ndarray, views: list[View]) -> np.ndarray:
         """Some views as network input `[n, 3, size, size]`."""
@@ -68,12 +82,12 @@ class Detector:
             slot[:] = view.render(frame).transpose(2, 0, 1)
         return tensor
 
-    def views_for(self, width: int) -> list[View]:
-        """The views with their maps, made at the first frame of a size."""
+    def views_for(self, width: int) -> tuple[Lens, list[View]]:
+        """The lens and the views with their maps, made at the first frame of a size."""
         with self.making:
             if width not in self.views:
                 lens = Lens(self.calibration, width)
-                self.views[width] = [View(planned, self.size, lens) for planned in self.plan]
+                self.views[width] = lens, [View(planned, self.size, lens) for planned in self.plan]
             return self.views[width]
 
 

@@ -25,6 +25,25 @@ class Lens:
         pixels = rays[..., :2] * scale[..., None] + [self.cx, self.cy]
         return pixels, theta <= self.max_theta
 
+    def direction(self, pixel: np.ndarray) -> np.ndarray:
+        """The unit ray `[3]` of a frame pixel (pixel center)."""
+        offset = (pixel - [self.cx, self.cy]) / self.focal
+        theta = max(np.hypot(*offset), 1e-9)
+        return np.append(offset * np.sin(theta) / theta, np.cos(theta))
+
+
+def view_of_person(box: np.ndarray, lens: Lens, fill: float = 0.3) -> dict:
+    """An upright view, as of a plan, in which a box of the frame of a camera that looks down fills a part of the side."""
+    middle = lens.direction((box[:2] + box[2:]) / 2 - 0.5)
+    radius = np.linalg.norm(box[2:] - box[:2]) / 2 / lens.focal
+    # Somewhat toward the lower edge of the frame, for a person right below the camera.
+    down = np.array([0.0, 1e-6, 1.0])
+    down -= down @ middle * middle
+    down /= np.linalg.norm(down)
+    rotation = np.stack([np.cross(down, middle), down, middle], axis=1)
+    half = np.arctan(np.tan(min(radius, 0.4)) / fill)
+    return {"camera_from_view": rotation.tolist(), "field_of_view_deg": float(np.degrees(2 * half))}
+
 
 class View:
     """One pinhole view of `size` × `size` pixels."""
