@@ -28,9 +28,6 @@ def of_profile(effort: Effort, profile: str) -> dict:
             result = steady(server, paths, jpeg, clients=clients, seconds=effort.seconds, frame_seconds=seconds)
             closed.append(result)
     capacity = max(result["succeeded_per_second"] for result in closed)
-    with lookdown(ROOMY | {"INFERENCE__THREADS": "1"}) as server:
-        report(server, paths[0], jpeg)  # builds the remap tables of the camera
-        one = steady(server, paths, jpeg, clients=4, seconds=effort.seconds, frame_seconds=2 * seconds)
     opened = []
     with lookdown() as server:
         report(server, paths[0], jpeg)  # builds the remap tables of the camera
@@ -39,8 +36,7 @@ def of_profile(effort: Effort, profile: str) -> dict:
             enough = max(effort.seconds, 12 / capacity)
             result = load(server, paths, jpeg, rate=rate, seconds=enough, warm_up=max(1.0, 4 / capacity))
             opened.append(result | {"percent": percent})
-    growth = capacity / one["succeeded_per_second"]
-    return {"capacity": capacity, "growth": growth, "stages": stages, "closed": closed, "open": opened}
+    return {"capacity": capacity, "stages": stages, "closed": closed, "open": opened}
 
 
 def stages_of(server: Server, path: str, frames: int) -> dict[str, float]:
@@ -65,9 +61,6 @@ def tell(raw: dict) -> str:
                 ("profile", "clients", "frames/s", "p50, ms", "p99", "cores used", "memory, MiB"),
                 [closed_row(name, result) for name, part in raw.items() for result in part["closed"]],
             ),
-            "Frames/s with all cores, as a multiple of those with one thread of the network: "
-            + ", ".join(f"{name} {part['growth']:.2f}" for name, part in raw.items())
-            + ".\n",
             open_loop,
             table(
                 ("profile", "load, % of capacity", "frames/s", "p50, ms", "p99")
