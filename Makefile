@@ -134,7 +134,7 @@ reliability: ## kill, flood, starve and soak the server (an hour), or only PARTS
 	$(PYTHON) tests/reliability/run.py $(FORM) $(PARTS)
 
 bench: ## run short benchmarks against other servers (a few minutes): lab/benches/RESULTS.md
-bench-full: ## run the benchmarks for reliable figures: an hour on an idle machine
+bench-full: ## run the benchmarks for reliable figures: half an hour on an idle machine
 bench: BENCH = short
 bench-full: BENCH = full
 bench bench-full:

@@ -32,8 +32,8 @@ TUNED = ("plain", "slicer")
 SLOW_CLIENTS = 4
 """Clients of the paper's plan in plain Python, enough to keep all cores busy at many seconds per frame."""
 PUBLISHED = (
-    "RAPiD, which finds rotated boxes in the frame itself, takes 1.8 s for an image on an Intel i7-8559U with four cores, "
-    "by its authors (Konrad et al., arXiv 2312.06544). It was not run here: its license forbids commercial use."
+    "RAPiD takes 1.8 s an image on an Intel i7-8559U (four cores), by its authors (arXiv 2312.06544). Not run here: its "
+    "license forbids commercial use."
 )
 # The comparisons.
 PAIRS = (

@@ -48,20 +48,16 @@ def stages_of(server: Server, path: str, frames: int) -> dict[str, float]:
 
 def tell(raw: dict) -> str:
     """The tables as Markdown."""
-    open_loop = (
-        "Open loop: frames are due at random times (Poisson), independent of the server, up to 256 at a time; "
-        "latencies count from the due time. Default settings: at most 16 frames in flight.\n"
-    )
     return "\n".join(
         [
             "Time per stage of a frame, ms, one client (median):\n",
             table(("profile", *STAGES, "not the network"), [stage_row(name, part) for name, part in raw.items()]),
-            "Closed loop: each client sends its next request after the response.\n",
+            "Closed loop:\n",
             table(
                 ("profile", "clients", "frames/s", "p50, ms", "p99", "cores used", "memory, MiB"),
                 [closed_row(name, result) for name, part in raw.items() for result in part["closed"]],
             ),
-            open_loop,
+            "Open loop, default settings (at most 16 frames in flight), up to 256 requests at a time:\n",
             table(
                 ("profile", "load, % of capacity", "frames/s", "p50, ms", "p99")
                 + ("refused", "p99 of refusals, ms", "broken or late", "cores used"),

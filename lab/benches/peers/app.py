@@ -1,4 +1,4 @@
-"""The web server of the peers in Python: FastAPI around the `detector_of(settings)` of the peer's own `detector` module.
+"""The web server of the peers in Python: FastAPI around the `Detector` of the peer's own `detector` module.
 
 Serves `POST /detect` (the frame as the body). Settings are environment variables: MODEL (a file), FRAMES (worked on at
 once), THREADS (of one run of the network), BATCH (images in a run), and those of the peer.
@@ -8,12 +8,12 @@ import asyncio
 import os
 from concurrent.futures import ThreadPoolExecutor
 
-from detector import detector_of
+from detector import Detector
 from fastapi import FastAPI, Request
 
 app = FastAPI()
 workers = ThreadPoolExecutor(int(os.environ["FRAMES"]))
-detector = detector_of(os.environ)
+detector = Detector(os.environ)
 
 
 @app.get("/ready")

@@ -20,31 +20,19 @@ CROP_SCORE = 0.05
 """The minimum score of a person who is looked at again."""
 
 
-def detector_of(settings: Mapping[str, str]) -> "Detector":
-    """The detector of these settings."""
-    return Detector(
-        (settings["MODEL"], settings["CROP_MODEL"]),
-        int(settings["CROPS"]),
-        json.loads(Path(settings["PLAN"]).read_text()),
-        json.loads(Path(settings["CALIBRATION"]).read_text()),
-        settings["REFINE"],
-        int(settings["THREADS"]),
-        int(settings["BATCH"]),
-    )
-
-
 class Detector:
     """Finds persons in the frames of one camera."""
 
-    def __init__(
-        self, models: tuple[str, str], crops: int, plan: dict, calibration: dict, refine: str, threads: int, batch: int
-    ):
+    def __init__(self, settings: Mapping[str, str]):
         options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = threads
-        self.sessions = [onnxruntime.InferenceSession(model, options) for model in models[: 1 + bool(crops)]]
+        options.intra_op_num_threads = int(settings["THREADS"])
+        models = settings["MODEL"], settings["CROP_MODEL"]
+        self.sessions = [onnxruntime.InferenceSession(model, options) for model in models]
         self.size = self.sessions[0].get_inputs()[0].shape[2]
-        self.crops, self.plan, self.calibration, self.batch = crops, plan["views"], calibration, batch
-        self.refine = {"nms": nms, "soft_nms": soft_nms}[refine]
+        self.crops, self.batch = int(settings["CROPS"]), int(settings["BATCH"])
+        self.plan = json.loads(Path(settings["PLAN"]).read_text())["views"]
+        self.calibration = json.loads(Path(settings["CALIBRATION"]).read_text())
+        self.refine = {"nms": nms, "soft_nms": soft_nms}[settings["REFINE"]]
         self.views: dict[int, tuple[Lens, list[View]]] = {}
         self.making = threading.Lock()
 
@@ -54,7 +42,7 @@ class Detector:
         lens, views = self.views_for(frame.shape[1])
         found = self.boxes_in(self.sessions[0], frame, views, CROP_SCORE if self.crops else SCORE)
         if self.crops:
-            likely = sorted(nms(found[:, :4], found[:, 4]), key=lambda person: -person[1])[: self.crops]
+            likely = nms(found[:, :4], found[:, 4])[: self.crops]
             crops = [View(view_of_person(box, lens), self.size, lens) for box, _ in likely]
             found = np.concatenate([found, self.boxes_in(self.sessions[1], frame, crops, SCORE)])
         found = found[found[:, 4] >= SCORE]

@@ -21,11 +21,11 @@ OVERLAP = 0.2
 class Detector:
     """Finds persons in frames."""
 
-    def __init__(self, model: str, side: int, threads: int, workers: int, score: float = SCORE):
-        self.score = score
+    def __init__(self, settings: Mapping[str, str]):
         options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = threads
-        self.session = onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
+        options.intra_op_num_threads = int(settings["THREADS"])
+        side = int(settings["SLICE"])
+        self.session = onnxruntime.InferenceSession(settings["MODEL"], options, providers=["CPUExecutionProvider"])
         self.size = self.session.get_inputs()[0].shape[2]
         self.slicer = supervision.InferenceSlicer(
             callback=self.persons_of,
@@ -33,7 +33,7 @@ class Detector:
             overlap_wh=(round(side * OVERLAP),) * 2,
             overlap_filter=supervision.OverlapFilter.NON_MAX_SUPPRESSION,
             iou_threshold=MERGED_IOU,
-            thread_workers=workers,
+            thread_workers=int(settings["FRAMES"]),
         )
 
     def detect(self, jpeg: bytes) -> list[dict]:
@@ -52,15 +52,10 @@ class Detector:
         tensor = np.zeros((1, 3, self.size, self.size), np.float32)
         tensor[0, :, : scaled.shape[0], : scaled.shape[1]] = scaled[..., ::-1].transpose(2, 0, 1)
         boxes, scores = (output[0] for output in self.session.run(["boxes", "scores"], {"images": tensor}))
-        good = scores >= self.score
+        good = scores >= SCORE
         found = supervision.Detections(
             xyxy=np.clip(boxes[good] * (longest / self.size), 0, (*piece.shape[1::-1],) * 2),
             confidence=scores[good],
             class_id=np.zeros(int(good.sum()), int),
         )
         return found.with_nms(SLICE_IOU)
-
-
-def detector_of(settings: Mapping[str, str]) -> Detector:
-    """The detector of these settings."""
-    return Detector(settings["MODEL"], int(settings["SLICE"]), int(settings["THREADS"]), int(settings["FRAMES"]))
