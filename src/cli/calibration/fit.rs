@@ -30,7 +30,7 @@ use super::{
     source::{Source, refuse_input, write_native},
 };
 use crate::{
-    cli::{parameters::one_of, settings_file::SettingsFile},
+    cli::{parameters::one_of, server_flags::SettingsFile},
     room_calibration::{
         checked, draw_preview, give_height, given_lens, known_height, room_calibration, tilt_deg,
     },
