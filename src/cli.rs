@@ -10,13 +10,11 @@ mod eval;
 mod health;
 mod key;
 mod model;
-mod output;
 mod parameters;
 mod progress;
 mod run;
 mod serve;
 mod server_flags;
-mod settings_file;
 mod watch;
 
 use std::{
@@ -29,8 +27,8 @@ use anyhow::Context;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use self::{
-    output::{UNWRITABLE, is_closed_pipe, with_causes},
-    settings_file::SettingsFile,
+    progress::{UNWRITABLE, is_closed_pipe, with_causes},
+    server_flags::SettingsFile,
 };
 use crate::api;
 

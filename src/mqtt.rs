@@ -7,13 +7,11 @@
 mod broker;
 mod camera;
 mod cameras;
-mod connector;
 mod counts;
 mod discovery;
 mod images;
 mod occupancy;
 mod publisher;
-mod retained;
 mod session;
 mod switches;
 mod topics;

@@ -4,57 +4,47 @@
 //! Each setting is declared once, with `settings!`: its key, type, form, default and documentation.
 //! `packaging/lookdown.toml` and `docs/configuration.md` are generated from these declarations.
 
-mod access;
 mod calibrations;
-mod counts;
 mod declare;
-mod detect;
-mod engine_errors;
 mod entry;
-mod error;
 mod form;
 mod inference;
-mod lists;
 mod locate;
-mod mqtt;
-mod observability;
 #[cfg(test)]
 mod reference;
 mod results;
 mod server;
-mod threads;
 mod values;
-mod variables;
 
 use std::{path::Path, time::Duration};
 
 use lookdown_common::ServerEntry;
+use lookdown_detect::parameters::DetectDefaults;
+use lookdown_http::server::ConnectionLimits;
 
-pub use access::AccessSettings;
 pub use calibrations::{CalibrationSettings, StateSettings};
-pub use counts::CountSettings;
-pub use engine_errors::explain;
-pub use error::SettingsError;
-pub use inference::{InferenceSettings, ModelSettings, RemoteSettings};
-pub use lists::ListSettings;
+pub use entry::{CAMERA_VARIABLE, SettingsError, environment};
+pub use inference::{InferenceSettings, ModelSettings, RemoteSettings, ThreadPlan, explain};
 pub use locate::{
     PackagedFiles, find_calibrations, find_installed, is_installed, use_packaged_files,
 };
-use lookdown_detect::parameters::DetectDefaults;
-pub use observability::{LogFormat, LogSettings, TraceSettings};
-pub use results::ResultSettings;
-pub use server::{LimitSettings, ServerSettings, ShutdownSettings};
-pub use threads::ThreadPlan;
-pub use variables::{CAMERA_VARIABLE, environment};
+pub use results::{CountSettings, ResultSettings};
+pub use server::{
+    AccessSettings, LimitSettings, LogFormat, LogSettings, ServerSettings, ShutdownSettings,
+    TraceSettings,
+};
+pub use values::ListSettings;
 
-pub(crate) use variables::variable_of;
+pub(crate) use entry::variable_of;
 
 use self::{
-    counts::UpstreamKeys, declare::Table, entry::Entry, inference::RemoteKeys, mqtt::MqttKeys,
-    results::ResultKeys, server::TlsKeys, threads::ThreadKeys, values::Values,
+    declare::Table,
+    entry::{Entry, ignored},
+    inference::{RemoteKeys, ThreadKeys},
+    results::{MqttKeys, ResultKeys, UpstreamKeys},
+    server::TlsKeys,
+    values::Values,
 };
-use lookdown_http::server::ConnectionLimits;
-
 use crate::{mqtt::MqttOptions, results::ResultLimits, tls::TlsOptions};
 
 /// All settings, checked.
@@ -198,5 +188,5 @@ pub fn load_with(
 /// A sentence on the variables among `names` that begin with `LOOKDOWN_` and are not settings, with
 /// the setting that each may have been meant for; `None` when there are none.
 pub fn ignored_variables(names: impl IntoIterator<Item = String>) -> Option<String> {
-    variables::ignored(names, &entries())
+    ignored(names, &entries())
 }

@@ -1,31 +1,28 @@
 //! TLS: the server's certificate and private key, reloaded when their files change, the handshakes,
 //! and TLS for outgoing connections.
 
-mod client;
-mod files;
 mod identity;
+#[cfg(test)]
+mod tests;
 
-use std::{io, num::NonZeroU64, sync::Arc};
+use std::{io, num::NonZeroU64, path::Path, sync::Arc};
 
 use jiff::Timestamp;
 use lookdown_common::LogOnce;
 use lookdown_http::server::Handshake;
 use parking_lot::{Mutex, RwLock};
-use rustls::ServerConfig;
+use rustls::{ClientConfig, RootCertStore, ServerConfig, pki_types::ServerName};
 use tokio::{
-    io::{AsyncReadExt, AsyncWriteExt},
+    io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt},
     net::TcpStream,
     time::timeout,
 };
-use tokio_rustls::{TlsAcceptor, server::TlsStream};
+use tokio_rustls::{TlsAcceptor, TlsConnector, client, server};
 
+pub use identity::TlsOptions;
+
+use self::identity::{Identity, TlsFiles, authorities_in, damaged};
 use crate::metrics::Metrics;
-
-use files::TlsFiles;
-use identity::Identity;
-
-pub use client::{ClientTls, Stream, connect};
-pub use files::TlsOptions;
 
 /// The current certificate and private key.
 pub struct Tls {
@@ -114,11 +111,11 @@ fn show(identity: &Identity, options: &TlsOptions, metrics: &Metrics) {
 }
 
 impl Handshake for Tls {
-    type Stream = TlsStream<TcpStream>;
+    type Stream = server::TlsStream<TcpStream>;
 
     /// Performs the TLS handshake of a connection. Returns `None` if it fails, is refused, or takes
     /// longer than the handshake timeout.
-    async fn accept(&self, connection: TcpStream) -> Option<TlsStream<TcpStream>> {
+    async fn accept(&self, connection: TcpStream) -> Option<server::TlsStream<TcpStream>> {
         let config = Arc::clone(&self.serving().config);
         let handshake = shake_hands(connection, config);
         let (result, encrypted) = match timeout(self.options.handshake_timeout, handshake).await {
@@ -151,7 +148,7 @@ const MAX_IGNORED_BYTES: u64 = 1 << 20;
 async fn shake_hands(
     mut connection: TcpStream,
     config: Arc<ServerConfig>,
-) -> io::Result<TlsStream<TcpStream>> {
+) -> io::Result<server::TlsStream<TcpStream>> {
     let mut first = [0];
     let read = connection.peek(&mut first).await?;
     if read == 0 {
@@ -168,5 +165,67 @@ async fn shake_hands(
     TlsAcceptor::from(config).accept(connection).await
 }
 
-#[cfg(test)]
-mod tests;
+/// A byte stream to a server.
+pub trait Stream: AsyncRead + AsyncWrite + Send + Unpin {}
+
+impl<T: AsyncRead + AsyncWrite + Send + Unpin> Stream for T {}
+
+/// Opens a connection whose small messages arrive without delay; with `tls` if the server uses TLS.
+///
+/// # Errors
+/// If the server cannot be reached, or its certificate is not valid for this host.
+pub async fn connect(
+    host: &str,
+    port: u16,
+    tls: Option<&ClientTls>,
+) -> io::Result<Box<dyn Stream>> {
+    let stream = TcpStream::connect((host, port)).await?;
+    stream.set_nodelay(true)?;
+    Ok(match tls {
+        Some(tls) => Box::new(tls.connect(host, stream).await?),
+        None => Box::new(stream),
+    })
+}
+
+/// The authorities that outgoing connections trust.
+#[derive(Clone)]
+pub struct ClientTls(TlsConnector);
+
+impl ClientTls {
+    /// Trusts the authorities in a PEM file, which the setting `setting` names, or those of the
+    /// system.
+    ///
+    /// # Errors
+    /// If the file cannot be used.
+    pub fn new(setting: &'static str, authorities: Option<&Path>) -> anyhow::Result<Self> {
+        let mut roots = RootCertStore::empty();
+        let trusted = match authorities {
+            Some(path) => authorities_in(setting, path)?,
+            None => rustls_native_certs::load_native_certs().certs,
+        };
+        // A certificate that cannot be parsed is not trusted.
+        let (_, refused) = roots.add_parsable_certificates(trusted);
+        if let Some(path) = authorities.filter(|_| refused > 0) {
+            return Err(damaged(setting, path));
+        }
+        let provider = Arc::new(rustls::crypto::ring::default_provider());
+        let config = ClientConfig::builder_with_provider(provider)
+            .with_safe_default_protocol_versions()?
+            .with_root_certificates(roots)
+            .with_no_client_auth();
+        Ok(Self(TlsConnector::from(Arc::new(config))))
+    }
+
+    /// Performs the handshake with the server `host`, a name or an address.
+    ///
+    /// # Errors
+    /// If the server's certificate is not valid for this host, or the connection fails.
+    pub async fn connect(
+        &self,
+        host: &str,
+        connection: TcpStream,
+    ) -> io::Result<client::TlsStream<TcpStream>> {
+        let name = ServerName::try_from(host.to_owned()).map_err(io::Error::other)?;
+        self.0.connect(name, connection).await
+    }
+}

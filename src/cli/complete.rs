@@ -20,7 +20,7 @@ use clap_complete::{
 };
 use lookdown_detect::inference::model_names;
 
-use crate::{cli::output::UNWRITABLE, settings};
+use crate::{cli::progress::UNWRITABLE, settings};
 
 /// The variable that the scripts set: the name of the shell.
 const VARIABLE: &str = "LOOKDOWN_COMPLETE";

@@ -15,8 +15,7 @@ use super::{
     SettingsFile,
     async_runtime::{THREADS, run_async},
     detect::stream::is_video,
-    server_flags::{ServerFlags, given},
-    settings_file::SettingsSource,
+    server_flags::{ServerFlags, SettingsSource, given},
 };
 use crate::{
     mqtt::{CountsOptions, CountsPublisher},

@@ -8,7 +8,7 @@ use std::{
 use anyhow::Context;
 use clap::Args;
 
-use super::{SettingsFile, async_runtime::for_this_thread, output::UNWRITABLE};
+use super::{SettingsFile, async_runtime::for_this_thread, progress::UNWRITABLE};
 use crate::probe::{self, Probe};
 
 /// Arguments of `lookdown health`.

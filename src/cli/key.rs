@@ -11,7 +11,7 @@ use lookdown_detect::fairness::PriorityLevel;
 
 use super::parameters::one_of;
 use crate::access::{KeyDigest, KeyName, Scope, Scopes, new_key};
-use crate::cli::output::UNWRITABLE;
+use crate::cli::progress::UNWRITABLE;
 
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {

@@ -19,10 +19,9 @@ use super::{
     SettingsFile,
     async_runtime::{THREADS, run_async},
     count::{counting, run_counts},
-    output::UNWRITABLE,
+    progress::UNWRITABLE,
     serve,
-    server_flags::{CameraFlags, given},
-    settings_file::SettingsSource,
+    server_flags::{CameraFlags, SettingsSource, given},
     watch::{cameras, separate},
 };
 use crate::{

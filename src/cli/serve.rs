@@ -18,7 +18,7 @@ use tokio::{
     time::timeout,
 };
 
-use super::{SettingsFile, async_runtime::run_async, output::UNWRITABLE, server_flags::given};
+use super::{SettingsFile, async_runtime::run_async, progress::UNWRITABLE, server_flags::given};
 use crate::{
     app::{App, Reloader, Sockets, assemble},
     settings::Settings,

@@ -14,8 +14,7 @@ use parking_lot::Mutex;
 use super::{
     SettingsFile,
     async_runtime::{THREADS, run_async},
-    server_flags::{CameraFlags, ServerFlags},
-    settings_file::{SettingsSource, is_settings_file},
+    server_flags::{CameraFlags, ServerFlags, SettingsSource, is_settings_file},
 };
 use crate::{cameras::Cameras, settings::Settings};
 use tokio_util::task::AbortOnDropHandle;

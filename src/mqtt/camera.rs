@@ -8,9 +8,8 @@ use serde_json::json;
 use tokio::time::Instant;
 
 use super::{
-    discovery::{Discovery, OFFLINE, ONLINE},
+    discovery::{Discovery, OFFLINE, ONLINE, part_withdrawal, withdrawal},
     occupancy::Occupancy,
-    retained::{part_withdrawal, withdrawal},
     session::Message,
     topics::{self, Topics},
 };

@@ -12,9 +12,8 @@ use tokio::time::Instant;
 
 use super::{
     camera::{Camera, Delays},
-    discovery::{Discovery, OFFLINE},
+    discovery::{Discovery, OFFLINE, RetainedTopics, part_withdrawal, withdrawal},
     images::CameraImage,
-    retained::{RetainedTopics, part_withdrawal, withdrawal},
     session::Message,
     topics::{Topics, is_part, level},
 };

@@ -19,10 +19,9 @@ use tokio::{
 use super::{
     Broker,
     cameras::{self, Cameras},
-    connector::Connector,
     discovery::{Discovery, OFFLINE, ONLINE},
     images::{CameraImage, Images},
-    session::{Message, Session, SessionError},
+    session::{Connector, Message, Session, SessionError},
     switches::Switches,
     topics::Topics,
 };

@@ -15,9 +15,8 @@ use tokio::{
 };
 
 use super::{
-    discovery::Discovery,
+    discovery::{Discovery, RetainedTopics},
     occupancy::{OFF, ON},
-    retained::RetainedTopics,
     session::Message,
     topics::{Topics, level},
 };

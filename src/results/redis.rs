@@ -9,12 +9,11 @@
 //! and exactly once: after a lost answer, Redis recognizes the report by its number.
 
 mod address;
-mod message;
-mod outbox;
-mod pushes;
 mod reading;
 mod session;
 mod shared;
+#[cfg(test)]
+mod tests;
 
 use std::{io, num::NonZeroUsize, sync::Arc, time::Duration};
 
@@ -26,21 +25,19 @@ use lookdown_http::request_id::new_id;
 use redis::{RedisResult, Script, aio::MultiplexedConnection};
 use tokio::{task::JoinSet, time::timeout};
 
+pub use address::{RedisAddress, RedisAddressError};
+pub use shared::RedisOptions;
+
+use self::{
+    address::{Connector, TIMEOUT},
+    reading::Reader,
+    shared::{Followed, Keys, Link, Outbox, PendingReport, Shared, is_refusal},
+};
 use super::{
     Cameras, ListenError, Listeners, Listening, NewReport, ReportId, ResultLimits, ResultStore,
     ResultUse, StoreHealth, StoredImage, StoredReport, Unreachable,
 };
 use crate::{annotated_image::StoredFrame, metrics::Metrics};
-
-use address::{Connector, TIMEOUT};
-use outbox::{Outbox, PendingReport};
-use reading::Reader;
-use shared::{Followed, Keys, Link, Shared, is_refusal};
-
-pub use {
-    address::{RedisAddress, RedisAddressError},
-    shared::RedisOptions,
-};
 
 /// Longest time that the shutdown waits for reports that Redis has not stored yet.
 const LAST_WAIT: Duration = Duration::from_secs(2);
@@ -294,6 +291,3 @@ impl Sender<'_> {
 fn now_micros() -> u64 {
     u64::try_from(Timestamp::now().as_microsecond()).unwrap_or_default()
 }
-
-#[cfg(test)]
-mod tests;

@@ -1,16 +1,26 @@
 //! The calibration store: a folder, and the memory for what is computed from it.
 //!
 //! The state that is changed over HTTP.
+//!
+//! Defaults of detection parameters. Their keys follow from the table of the parameters.
 
-use std::{num::NonZeroU64, path::PathBuf};
+use std::{num::NonZeroU64, path::PathBuf, sync::LazyLock};
 
-use lookdown_detect::pipeline::EngineOptions;
+use lookdown_detect::{
+    parameters::{DetectDefaults, ParameterSpec},
+    pipeline::EngineOptions,
+};
 use lookdown_lens::self_calibration::IdealLens;
 
 use super::{
-    declare::settings,
-    form::{MAX_BYTES, flag, optional, path, poll_seconds, variant, whole},
+    SettingsError,
+    declare::{Table, settings},
+    entry::Entry,
+    form::{
+        Form, MAX_BYTES, Refusal, flag, optional, optional_text, path, poll_seconds, variant, whole,
+    },
     locate::DEFAULT_CALIBRATIONS,
+    values::Values,
 };
 
 settings! {
@@ -53,4 +63,44 @@ settings! {
         /// is created when it is needed.
         path: PathBuf = "state".into() => path();
     }
+}
+
+/// The parameters with their keys.
+static KEYS: LazyLock<Vec<(&'static ParameterSpec, String)>> = LazyLock::new(|| {
+    let offered = DetectDefaults::offered();
+    offered
+        .map(|spec| (spec, format!("detect.{}", spec.name)))
+        .collect()
+});
+
+impl Table for DetectDefaults {
+    fn read(values: &Values) -> Result<Self, SettingsError> {
+        let mut given = Vec::new();
+        for (spec, key) in KEYS.iter() {
+            if let Some(Some(value)) = values.get(key, &value(spec))? {
+                given.push((spec.name, value));
+            }
+        }
+        let pairs = given.iter().map(|(name, value)| (*name, value.as_str()));
+        Self::parse(pairs).map_err(|error| SettingsError::hidden("detect", error))
+    }
+
+    fn entries() -> Vec<Entry> {
+        let entries = KEYS.iter().map(|(spec, key)| {
+            let name = spec.name;
+            let help = format!("The default of the parameter `{name}` (docs/parameters.md).");
+            Entry::new(key, &[&help], &value(spec), &None)
+        });
+        entries.collect()
+    }
+}
+
+/// A value of the parameter.
+fn value(spec: &'static ParameterSpec) -> Form<Option<String>> {
+    optional_text(spec.kind.rule(), |text| {
+        let checked = DetectDefaults::parse([(spec.name, text)]);
+        checked
+            .map(|_| text.to_owned())
+            .map_err(|_| Refusal::Shown(format!("give {}", spec.kind.rule())))
+    })
 }

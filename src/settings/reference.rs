@@ -2,7 +2,11 @@
 
 use std::{fmt::Write as _, fs, path::Path};
 
-use super::{entries, entry::Entry, load, variables::variable_of};
+use super::{
+    entries,
+    entry::{Entry, variable_of},
+    load,
+};
 
 /// Width of the generated files, characters.
 const WIDTH: usize = 100;

@@ -1,20 +1,24 @@
 //! Values by their keys: those of the settings file, and the environment variables that take
 //! precedence.
+//!
+//! The tables of the settings file that are lists: cameras and webhooks.
 
 use std::{collections::BTreeMap, path::Path};
 
 use lookdown_common::{
     StoredFile,
     files::{self, MAX_SETTINGS_BYTES},
+    parse_toml,
 };
+use lookdown_count::WebhookEntry;
+use lookdown_watch::CameraEntry;
+use serde::Deserialize;
 use toml::{Table, Value};
 
 use super::{
     SettingsError,
-    entry::{Entry, unknown},
+    entry::{Entry, key_of, unknown},
     form::{Form, Written},
-    lists::{self, ListSettings},
-    variables,
 };
 
 /// The values that were given.
@@ -42,7 +46,7 @@ impl Values {
             if let Some(version) = table.remove(StoredFile::KEY) {
                 check_version(path, &version)?;
             }
-            let lists = lists::NAMES
+            let lists = LIST_NAMES
                 .iter()
                 .filter(|name| table.remove(**name).is_some());
             if lists.count() > 0 {
@@ -51,7 +55,7 @@ impl Values {
             values.add_table("", table, entries)?;
         }
         for (name, value) in environment {
-            if let Some(key) = variables::key_of(&name, entries)? {
+            if let Some(key) = key_of(&name, entries)? {
                 values.variables.insert(key, value);
             }
         }
@@ -147,4 +151,32 @@ fn check_version(path: &Path, version: &Value) -> Result<(), SettingsError> {
 fn on_one_line(message: &str) -> String {
     let lines = message.lines().filter(|line| !line.contains('|'));
     lines.collect::<Vec<_>>().join(": ")
+}
+
+/// The names of the tables that are lists.
+const LIST_NAMES: [&str; 3] = ["cameras", "camera_defaults", "webhooks"];
+
+/// Cameras and webhooks as they are written.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+pub struct ListSettings {
+    /// The values of keys that a camera does not have.
+    #[serde(default)]
+    pub camera_defaults: CameraEntry,
+    /// The cameras of `lookdown run` and `lookdown watch`.
+    #[serde(default)]
+    pub cameras: Vec<CameraEntry>,
+    /// The receivers of messages of `lookdown run` and `lookdown count`.
+    #[serde(default)]
+    pub webhooks: Vec<WebhookEntry>,
+}
+
+impl ListSettings {
+    /// The lists in the text of a settings file.
+    pub(super) fn read(text: &str) -> Result<Self, SettingsError> {
+        Ok(parse_toml(
+            text,
+            "the settings file",
+            "docs/configuration.md",
+        )?)
+    }
 }

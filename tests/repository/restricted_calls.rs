@@ -45,7 +45,7 @@ const STARTERS: [&str; 2] = [
 const COMPARISONS: [&str; 2] = [".identify(", ".holder_of("];
 /// The files that may make them.
 const COMPARERS: [&str; 4] = [
-    "src/access/key_list.rs",
+    "src/access.rs",
     "src/api/http/access.rs",
     "src/api/http/context.rs",
     "src/api/require_scope.rs",
@@ -78,11 +78,11 @@ const CLOCK_READERS: [&str; 21] = [
     "src/api/routes/results.rs",
     "src/api/detect/upload.rs",
     "src/app.rs",
-    "src/calibration_store/store.rs",
+    "src/calibration_store.rs",
     "src/mqtt/publisher.rs",
     "src/results/memory.rs",
     "src/results/redis.rs",
-    "src/telemetry/request_trace.rs",
+    "src/telemetry.rs",
     // The validity of certificates.
     "src/tls.rs",
 ];
@@ -106,7 +106,7 @@ const CLIENT_MAKERS: [&str; 5] = [
     // Asks this machine's own server, whose certificate is for other names; ends after 3 s.
     "src/probe.rs",
     // Uses the proxies of the system; ends after 5 s.
-    "src/telemetry/tracer.rs",
+    "src/telemetry.rs",
 ];
 
 /// The source files of all crates without those of tests.

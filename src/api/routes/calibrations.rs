@@ -54,10 +54,7 @@ use crate::{
         require_scope::{RequireAdmin, RequireRead},
     },
     calibration_store::{CalibrationEntry, CalibrationRow, ChangeError},
-    room_calibration::{
-        known::{FIELD_OF_VIEW_DEG, LENS, parsed},
-        known_camera, room_calibration,
-    },
+    room_calibration::{FIELD_OF_VIEW_DEG, LENS, known_camera, parsed, room_calibration},
     suggestions::FRAMES,
 };
 

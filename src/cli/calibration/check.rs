@@ -25,7 +25,7 @@ use super::{
     read_frame,
     source::{NamedCamera, Source, refuse_input},
 };
-use crate::cli::output::UNWRITABLE;
+use crate::cli::progress::UNWRITABLE;
 
 /// The resolution of the plan's views: the input side of the default network, pixels.
 const VIEW_SIDE: u32 = 416;

@@ -7,7 +7,7 @@ use clap::Args;
 use lookdown_calibration::export::Target;
 
 use super::source::Source;
-use crate::cli::{output::write_or_print, parameters::one_of};
+use crate::cli::{parameters::one_of, progress::write_or_print};
 
 /// Arguments of `lookdown calibration convert`.
 #[derive(Debug, Args)]

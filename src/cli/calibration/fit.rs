@@ -30,9 +30,9 @@ use super::{
     source::{Source, refuse_input, write_native},
 };
 use crate::{
-    cli::{parameters::one_of, settings_file::SettingsFile},
+    cli::{parameters::one_of, server_flags::SettingsFile},
     room_calibration::{
-        checked, give_height, given_lens, known::known_height, preview, room_calibration, tilt_deg,
+        checked, draw_preview, give_height, given_lens, known_height, room_calibration, tilt_deg,
     },
     rounding::{meters as thousandths, radians_below},
 };
@@ -321,7 +321,7 @@ fn fit_to_room(
     report(arguments, &fit, &calibration.sources);
     let first = frames.first().zip(edges.first());
     if let (Some(out), Some((frame, edges))) = (&arguments.preview, first) {
-        let drawn = preview::draw(&checked(&calibration)?, &fit, frame, edges)?;
+        let drawn = draw_preview(&checked(&calibration)?, &fit, frame, edges)?;
         fs::write(out, drawn)
             .with_context(|| format!("--preview: {} cannot be written", out.display()))?;
     }

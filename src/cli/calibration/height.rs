@@ -9,7 +9,7 @@ use super::{
     people::{PeopleSource, set_height},
     source::{Source, read_frames, write_native},
 };
-use crate::cli::settings_file::SettingsFile;
+use crate::cli::server_flags::SettingsFile;
 
 /// Arguments of `lookdown calibration height`.
 #[derive(Debug, Args)]

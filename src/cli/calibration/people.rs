@@ -29,7 +29,7 @@ use lookdown_lens::{
 
 use crate::{
     app::engine_for,
-    cli::settings_file::SettingsFile,
+    cli::server_flags::SettingsFile,
     room_calibration::{self, checked, may_set_height},
 };
 

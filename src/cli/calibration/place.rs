@@ -19,7 +19,7 @@ use tokio::time;
 
 use crate::cli::{
     async_runtime::for_this_thread,
-    output::UNWRITABLE,
+    progress::UNWRITABLE,
     server_flags::{ServerFlags, read_json},
 };
 

@@ -22,7 +22,7 @@ use lookdown_imaging::{
     decode::{DecodeLimits, decode},
 };
 
-use crate::{calibration_store::defaults, cli::output::write_or_print};
+use crate::{calibration_store::defaults, cli::progress::write_or_print};
 
 /// The arguments that select a file, and a camera of it.
 #[derive(Debug, Args)]

@@ -12,7 +12,7 @@ use serde_json::json;
 
 use crate::cli::{
     async_runtime::for_this_thread,
-    output::UNWRITABLE,
+    progress::UNWRITABLE,
     server_flags::{ServerFlags, read_json},
 };
 

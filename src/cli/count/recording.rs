@@ -32,9 +32,8 @@ use crate::{
         annotate::AnnotatedVideo,
         async_runtime::for_this_thread,
         detect::stream::{interval, is_video},
-        output::write_or_print,
         parameters::{ParameterFlags, named_calibration},
-        progress::Progress,
+        progress::{Progress, write_or_print},
         server_flags::given,
     },
 };

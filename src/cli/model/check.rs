@@ -30,7 +30,7 @@ use crate::{
     annotated_image::AnnotationOptions,
     app::{engine_for, onnx_options},
     cli::{
-        annotate, eval::DEFAULT_SCORE_THRESHOLD, output::UNWRITABLE, settings_file::SettingsFile,
+        annotate, eval::DEFAULT_SCORE_THRESHOLD, progress::UNWRITABLE, server_flags::SettingsFile,
     },
     settings::{Settings, explain, find_installed},
 };

@@ -10,7 +10,7 @@ use anyhow::Context;
 use lookdown_detect::inference::{ModelManifest, model_names};
 
 use crate::{
-    cli::{output::UNWRITABLE, settings_file::SettingsFile},
+    cli::{progress::UNWRITABLE, server_flags::SettingsFile},
     settings::explain,
 };
 

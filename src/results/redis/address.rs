@@ -1,17 +1,24 @@
 //! The address of a Redis.
 //!
 //! Opens connections to Redis, with a bound on the time of every reply.
+//!
+//! A bounded queue of the messages that Redis pushes. A queue that overflows ends, and with it the
+//! connection: the next one reads from the streams what it has missed.
 
-use std::{fmt, io, str::FromStr, time::Duration};
+use std::{fmt, io, str::FromStr, sync::Arc, time::Duration};
 
+use parking_lot::Mutex;
 use redis::{
-    AsyncConnectionConfig, Client, ConnectionAddr, ProtocolVersion, RedisResult,
-    aio::MultiplexedConnection,
+    AsyncConnectionConfig, Client, ConnectionAddr, ProtocolVersion, PushInfo, PushKind,
+    RedisResult, Value, aio::MultiplexedConnection,
 };
-use tokio::{spawn, time::timeout};
+use tokio::{
+    spawn,
+    sync::{Notify, OwnedSemaphorePermit, Semaphore, mpsc},
+    time::timeout,
+};
 use url::Url;
 
-use super::pushes::{self, Pushes};
 use crate::tls::{ClientTls, Stream, connect};
 
 /// The address and the credentials of a Redis. It is displayed without the credentials.
@@ -106,7 +113,7 @@ impl Connector {
 
     /// Connects for subscriptions, and logs in.
     pub(super) async fn connect_for_pushes(&self) -> RedisResult<(MultiplexedConnection, Pushes)> {
-        let (accept, pushes) = pushes::queue();
+        let (accept, pushes) = queue();
         let config = AsyncConnectionConfig::new().set_push_sender(accept);
         let connection = self.open(ProtocolVersion::RESP3, config).await?;
         Ok((connection, pushes))
@@ -145,6 +152,77 @@ impl Connector {
     }
 }
 
+/// Most bytes of the messages that wait, beside those of the largest report.
+const MOST_BYTES: usize = 16 << 20;
+/// Memory of a message in addition to its payload.
+const MESSAGE_BYTES: usize = 1 << 10;
+
+/// A message, and its share of the queue's memory.
+type Waiting = (PushInfo, OwnedSemaphorePermit);
+
+/// The receiving end of the queue.
+pub(super) struct Pushes {
+    messages: mpsc::Receiver<Waiting>,
+    ended: Arc<Notify>,
+}
+
+/// Creates a queue: a function that accepts messages without waiting, and the receiving end.
+pub(super) fn queue() -> (
+    impl Fn(PushInfo) -> Result<(), ()> + Send + Sync + 'static,
+    Pushes,
+) {
+    let (sender, messages) = mpsc::channel::<Waiting>(MOST_BYTES / MESSAGE_BYTES);
+    let sender = Mutex::new(Some(sender));
+    let bytes = Arc::new(Semaphore::new(MOST_BYTES));
+    let ended = Arc::new(Notify::new());
+    let pushes = Pushes {
+        messages,
+        ended: Arc::clone(&ended),
+    };
+    let accept = move |push: PushInfo| {
+        let mut sender = sender.lock();
+        let is_over = push.kind == PushKind::Disconnection;
+        let size = u32::try_from(bytes_of(&push)).unwrap_or(u32::MAX);
+        let share = Arc::clone(&bytes).try_acquire_many_owned(size);
+        match (&*sender, share) {
+            (Some(open), Ok(share)) if !is_over => open.try_send((push, share)).map_err(|_| ()),
+            _ => {
+                *sender = None;
+                ended.notify_one();
+                Err(())
+            }
+        }
+    };
+    (accept, pushes)
+}
+
+impl Pushes {
+    /// The end of the connection or of the queue, at once, also while messages wait.
+    pub(super) fn ended(&self) -> Arc<Notify> {
+        Arc::clone(&self.ended)
+    }
+
+    /// Returns the next message. `None` when the connection or the queue has ended.
+    pub(super) async fn next(&mut self) -> Option<PushInfo> {
+        let (push, _) = self.messages.recv().await?;
+        Some(push)
+    }
+
+    /// Returns the next message if it has arrived already.
+    pub(super) fn waiting(&mut self) -> Option<PushInfo> {
+        let (push, _) = self.messages.try_recv().ok()?;
+        Some(push)
+    }
+}
+
+fn bytes_of(push: &PushInfo) -> usize {
+    let parts = push.data.iter().map(|part| match part {
+        Value::BulkString(bytes) => bytes.len(),
+        _ => 0,
+    });
+    MESSAGE_BYTES + parts.sum::<usize>()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -176,5 +254,41 @@ mod tests {
             let error = text.parse::<RedisAddress>().unwrap_err();
             assert!(!error.to_string().contains("s3cret"), "{text}");
         }
+    }
+
+    fn message(length: usize) -> PushInfo {
+        PushInfo {
+            kind: PushKind::SMessage,
+            data: vec![Value::BulkString(vec![b'x'; length])],
+        }
+    }
+
+    #[tokio::test]
+    async fn messages_are_received_in_order_until_it_overflows() {
+        let (accept, mut pushes) = queue();
+        for length in 0..1000 {
+            accept(message(length)).unwrap();
+            assert_eq!(pushes.next().await, Some(message(length)));
+        }
+        let accepted = (0..MOST_BYTES).take_while(|_| accept(message(9000)).is_ok());
+        let accepted = accepted.count();
+        assert!((1..=MOST_BYTES / 9000).contains(&accepted), "{accepted}");
+        for _ in 0..accepted {
+            assert_eq!(pushes.next().await, Some(message(9000)));
+        }
+        assert_eq!(pushes.next().await, None);
+    }
+
+    #[tokio::test]
+    async fn a_lost_connection_ends_the_queue() {
+        let (accept, mut pushes) = queue();
+        accept(message(1)).unwrap();
+        let disconnection = PushInfo {
+            kind: PushKind::Disconnection,
+            data: Vec::new(),
+        };
+        accept(disconnection).unwrap_err();
+        assert!(pushes.next().await.is_some());
+        assert!(pushes.next().await.is_none());
     }
 }

@@ -1,5 +1,7 @@
 //! Queries to Redis, and the parsing of its answers into reports. Entries that are not reports of
 //! Lookdown are skipped.
+//!
+//! The messages on the channels: new reports, as `record.lua` publishes them.
 
 use std::{num::NonZeroUsize, sync::Arc};
 
@@ -13,7 +15,7 @@ use redis::{
     streams::{StreamId, StreamRangeReply},
 };
 
-use super::{message::is_one_line, shared::Keys};
+use super::shared::Keys;
 use crate::{
     annotated_image::StoredFrame,
     results::{Cameras, NewReport, ReportId, ResultUse, StoredImage, StoredReport},
@@ -276,4 +278,66 @@ fn text(entry: &StreamId, field: &str) -> Option<String> {
 
 fn id_of(entry: &StreamId) -> Option<ReportId> {
     entry.id.strip_suffix("-0")?.parse().ok()
+}
+
+/// Parses a message: the ID, the time of arrival, the number of persons, the JSON and the camera,
+/// in lines of their own. Returns `None` for the message of another program.
+pub(super) fn parse_message(message: Vec<u8>) -> Option<StoredReport> {
+    let message = Bytes::from(message);
+    let mut parts = message.splitn(5, |&byte| byte == b'\n');
+    let id = str::from_utf8(parts.next()?).ok()?.parse().ok()?;
+    let received_at = str::from_utf8(parts.next()?).ok()?.parse().ok()?;
+    let persons = str::from_utf8(parts.next()?).ok()?.parse().ok()?;
+    let json = parts.next()?;
+    let camera = str::from_utf8(parts.next()?).ok()?.to_owned();
+    let is_report = is_one_line(json) && is_camera_name(&camera);
+    is_report.then(|| StoredReport {
+        id,
+        report: NewReport {
+            camera,
+            received_at,
+            persons,
+            scores: None,
+            json: message.slice_ref(json),
+        },
+    })
+}
+
+/// Returns false for JSON with line ends: each line would be an event of its own in an event
+/// stream.
+pub(super) fn is_one_line(json: &[u8]) -> bool {
+    !json.iter().any(|byte| matches!(byte, b'\r' | b'\n'))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn message_of_the_script_is_a_report() {
+        let message = "7\n2026-11-22T09:30:00Z\n2\n{\"persons\":[]}\nhall of mirrors";
+        let stored = parse_message(message.into()).unwrap();
+        assert_eq!(stored.id.to_string(), "7");
+        assert_eq!(stored.report.camera, "hall of mirrors");
+        assert_eq!(stored.report.persons, 2);
+        assert_eq!(&stored.report.json[..], b"{\"persons\":[]}");
+    }
+
+    #[test]
+    fn messages_of_other_programs_are_ignored() {
+        for message in [
+            "",
+            "7",
+            "7\n2026-11-22T09:30:00Z\n2\n{}",
+            "seven\n2026-11-22T09:30:00Z\n2\n{}\nhall",
+            "7\nyesterday\n2\n{}\nhall",
+            "7\n2026-11-22T09:30:00Z\n-2\n{}\nhall",
+            "7\n2026-11-22T09:30:00Z\n2\n{}\r\nhall",
+            "7\n2026-11-22T09:30:00Z\n2\n{}\nhall\nof mirrors",
+            "7\n2026-11-22T09:30:00Z\n2\n{}\n\u{202e}llah",
+        ] {
+            assert!(parse_message(message.into()).is_none(), "{message:?}");
+        }
+        assert!(parse_message(b"7\n2026-11-22T09:30:00Z\n2\n{}\n\xff".to_vec()).is_none());
+    }
 }

@@ -13,7 +13,11 @@ use lookdown_common::{Backoff, LogOnce, text::one_line};
 use redis::{PushInfo, PushKind, RedisError, RedisResult, Value, aio::MultiplexedConnection, pipe};
 use tokio::time::{Instant, MissedTickBehavior, interval, sleep};
 
-use super::{Shared, message, pushes::Pushes, reading::Reader};
+use super::{
+    Shared,
+    address::Pushes,
+    reading::{Reader, parse_message},
+};
 use crate::results::{Cameras, ReportId};
 
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
@@ -156,7 +160,7 @@ impl News<'_> {
             return;
         };
         if let (PushKind::SMessage, Some(Value::BulkString(report))) = (push.kind, data.next()) {
-            let report = message::parse(report).map(Arc::new);
+            let report = parse_message(report).map(Arc::new);
             let position = self.positions.entry(cameras.clone()).or_default();
             // A report may have been read from the stream before.
             if let Some(report) = report.filter(|report| report.id > *position) {

@@ -199,3 +199,14 @@ fn new_keys_are_long_differ_and_are_nowhere_in_debug_output() {
     assert_eq!(one.len(), PREFIX.len() + 64);
     assert_eq!(format!("{:?}", KeyDigest::new(b"abc")), "KeyDigest(…)");
 }
+
+#[test]
+fn a_scope_opens_itself_and_admin_opens_all() {
+    for &own in Scope::VARIANTS {
+        for &wanted in Scope::VARIANTS {
+            let opens = Scopes::new(&[own]).unwrap().allow(wanted);
+            assert_eq!(opens, own == wanted || own == Scope::Admin);
+        }
+    }
+    assert_eq!(Scopes::new(&[]), None);
+}
