@@ -107,9 +107,10 @@ impl<P: FoundPerson> FollowedPeople<P> {
         targets.map(move |(target, _)| (&target.person, target.expected(at_s)))
     }
 
-    /// Confirms people in motion by those found in crops at `at_s` (seconds). Others that were
-    /// found become people of their own from `least_score` on. `place` returns a found person with
-    /// another score and another oriented box.
+    /// Confirms people in motion by those found in crops at `at_s` (seconds): first by boxes from
+    /// `least_score` on, because a weak box between two people may overlap the expected place
+    /// most. Others from `least_score` on become people of their own. `place` returns a found
+    /// person with another score and another oriented box.
     pub fn confirm(
         &mut self,
         moving: &[bool],
@@ -124,14 +125,15 @@ impl<P: FoundPerson> FollowedPeople<P> {
             for (index, expected) in expected.iter().enumerate() {
                 let iou = iou(expected, &person.bounds());
                 if iou >= SAME_IOU {
-                    pairs.push((iou, index, number));
+                    let is_weak = person.score() < least_score;
+                    pairs.push((is_weak, iou, index, number));
                 }
             }
         }
-        pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
+        pairs.sort_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)));
         let mut is_used = vec![false; found.len()];
         let mut is_paired = vec![false; expected.len()];
-        for (_, index, number) in pairs {
+        for (_, _, index, number) in pairs {
             if !is_paired[index] && !is_used[number] {
                 is_paired[index] = true;
                 is_used[number] = true;

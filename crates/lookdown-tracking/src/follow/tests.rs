@@ -70,6 +70,16 @@ fn a_crop_keeps_the_odds_of_the_search() {
 }
 
 #[test]
+fn a_weak_box_at_the_expected_place_hides_no_person() {
+    let mut walker = walker();
+    let found = |x, score| Found { x, score };
+    let weak_and_person = vec![found(15.0, 0.001), found(25.0, 0.6)];
+    walker.confirm(&[true], weak_and_person, 0.4, 0.3, placed);
+    let seen: Vec<f64> = walker.seen().map(|person| person.x).collect();
+    assert_eq!(seen, [25.0]);
+}
+
+#[test]
 fn a_walker_whom_a_search_misses_is_expected_for_a_second() {
     let walker = walker();
     let after = |at_s| FollowedPeople::from_search(&[], at_s, Some(&walker));
