@@ -12,10 +12,8 @@ use lookdown_common::report::ReportPerson;
 use lookdown_detect::{
     open_inference::{
         Datatype, HEAD_LENGTH, TensorValues,
-        bounded_json::Entries,
-        message::{InferResponse, Message, OutputParameters, OutputTensor},
+        message::{Entries, InferResponse, Message, OutputParameters, OutputTensor, Parameter},
         metadata::ModelMetadata,
-        parameters::Parameter,
     },
     parameters::{DetectParameters, JsonType, ParameterError},
     pipeline::DetectJob,
