@@ -13,7 +13,6 @@ use tokio::{
 };
 
 use crate::{
-    batch::Batch,
     calibrations::Calibrations,
     counter::{Accepted, Counter},
     event_parser::{Event, EventParser, TooLarge},
@@ -21,6 +20,7 @@ use crate::{
     metrics::Metrics,
     now::Now,
     report::ReceivedReport,
+    scene::Batch,
     snapshot::Snapshot,
     store::Store,
     webhooks::{Conditions, Deliveries},

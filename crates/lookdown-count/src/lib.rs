@@ -9,13 +9,11 @@
 //! with the state and the ID of the last report, and the HTTP API answers from both.
 
 mod bars;
-mod batch;
 mod calibrations;
 #[cfg(test)]
 mod clock_simulation;
 mod counter;
 mod definition;
-mod definition_key;
 mod drops;
 mod event_image;
 mod event_parser;
@@ -30,7 +28,6 @@ mod presence;
 mod recording;
 mod remote_persons;
 mod report;
-mod report_time;
 mod run;
 mod scene;
 mod scene_camera;

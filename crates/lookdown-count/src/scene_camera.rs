@@ -15,13 +15,11 @@ use lookdown_tracking::{
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    definition::CameraDefinition,
-    definition_key::DefinitionKey,
+    definition::{CameraDefinition, DefinitionKey},
     floor::Floor,
     now::{LogPause, Now, milliseconds},
-    presence::Presence,
+    presence::{Presence, ReportTime},
     report::ReportKey,
-    report_time::ReportTime,
     sums::{LineDirection, MINUTE_MS, Sums, ZoneOf},
     time_span::TimeSpan,
 };

@@ -28,6 +28,7 @@ use lookdown_lens::self_calibration::{FieldOfView, IdealLens, KnownCamera};
 use serde::Serialize;
 use strum::VariantNames;
 use tokio_util::sync::CancellationToken;
+use upload::{CalibrationAddress, CalibrationUpload, NewCalibrationAddress, write_condition};
 use utoipa::{
     IntoParams, PartialSchema, ToSchema,
     openapi::{
@@ -37,7 +38,7 @@ use utoipa::{
     },
 };
 
-use super::found_lens::FoundLens;
+use super::cameras::suggestion::FoundLens;
 use crate::{
     api::{
         ApiState,
@@ -57,8 +58,6 @@ use crate::{
     room_calibration::{FIELD_OF_VIEW_DEG, LENS, known_camera, parsed, room_calibration},
     suggestions::FRAMES,
 };
-
-use upload::{CalibrationAddress, CalibrationUpload, NewCalibrationAddress, write_condition};
 
 /// List calibrations
 ///

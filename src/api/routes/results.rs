@@ -35,7 +35,7 @@ use crate::{
     api::{
         ApiState,
         http::{
-            caller::Caller,
+            access::Caller,
             deadline::Deadline,
             problem::{Problem, ProblemKind},
             query::{pairs, parameters_named, query_parameters},

@@ -22,7 +22,7 @@ use lookdown_http::{
     entity_tags::{entity_tag, is_unmodified},
     problem::Problem,
 };
-use lookdown_tracking::{taught::default_bar, taught_crossings::CrossingRatio};
+use lookdown_tracking::taught::{CrossingRatio, default_bar};
 use serde::{Deserialize, Serialize};
 use utoipa::{
     IntoParams, ToSchema,

@@ -2,8 +2,8 @@ use lookdown_tracking::heat_map::Cell;
 
 use super::*;
 use crate::{
-    batch::Batch,
     message::Message,
+    scene::Batch,
     sums::{DAY_MS, LineDirection, MINUTE_MS, Owner, PresenceSum, Sums, ZoneOf, ZoneSum},
     time_span::TimeSpan,
 };

@@ -6,8 +6,8 @@ use rusqlite::{Transaction, params};
 
 use super::{STATE_VERSION, Store, StoreError};
 use crate::{
-    batch::Batch,
     message::{HeldCondition, Message},
+    scene::Batch,
     sums::{DAY_MS, LineDirection, MINUTE_MS, Owner, Sums, ZoneSum},
 };
 

@@ -18,7 +18,7 @@ use tokio::{
 };
 use tokio_util::task::AbortOnDropHandle;
 
-use super::{Webhook, signature::SigningKey};
+use super::{SigningKey, Webhook};
 use crate::{event_image::latest_image, message::Message, metrics::Metrics, store::Store};
 
 /// Most messages that wait for a receiver.

@@ -74,7 +74,7 @@ impl<'a> TensorData<'a> {
     ///
     /// # Errors
     /// The end of a sentence: what was sent, and what is needed.
-    fn elements(self, count: usize) -> Result<Vec<Bytes>, String> {
+    pub fn elements(self, count: usize) -> Result<Vec<Bytes>, String> {
         match self {
             Self::Json(text) => byte_elements(text, count),
             Self::Binary(bytes) => binary_elements(&bytes, count),

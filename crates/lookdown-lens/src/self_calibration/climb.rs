@@ -4,10 +4,8 @@ use nalgebra::{Rotation3, Vector3};
 
 use super::{
     camera::RoomCamera,
-    edge_curve::EdgeCurve,
-    evaluation::{Evaluation, Parameters},
-    evidence::evaluate,
-    prior::Prior,
+    evidence::{EdgeCurve, evaluate},
+    prior::{Evaluation, Parameters, Prior},
 };
 
 /// Growth of the steps after each success, and their greatest length, in those of Gauss and Newton.

@@ -5,10 +5,9 @@ use nalgebra::{Matrix3, Rotation3};
 use super::{
     camera::{Angles, RoomCamera},
     climb::{climb, stepped},
-    edge_curve::EdgeCurve,
-    evaluation::Evaluation,
+    evidence::EdgeCurve,
     known_camera::KnownCamera,
-    prior::Prior,
+    prior::{Evaluation, Prior},
     search,
     uncertainty::{curvature, distance, radius_step},
 };

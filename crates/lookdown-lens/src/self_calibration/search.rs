@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Rotation3};
 
 use super::{
     camera::{Angles, RoomCamera, curve, ideal_shape},
-    edge_curve::EdgeCurve,
+    evidence::EdgeCurve,
     known_camera::{FieldOfView, KnownCamera},
     prior::Prior,
     triples::Triples,

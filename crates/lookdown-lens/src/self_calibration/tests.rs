@@ -10,9 +10,9 @@ use super::{
     CircleGuess, EdgeCurve, FieldOfView, FitRefusal, IdealLens, KnownCamera, RoomFit,
     camera::{Angles, RoomCamera},
     climb::stepped,
-    evaluation::{PARAMETERS, Parameters},
     evidence::evaluate,
     fit::prior,
+    prior::{PARAMETERS, Parameters},
     triples::Triples,
 };
 use crate::geometry::Ray;

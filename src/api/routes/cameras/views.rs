@@ -28,7 +28,7 @@ use crate::{
     api::{
         ApiState,
         http::{
-            caller::Caller,
+            access::Caller,
             context::RequestContext,
             deadline::{CAMERAS, Deadline},
             problem::{Problem, ProblemKind},
