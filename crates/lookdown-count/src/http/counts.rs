@@ -10,8 +10,8 @@ use axum::{
     body::to_bytes,
     extract::{Path, Query, State, rejection::QueryRejection},
     http::{
-        HeaderMap, HeaderValue, StatusCode,
-        header::{ACCEPT, CACHE_CONTROL, CONTENT_TYPE, ETAG},
+        HeaderMap, StatusCode,
+        header::{ACCEPT, CONTENT_TYPE},
     },
     response::{IntoResponse, Response},
 };
@@ -19,7 +19,7 @@ use jiff::Timestamp;
 use lookdown_calibration::revision::revision_of;
 use lookdown_common::text::shortened;
 use lookdown_http::{
-    entity_tags::{entity_tag, is_unmodified},
+    entity_tags::{entity_tag, revalidated, unless_known},
     problem::Problem,
 };
 use lookdown_tracking::taught::{CrossingRatio, default_bar};
@@ -142,14 +142,8 @@ async fn answer(
     let body = to_bytes(body, usize::MAX).await;
     let body = body.map_err(|_| Problem::internal())?;
     let revision = revision_of(&body);
-    let about = [
-        (ETAG, entity_tag(&revision)),
-        (CACHE_CONTROL, HeaderValue::from_static("no-cache")),
-    ];
-    if is_unmodified(headers, &revision)? {
-        return Ok((StatusCode::NOT_MODIFIED, about).into_response());
-    }
-    Ok((parts, about, body).into_response())
+    let about = revalidated(entity_tag(&revision));
+    unless_known(headers, &revision, about, (parts, body))
 }
 
 fn too_large() -> Problem {
