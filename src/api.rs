@@ -114,9 +114,9 @@ fn description() -> OpenApiRouter<ApiState> {
         .routes(routes!(problems::list_problems))
         .routes(routes!(problems::get_problem))
         .routes(routes!(open_inference::persons::server))
-        .routes(routes!(deepstack::status::ping))
-        .routes(routes!(deepstack::status::server_ping))
-        .routes(routes!(deepstack::status::update_available))
+        .routes(routes!(deepstack::ping))
+        .routes(routes!(deepstack::server_ping))
+        .routes(routes!(deepstack::update_available))
 }
 
 fn probes() -> OpenApiRouter<ApiState> {

@@ -16,13 +16,12 @@ use crate::{
     calibrations::Calibrations,
     counter::{Accepted, Counter},
     event_parser::{Event, EventParser, TooLarge},
-    message::Message,
     metrics::Metrics,
     now::Now,
     report::ReceivedReport,
     scene::Batch,
     snapshot::Snapshot,
-    store::Store,
+    store::{Store, write::Message},
     webhooks::{Conditions, Deliveries},
 };
 

@@ -20,7 +20,6 @@ mod event_parser;
 mod floor;
 mod follower;
 mod http;
-mod message;
 mod metrics;
 mod now;
 mod options;
@@ -34,7 +33,6 @@ mod scene_camera;
 mod snapshot;
 mod store;
 mod sums;
-mod time_span;
 mod webhooks;
 
 pub use event_image::latest_image;

@@ -4,10 +4,7 @@ use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
-use crate::{
-    sums::{MINUTE_MS, Owner, Sums},
-    time_span::TimeSpan,
-};
+use crate::sums::{MINUTE_MS, Owner, Sums, TimeSpan};
 
 /// The last report and its number of persons.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]

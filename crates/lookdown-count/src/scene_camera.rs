@@ -20,8 +20,7 @@ use crate::{
     now::{LogPause, Now, milliseconds},
     presence::{Presence, ReportTime},
     report::ReportKey,
-    sums::{LineDirection, MINUTE_MS, Sums, ZoneOf},
-    time_span::TimeSpan,
+    sums::{LineDirection, MINUTE_MS, Sums, TimeSpan, ZoneOf},
 };
 
 /// Reports of a camera that are late for this long mean that a clock was set back: tracks begin

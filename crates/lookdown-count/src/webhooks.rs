@@ -20,10 +20,10 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
 use crate::{
-    message::{HeldCondition, Message},
     now::{Now, time_of},
     scene::Scene,
     scene_camera::NamedCrossing,
+    store::write::{HeldCondition, Message},
 };
 
 /// Time without a report after which a camera is silent.

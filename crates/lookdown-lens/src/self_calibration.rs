@@ -6,7 +6,6 @@
 
 mod camera;
 mod camera_height;
-mod climb;
 mod evidence;
 mod fit;
 mod known_camera;
@@ -17,7 +16,6 @@ mod refusal;
 mod search;
 #[cfg(test)]
 mod tests;
-mod triples;
 mod uncertainty;
 
 pub use camera_height::{CameraHeight, HeightRefusal};

@@ -15,7 +15,6 @@ mod kalman;
 pub mod lines;
 mod measurement;
 mod motion;
-mod place;
 mod reappearance;
 mod relative_pose;
 mod settings;

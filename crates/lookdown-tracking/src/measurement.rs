@@ -6,7 +6,7 @@
 use lookdown_lens::geometry::BoxAngles;
 use nalgebra::{Matrix2, Unit, Vector2, Vector3};
 
-use crate::{CameraPose, MeasurementNoise, place::Place};
+use crate::{CameraPose, MeasurementNoise, settings::Place};
 
 /// Extents in the radial direction and across it: meters, or radians.
 #[derive(Clone, Copy, Debug, PartialEq)]

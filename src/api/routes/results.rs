@@ -382,12 +382,8 @@ pub(in crate::api) async fn get_latest(
     let id = report.id.to_string();
     let content_type = [(CONTENT_TYPE, "application/json")];
     let answer = (content_type, report.report.json.clone());
-    Ok(unless_known(
-        &headers,
-        &id,
-        revalidated(entity_tag(&id)),
-        answer,
-    )?)
+    let about = revalidated(entity_tag(&id));
+    Ok(unless_known(&headers, &id, about, answer)?)
 }
 
 /// Returns the first report that the client does not have, or the latest one if none arrives in

@@ -38,8 +38,7 @@ use crate::{
     definition::CameraDefinition,
     now::time_of,
     store::{Span, Step},
-    sums::{MINUTE_MS, Owner},
-    time_span::TimeSpan,
+    sums::{MINUTE_MS, Owner, TimeSpan},
 };
 
 /// Most values of an answer: steps times directions of lines and zones. An answer has 12 MB at

@@ -19,7 +19,11 @@ use tokio::{
 use tokio_util::task::AbortOnDropHandle;
 
 use super::{SigningKey, Webhook};
-use crate::{event_image::latest_image, message::Message, metrics::Metrics, store::Store};
+use crate::{
+    event_image::latest_image,
+    metrics::Metrics,
+    store::{Store, write::Message},
+};
 
 /// Most messages that wait for a receiver.
 const QUEUE: usize = 256;

@@ -14,10 +14,9 @@ use nalgebra::{Matrix3, Rotation3};
 
 use super::{
     camera::{Angles, MIN_SLOPE, RoomCamera, curve, ideal_shape},
-    climb::climb,
     evidence::{EdgeCurve, evaluate, followed_direction},
     known_camera::{IdealLens, KnownCamera},
-    maxima::{Maximum, fine_maxima, maxima},
+    maxima::{Maximum, climb, fine_maxima, maxima},
     prior::{CircleGuess, Evaluation, Normal, Parameters, Prior},
     refusal::FitRefusal,
     search::has_lens,

@@ -9,11 +9,11 @@ use nalgebra::{Rotation3, Vector3};
 use super::{
     CircleGuess, EdgeCurve, FieldOfView, FitRefusal, IdealLens, KnownCamera, RoomFit,
     camera::{Angles, RoomCamera},
-    climb::stepped,
     evidence::evaluate,
     fit::prior,
+    maxima::stepped,
     prior::{PARAMETERS, Parameters},
-    triples::Triples,
+    search::Triples,
 };
 use crate::geometry::Ray;
 

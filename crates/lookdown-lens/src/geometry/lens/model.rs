@@ -191,7 +191,8 @@ pub(super) fn ideal_plane(
     Ok(ImagePlane::new(fx, fy, cx, cy))
 }
 
-/// Declares the list of all models: `name: Struct`, with the name of the model in calibration files.
+/// Declares the list of all models: `name: Struct`, with the name of the model in calibration
+/// files.
 /// Makes of it [`LensModel`](super::LensModel) and its curve.
 macro_rules! lens_models {
     ($($name:ident: $Model:ident,)+) => {

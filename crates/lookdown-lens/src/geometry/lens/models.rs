@@ -1,5 +1,5 @@
-//! The lens models: each has its formula, symbols, domain, source, parameters and curve. A new model
-//! is a line of the list and its parameters. `docs/geometry.md` has the table.
+//! The lens models: each has its formula, symbols, domain, source, parameters and curve. A new
+//! model is a line of the list and its parameters. `docs/geometry.md` has the table.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
