@@ -50,8 +50,6 @@ check: ## check formatting, lints and budgets of lines, and run the unit tests; 
 test: ## set up, then check formatting, lints, tests and documentation; needs only this repository
 	@$(PYTHON) packaging/scripts/setup.py toolchain runtime checkers converters
 	cargo fmt --all --check
-	@# cargo fmt does not find modules that a macro declares.
-	rustfmt --check --edition 2024 crates/lookdown-lens/src/geometry/lens/models/*.rs
 	cargo clippy --workspace --all-targets --locked -- -D warnings
 	@# Workspaces of their own: the lock file of the fuzzers, the bench of the tracker.
 	cargo tree --quiet --locked --manifest-path lab/fuzz/Cargo.toml > /dev/null

@@ -1,14 +1,10 @@
 //! Exports detected persons in the file formats of annotation tools, for correction there. The
-//! output is text in memory, which the caller writes or sends. A new format needs a file with its
+//! output is text in memory, which the caller writes or sends. A new format needs a
 //! `FormatSpec` and a row of the table here.
 
-mod cepdof;
-mod coco;
 mod content;
-mod cvat;
-mod geojson;
-mod label_studio;
-mod voc;
+mod json;
+mod xml;
 mod yolo;
 
 use strum::{Display, EnumString, VariantArray};
@@ -16,9 +12,9 @@ use strum::{Display, EnumString, VariantArray};
 pub use self::content::{AnnotatedBox, AnnotatedImage, AnnotationFile, BoxKind};
 use self::content::{FormatSpec, Layout, SupportedBoxes, file};
 
-/// Declares [`AnnotationFormat`]: for each format a description, a variant and its module.
+/// Declares [`AnnotationFormat`]: for each format a description, a variant and its specification.
 macro_rules! annotation_formats {
-    ($($(#[doc = $description:literal])+ $variant:ident = $module:ident,)+) => {
+    ($($(#[doc = $description:literal])+ $variant:ident = $format:path,)+) => {
         /// A file format of annotation tools.
         #[derive(
             Debug, Clone, Copy, PartialEq, Eq, Display, EnumString, VariantArray, strum::VariantNames,
@@ -38,7 +34,7 @@ macro_rules! annotation_formats {
 
             const fn spec(self) -> &'static FormatSpec {
                 match self {
-                    $(Self::$variant => &$module::FORMAT,)+
+                    $(Self::$variant => &$format,)+
                 }
             }
         }
@@ -47,20 +43,20 @@ macro_rules! annotation_formats {
 
 annotation_formats! {
     /// COCO detection: annotations.json.
-    Coco = coco,
+    Coco = json::COCO,
     /// CVAT for images 1.1: annotations.xml.
-    Cvat = cvat,
+    Cvat = xml::CVAT,
     /// YOLO as Ultralytics reads it, also with oriented boxes (OBB): labels/, data.yaml,
     /// classes.txt.
-    Yolo = yolo,
+    Yolo = yolo::YOLO,
     /// Pascal VOC: Annotations/, ImageSets/.
-    Voc = voc,
+    Voc = xml::VOC,
     /// GeoJSON with the oriented boxes as polygons in pixels: features/.
-    GeoJson = geojson,
+    GeoJson = json::GEO_JSON,
     /// CEPDOF and RAPiD, COCO with oriented boxes: annotations.json.
-    Cepdof = cepdof,
+    Cepdof = json::CEPDOF,
     /// Label Studio: tasks.json, tasks with predictions.
-    LabelStudio = label_studio,
+    LabelStudio = json::LABEL_STUDIO,
 }
 
 impl AnnotationFormat {

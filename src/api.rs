@@ -3,13 +3,11 @@
 
 mod companions;
 mod detect;
-mod fit_turns;
 mod http;
 mod in_process;
 mod openapi;
 mod parameters;
 mod protocols;
-mod readiness;
 mod require_scope;
 mod response_memory;
 mod routes;
@@ -50,9 +48,8 @@ pub use self::{
     http::{access::Access, rate_limit::RequestRate},
     in_process::in_process,
     openapi::Document,
-    readiness::{Phase, Readiness},
     routes::problems::problem_table,
-    state::{ApiOptions, ApiState},
+    state::{ApiOptions, ApiState, Phase, Readiness},
 };
 
 /// All routes with their entries in the OpenAPI document.
@@ -95,8 +92,8 @@ async fn openapi_json(State(state): State<ApiState>) -> Result<Json<Document>, P
 fn client_routes() -> OpenApiRouter<ApiState> {
     OpenApiRouter::with_openapi(<openapi::Common as utoipa::OpenApi>::openapi())
         .merge(routes::client_routes())
-        .routes(routes!(open_inference::describe::model))
-        .routes(routes!(open_inference::describe::model_ready))
+        .routes(routes!(open_inference::persons::model))
+        .routes(routes!(open_inference::persons::model_ready))
         .routes(routes!(open_inference::infer::infer))
 }
 
@@ -116,18 +113,18 @@ fn description() -> OpenApiRouter<ApiState> {
         .routes(routes!(openapi_json))
         .routes(routes!(problems::list_problems))
         .routes(routes!(problems::get_problem))
-        .routes(routes!(open_inference::describe::server))
-        .routes(routes!(deepstack::status::ping))
-        .routes(routes!(deepstack::status::server_ping))
-        .routes(routes!(deepstack::status::update_available))
+        .routes(routes!(open_inference::persons::server))
+        .routes(routes!(deepstack::ping))
+        .routes(routes!(deepstack::server_ping))
+        .routes(routes!(deepstack::update_available))
 }
 
 fn probes() -> OpenApiRouter<ApiState> {
     OpenApiRouter::new()
         .routes(routes!(health::livez))
         .routes(routes!(health::readyz))
-        .routes(routes!(open_inference::describe::live))
-        .routes(routes!(open_inference::describe::ready))
+        .routes(routes!(open_inference::persons::live))
+        .routes(routes!(open_inference::persons::ready))
 }
 
 fn metrics() -> OpenApiRouter<ApiState> {
@@ -159,7 +156,7 @@ fn limited_router(state: ApiState, limiter: Option<RateLimiter>) -> Router {
         .layer(option_layer(limiter));
     // Some clients ask for the metadata with a slash at the end.
     let description =
-        Router::from(description()).route("/v2/", get(open_inference::describe::server));
+        Router::from(description()).route("/v2/", get(open_inference::persons::server));
     let clients = Router::from(client_routes()).merge(counts::router());
     let clients = clients.route_layer(guards.clone());
     let deepstack = Router::from(deepstack_routes()).route_layer(guards);

@@ -1,13 +1,10 @@
 //! The persons of images, the files that describe them, and the specification of a format.
-//!
-//! XML documents of annotation files.
 
 use lookdown_detect::{
     detection::{BBox, FramePixels},
     pipeline::{DetectionReport, Person},
 };
 use lookdown_lens::geometry::{OrientedBox, floor::FloorPosition};
-use quick_xml::escape::escape;
 use serde_json::{Value, json};
 
 use crate::rounding::pixels;
@@ -123,11 +120,6 @@ pub(super) fn stem(file_name: &str) -> &str {
     }
 }
 
-/// Returns a JSON document as text. Serializing numbers and strings cannot fail.
-pub(super) fn json_text(document: &Value) -> String {
-    serde_json::to_string_pretty(document).unwrap_or_default()
-}
-
 /// A format of annotations.
 pub(super) struct FormatSpec {
     /// The media type of a document. One that is not registered begins with `x.`, so that it is not
@@ -162,15 +154,4 @@ pub(super) enum Layout {
         document: fn(&AnnotatedImage, BoxKind) -> String,
         others: fn(&[AnnotatedImage]) -> Vec<AnnotationFile>,
     },
-}
-
-/// The first line of a document.
-pub(super) const DECLARATION: &str = "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n";
-
-/// Returns escaped text in which U+FFFD replaces control characters and others that XML cannot
-/// contain (XML 1.0, section 2.2), or that a parser would change.
-pub(super) fn escaped(text: &str) -> String {
-    let is_refused = |c: char| c < ' ' || "\u{fffe}\u{ffff}".contains(c);
-    let replaced = text.replace(is_refused, "\u{fffd}");
-    escape(replaced).into_owned()
 }

@@ -10,7 +10,7 @@ use super::content::{
 };
 
 /// The format.
-pub(super) const FORMAT: FormatSpec = FormatSpec {
+pub(super) const YOLO: FormatSpec = FormatSpec {
     media_type: "text/plain; charset=utf-8",
     boxes: SupportedBoxes::Both,
     layout: Layout::FilePerImage {

@@ -2,7 +2,6 @@
 //! that the other protocols share with it.
 
 pub(super) mod answer;
-pub(super) mod defaults;
 pub(super) mod report;
 pub(super) mod route;
 pub(super) mod run;

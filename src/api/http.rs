@@ -3,7 +3,6 @@
 
 pub(super) mod accept;
 pub(super) mod access;
-pub(super) mod caller;
 pub(super) mod context;
 pub(super) mod cors;
 pub(super) mod deadline;

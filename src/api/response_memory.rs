@@ -13,7 +13,7 @@ use lookdown_detect::fairness::{BudgetError, Client};
 use super::{
     ApiState,
     http::{
-        caller::Caller,
+        access::Caller,
         context::RequestContext,
         problem::{Problem, ProblemKind},
         request_body::Held,

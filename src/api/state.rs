@@ -12,10 +12,10 @@ use lookdown_detect::{
     pipeline::{PipelineError, WorkerPool},
 };
 use lookdown_http::csrf::AllowedOrigins;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 
 use super::{
     companions::Companions,
-    fit_turns::FitTurns,
     http::{
         access::Access,
         context::RequestContext,
@@ -23,7 +23,6 @@ use super::{
         rate_limit::RequestRate,
         request_body::{BodyReader, UploadBudget},
     },
-    readiness::{Phase, Readiness},
 };
 use crate::{
     calibration_store::Calibrations,
@@ -209,5 +208,135 @@ impl Deref for ApiState {
 
     fn deref(&self) -> &Shared {
         &self.0
+    }
+}
+
+/// The phase of the server's life.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Phase {
+    /// The models have not run yet.
+    WarmingUp,
+    /// The server accepts frames.
+    Ready,
+    /// The server is shutting down and finishes the requests that have arrived.
+    Stopping,
+}
+
+/// The current [`Phase`]. Clones share it.
+#[derive(Debug, Clone)]
+pub struct Readiness(watch::Sender<Phase>);
+
+impl Default for Readiness {
+    fn default() -> Self {
+        Self(watch::Sender::new(Phase::WarmingUp))
+    }
+}
+
+impl Readiness {
+    /// Marks the end of the warm-up. A server that is already stopping stays in that phase.
+    pub fn warmed_up(&self) {
+        self.0.send_if_modified(|phase| {
+            let warming_up = *phase == Phase::WarmingUp;
+            if warming_up {
+                *phase = Phase::Ready;
+            }
+            warming_up
+        });
+    }
+
+    /// Marks the beginning of the shutdown.
+    pub fn stopping(&self) {
+        self.0.send_replace(Phase::Stopping);
+    }
+
+    /// Returns the current phase.
+    pub fn phase(&self) -> Phase {
+        *self.0.borrow()
+    }
+
+    /// Waits for the end of the warm-up.
+    pub async fn ready(&self) {
+        // `self` holds the sender, so the channel stays open.
+        let _ = self
+            .0
+            .subscribe()
+            .wait_for(|phase| *phase != Phase::WarmingUp)
+            .await;
+    }
+}
+
+/// Fits that run or wait.
+const PLACES: usize = 3;
+
+/// The places and the turn.
+pub(super) struct FitTurns {
+    places: Arc<Semaphore>,
+    turn: Arc<Semaphore>,
+}
+
+/// A turn, until it is dropped.
+pub(super) struct FitTurn {
+    _place: OwnedSemaphorePermit,
+    _turn: OwnedSemaphorePermit,
+}
+
+impl Default for FitTurns {
+    fn default() -> Self {
+        Self {
+            places: Arc::new(Semaphore::new(PLACES)),
+            turn: Arc::new(Semaphore::new(1)),
+        }
+    }
+}
+
+impl FitTurns {
+    /// Waits for the end of the fits before.
+    ///
+    /// # Errors
+    /// [`ProblemKind::Overloaded`] at once if all places are taken.
+    pub(super) async fn next(&self) -> Result<FitTurn, Problem> {
+        let place = Arc::clone(&self.places).try_acquire_owned();
+        let place = place.map_err(|_| {
+            let detail = format!("{PLACES} fits run or wait: retry when they have ended");
+            Problem::new(ProblemKind::Overloaded, detail)
+        })?;
+        let turn = Arc::clone(&self.turn).acquire_owned().await;
+        Ok(FitTurn {
+            _place: place,
+            _turn: turn.map_err(|_| Problem::shutting_down())?,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{
+        future::Future,
+        task::{Context, Poll, Waker},
+    };
+
+    use super::*;
+
+    #[test]
+    fn one_fit_runs_two_wait_and_a_fourth_is_refused() {
+        let turns = FitTurns::default();
+        let mut context = Context::from_waker(Waker::noop());
+        let mut waiting = [(); 4].map(|()| Box::pin(turns.next()));
+        let polled = waiting
+            .each_mut()
+            .map(|next| next.as_mut().poll(&mut context));
+        let [
+            Poll::Ready(Ok(running)),
+            Poll::Pending,
+            Poll::Pending,
+            Poll::Ready(Err(refused)),
+        ] = polled
+        else {
+            panic!("other turns");
+        };
+        assert_eq!(refused.kind, ProblemKind::Overloaded);
+        drop(running);
+        let second = waiting[1].as_mut().poll(&mut context);
+        assert!(matches!(second, Poll::Ready(Ok(_))));
     }
 }

@@ -1,13 +1,19 @@
 //! `lookdown model`
 
 mod check;
-mod list;
 
-use std::process::ExitCode;
+use std::{
+    io::{self, Write},
+    path::Path,
+    process::ExitCode,
+};
 
+use anyhow::Context;
 use clap::Subcommand;
+use lookdown_detect::inference::{ModelManifest, model_names};
 
-use super::SettingsFile;
+use super::{progress::UNWRITABLE, server_flags::SettingsFile};
+use crate::settings::explain;
 
 /// The subcommands for models.
 #[derive(Debug, Subcommand)]
@@ -22,6 +28,37 @@ pub(super) enum Command {
 pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
     match command {
         Command::Check(arguments) => check::run(arguments),
-        Command::List(settings_file) => list::run(settings_file),
+        Command::List(settings_file) => list(settings_file),
     }
+}
+
+/// Bytes of the unit of sizes.
+const MEBIBYTE: f64 = 1_048_576.0;
+
+/// Lists the models of the repository.
+fn list(settings_file: &SettingsFile) -> anyhow::Result<ExitCode> {
+    let settings = settings_file.load()?;
+    let folder = settings.model.find_repository()?;
+    let mut out = io::stdout().lock();
+    for name in model_names(&folder) {
+        let manifest = ModelManifest::locate(&folder.join(&name));
+        let line = match &manifest {
+            Ok(manifest) => {
+                let license = manifest.license.as_deref().unwrap_or("-");
+                let size = size(&manifest.onnx);
+                let size = size.as_deref().unwrap_or("missing");
+                format!("{size:>10}  {license}")
+            }
+            Err(error) => format!("{:>10}  {}", "invalid", explain(error)),
+        };
+        writeln!(out, "{name:<40}{line}").context(UNWRITABLE)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The size of a file. `None` if it is missing.
+fn size(file: &Path) -> Option<String> {
+    let mebibytes = |bytes: u64| bytes as f64 / MEBIBYTE;
+    let metadata = file.metadata().ok()?;
+    Some(format!("{:.1} MiB", mebibytes(metadata.len())))
 }

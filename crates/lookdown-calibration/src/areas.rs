@@ -11,8 +11,8 @@ use nalgebra::Point2;
 use crate::{
     FormatError,
     formats::Camera,
+    id::check_name,
     native::{NativeImage, NativeLine, NativeLying, NativePlace},
-    plain_field::check_name,
 };
 
 /// Most zones of a calibration, most lines, most masks, most areas and most ignored places.

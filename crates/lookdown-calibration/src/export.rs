@@ -3,18 +3,16 @@
 //! COLMAP's `cameras.txt` with one camera. It has no skew; its pixel coordinates begin at the
 //! corner of the first pixel.
 
-mod decimal;
-mod equivalents;
-mod opencv;
+use std::fmt::{self, Display, Write};
 
-use lookdown_lens::geometry::{Pixel, lens::LensModel, pixels::to_corner_origin};
+use lookdown_lens::geometry::{
+    Pixel,
+    lens::{LensModel, Pinhole},
+    pixels::to_corner_origin,
+};
 use strum::{EnumString, IntoStaticStr, VariantArray};
 
 use crate::native::{NativeCalibration, NativeMount};
-
-use decimal::join;
-use equivalents::{eucm, kannala_brandt, mei, rectilinear};
-use opencv::camera_matrix;
 
 /// A format that is written.
 #[derive(
@@ -61,7 +59,7 @@ impl Target {
     pub fn write(self, calibration: &NativeCalibration) -> Result<Exported, NotExpressible> {
         let content = match self {
             Self::Native => Some(native(calibration)),
-            Self::OpenCv => opencv::write(calibration),
+            Self::OpenCv => write_opencv(calibration),
             Self::Kalibr => write_kalibr(calibration),
             Self::Ros => write_ros(calibration),
             Self::Colmap => write_colmap(calibration),
@@ -230,4 +228,136 @@ fn write_ros(calibration: &NativeCalibration) -> Option<String> {
         join(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0], ", "),
         join(&projection, ", "),
     ))
+}
+
+/// A number as every YAML reader takes it for a number.
+///
+/// Written so that it reads back as the same `f64`.
+///
+/// YAML 1.1 readers such as `PyYAML` take `1e-7` for a text: a point and a sign are put in.
+struct Decimal(f64);
+
+impl Display for Decimal {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let shortest = format!("{:?}", self.0);
+        let Some((mantissa, exponent)) = shortest.split_once('e') else {
+            return formatter.write_str(&shortest);
+        };
+        let point = if mantissa.contains('.') { "" } else { ".0" };
+        let sign = if exponent.starts_with('-') { "" } else { "+" };
+        write!(formatter, "{mantissa}{point}e{sign}{exponent}")
+    }
+}
+
+/// Numbers with a separator between them.
+fn join(numbers: &[f64], separator: &str) -> String {
+    let decimals: Vec<_> = numbers
+        .iter()
+        .map(|&number| Decimal(number).to_string())
+        .collect();
+    decimals.join(separator)
+}
+
+/// The lens as another model, where the two are the same function.
+fn rectilinear(lens: &LensModel) -> Option<Pinhole> {
+    match lens {
+        LensModel::Rectilinear(lens) => lens.pinhole(),
+        _ => None,
+    }
+}
+
+/// Kannala-Brandt: `k1 … k4` and the skew in pixels. The equidistant lens has none of them.
+fn kannala_brandt(lens: &LensModel) -> Option<(Pinhole, [f64; 4], f64)> {
+    match lens {
+        LensModel::KannalaBrandt(lens) => Some((lens.pinhole(), lens.k, lens.skew)),
+        LensModel::Equidistant(lens) => Some((lens.pinhole()?, [0.0; 4], 0.0)),
+        _ => None,
+    }
+}
+
+/// Unified camera model. The stereographic lens is the one with `alpha` ½:
+/// `sin(theta) / (½ + ½ cos(theta)) = 2 tan(theta / 2)`.
+fn ucm(lens: &LensModel) -> Option<(Pinhole, f64)> {
+    match lens {
+        LensModel::Ucm(lens) => Some((lens.pinhole(), lens.alpha)),
+        LensModel::Stereographic(lens) => Some((lens.pinhole()?, 0.5)),
+        _ => None,
+    }
+}
+
+/// Enhanced unified camera model: `beta` 1 for the unified one.
+fn eucm(lens: &LensModel) -> Option<(Pinhole, f64, f64)> {
+    match lens {
+        LensModel::Eucm(lens) => Some((lens.pinhole(), lens.alpha, lens.beta)),
+        _ => ucm(lens).map(|(pinhole, alpha)| (pinhole, alpha, 1.0)),
+    }
+}
+
+/// Mei's model: pinhole, `xi`, `k1 k2 p1 p2`, skew in pixels. The unified model is the one
+/// without distortion: `xi = alpha / (1 − alpha)`, focal lengths divided by `1 − alpha`.
+fn mei(lens: &LensModel) -> Option<(Pinhole, f64, [f64; 4], f64)> {
+    if let LensModel::Mei(lens) = lens {
+        let distortion = [lens.k1, lens.k2, lens.p1, lens.p2];
+        return Some((lens.pinhole(), lens.xi, distortion, lens.skew));
+    }
+    let ([fx, fy, cx, cy], alpha) = ucm(lens)?;
+    let rest = 1.0 - alpha;
+    (rest > 0.0).then(|| ([fx / rest, fy / rest, cx, cy], alpha / rest, [0.0; 4], 0.0))
+}
+
+/// OpenCV's `FileStorage` YAML: `cv::fisheye`, `cv::omnidir`, or a camera without distortion.
+fn write_opencv(calibration: &NativeCalibration) -> Option<String> {
+    let lens = &calibration.lens;
+    let (said, pinhole, skew, coefficients) = if let Some((pinhole, k, skew)) = kannala_brandt(lens)
+    {
+        ("fisheye_model: 1".to_owned(), pinhole, skew, k.to_vec())
+    } else if let Some((pinhole, xi, distortion, skew)) = mei(lens) {
+        let said = format!("xi: {}", Decimal(xi));
+        (said, pinhole, skew, distortion.to_vec())
+    } else {
+        let said = "fisheye_model: 0".to_owned();
+        (said, rectilinear(lens)?, 0.0, vec![0.0; 5])
+    };
+    // Every OpenCV reads this directive; 5 writes another one.
+    let mut content = format!(
+        "%YAML:1.0\n---\nimage_width: {}\nimage_height: {}\n{said}\n",
+        calibration.image.width, calibration.image.height
+    );
+    let camera_matrix = camera_matrix(pinhole, skew);
+    write_matrix(&mut content, "camera_matrix", 3, &camera_matrix);
+    write_matrix(&mut content, "distortion_coefficients", 1, &coefficients);
+    Some(content)
+}
+
+/// The 3×3 matrix, row by row.
+fn camera_matrix([fx, fy, cx, cy]: Pinhole, skew: f64) -> [f64; 9] {
+    [fx, skew, cx, 0.0, fy, cy, 0.0, 0.0, 1.0]
+}
+
+fn write_matrix(content: &mut String, name: &str, rows: usize, data: &[f64]) {
+    let columns = data.len() / rows;
+    // Writing to a String cannot fail.
+    let _ = write!(
+        content,
+        "{name}: !!opencv-matrix\n   rows: {rows}\n   cols: {columns}\n   dt: d\n   data: [ {} ]\n",
+        join(data, ", ")
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exponents_have_a_point_and_a_sign() {
+        for (number, expected) in [
+            (1e-7, "1.0e-7"),
+            (-1.5e-7, "-1.5e-7"),
+            (1e20, "1.0e+20"),
+            (0.1, "0.1"),
+            (3.0, "3.0"),
+        ] {
+            assert_eq!(Decimal(number).to_string(), expected);
+        }
+    }
 }

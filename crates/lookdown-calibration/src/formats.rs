@@ -4,41 +4,28 @@
 //! Each reader documents its format and the usual mistakes; `docs/calibrate.md` has the table.
 
 mod alicevision;
-mod basalt;
+mod angle_polynomial;
 mod camera_file;
-mod camera_intrinsic_model;
 mod camera_matrix;
 mod camodocal;
-mod claimed_field;
 mod colmap;
-mod column_first;
-mod depthai;
-mod distortion;
 mod document;
 mod dso;
 mod error;
 mod fields;
-mod fisheye_calib_adapter;
 mod foreign;
 mod format;
-mod gyroflow;
 mod kalibr;
-mod matlab;
-mod moil;
-mod multicol;
 mod named_parameters;
 mod native_file;
 mod nerfstudio;
-mod nvidia;
 mod ocam;
 mod opencv;
 mod opencv_xml;
 mod opensfm;
 mod recognize;
-mod rig;
 mod ros;
 mod slam;
-mod woodscape;
 
 use serde_json::Value;
 
@@ -179,7 +166,7 @@ fn read_lines(text: &str) -> Result<CalibrationFile, FormatError> {
     let format = recognize_lines(text).ok_or_else(unrecognized)?;
     let cameras = match format {
         Format::OCamCalib => alone(ocam::read(text)),
-        Format::MultiCol => alone(multicol::read(text)),
+        Format::MultiCol => alone(ocam::read_multicol(text)),
         Format::Dso => alone(dso::read(text)),
         _ => colmap::read(text),
     };
@@ -193,18 +180,20 @@ fn read_tree(format: Format, fields: &Fields<'_>) -> Result<Vec<FileCamera>, For
         Format::Ros => alone(ros::read(fields)),
         Format::PyOCamCalib => alone(ocam::read_python(fields)),
         Format::Camodocal => alone(camodocal::read(fields)),
-        Format::Basalt => basalt::read(fields)?,
-        Format::WoodScape => alone(woodscape::read(fields)),
-        Format::NvidiaFTheta => alone(nvidia::read(fields)),
-        Format::Moil => moil::read(fields),
-        Format::FisheyeCalibAdapter => alone(fisheye_calib_adapter::read(fields)),
-        Format::CameraIntrinsicModel => alone(camera_intrinsic_model::read(fields)),
+        Format::Basalt => named_parameters::read_basalt(fields)?,
+        Format::WoodScape => alone(angle_polynomial::read_woodscape(fields)),
+        Format::NvidiaFTheta => alone(angle_polynomial::read_nvidia(fields)),
+        Format::Moil => angle_polynomial::read_moil(fields),
+        Format::FisheyeCalibAdapter => alone(named_parameters::read_fisheye_calib_adapter(fields)),
+        Format::CameraIntrinsicModel => {
+            alone(named_parameters::read_camera_intrinsic_model(fields))
+        }
         Format::Slam => slam::read(fields),
         Format::Nerfstudio => nerfstudio::read(fields),
-        Format::Gyroflow => alone(gyroflow::read(fields)),
-        Format::DepthAi => depthai::read(fields)?,
+        Format::Gyroflow => alone(camera_matrix::read_gyroflow(fields)),
+        Format::DepthAi => camera_matrix::read_depthai(fields)?,
         Format::OpenSfm => opensfm::read(fields),
-        Format::Matlab => alone(matlab::read(fields)),
+        Format::Matlab => alone(ocam::read_matlab(fields)),
         Format::AliceVision => alicevision::read(fields),
         Format::Native | Format::OCamCalib | Format::MultiCol | Format::Colmap | Format::Dso => {
             Vec::new()

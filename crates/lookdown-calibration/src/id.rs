@@ -7,6 +7,8 @@ use lookdown_common::{
     text::{Quoted, shortened},
 };
 
+use crate::FormatError;
+
 /// The ID of a calibration: `[a-z0-9][a-z0-9_-]{0,63}`. Safe in file names and URLs.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct CalibrationId(String);
@@ -67,6 +69,19 @@ impl fmt::Display for CalibrationId {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.write_str(&self.0)
     }
+}
+
+/// Checks the name in a field of a calibration file.
+pub(super) fn check_name(field: &str, name: &str) -> Result<(), FormatError> {
+    if is_plain(name) {
+        return Ok(());
+    }
+    let shown: String = name.chars().take(MAX_CHARS).collect();
+    let problem = format!(
+        "it is {shown:?}: use 1 to {MAX_CHARS} of a-z, 0-9, _ and -, beginning with a letter or \
+         digit"
+    );
+    Err(FormatError::invalid(field, problem))
 }
 
 #[cfg(test)]

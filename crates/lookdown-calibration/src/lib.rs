@@ -7,7 +7,6 @@ mod file;
 pub mod formats;
 mod id;
 pub mod native;
-mod plain_field;
 pub mod revision;
 mod site;
 pub mod warning;

@@ -1,7 +1,8 @@
 //! The place of a camera on a site, checked.
 
-use super::{FormatError, native::NativeMount, plain_field::check_name};
 use lookdown_lens::geometry::SitePlacement;
+
+use crate::{FormatError, id::check_name, native::NativeMount};
 
 /// Farthest coordinate of a site, meters.
 const MAX_POSITION_M: f64 = 10_000.0;

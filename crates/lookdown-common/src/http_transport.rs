@@ -3,9 +3,8 @@
 //! that never ends them would keep a core busy until the deadline of the request.
 
 mod body;
-mod error;
 
-pub use error::{ClientError, HttpError};
+pub use body::{ClientError, HttpError};
 
 use std::{
     sync::{
@@ -37,8 +36,8 @@ use tokio::{
 use tower::{BoxError, timeout::Timeout, util::BoxCloneSyncService};
 
 use crate::text::with_causes;
+use body::MAX_PROVISIONAL;
 use body::UntilDeadline;
-use error::MAX_PROVISIONAL;
 
 /// Longest time for a connection, with the look-up of the name and the handshake of TLS.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);

@@ -9,8 +9,6 @@
 mod backoff;
 #[cfg(feature = "companion")]
 mod config;
-#[cfg(feature = "companion")]
-mod duration;
 pub mod files;
 #[cfg(feature = "companion")]
 mod http_client;
@@ -45,8 +43,7 @@ pub use stored_file::StoredFile;
 #[cfg(feature = "companion")]
 pub use {
     backoff::Backoff,
-    config::{ConfigError, parse_toml, read_file, read_secret},
-    duration::{optional_duration, parse_duration},
+    config::{ConfigError, optional_duration, parse_duration, parse_toml, read_file, read_secret},
     http_client::{ServerClient, read_body, retry_after},
     http_transport::{ClientError, HttpClient, HttpError},
     in_process::InProcess,

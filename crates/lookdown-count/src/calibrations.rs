@@ -7,8 +7,7 @@ use lookdown_common::{ServerClient, read_body, text::one_line};
 use reqwest::{StatusCode, header::ETAG};
 
 use crate::{
-    definition::CameraDefinition,
-    definition_key::DefinitionKey,
+    definition::{CameraDefinition, DefinitionKey},
     store::{Store, StoredCalibrations},
 };
 

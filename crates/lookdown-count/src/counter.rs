@@ -13,14 +13,12 @@ use lookdown_common::{Claim, OwnCameras, text::one_line};
 use lookdown_tracking::{MAX_CAMERAS, taught::NumberWithBar};
 
 use crate::{
-    batch::Batch,
-    definition::CameraDefinition,
-    definition_key::DefinitionKey,
+    definition::{CameraDefinition, DefinitionKey},
     drops::{DropReason, Drops},
     now::{LogPause, Now},
+    presence::ReportTime,
     report::ReceivedReport,
-    report_time::ReportTime,
-    scene::{Scene, SceneState},
+    scene::{Batch, Scene, SceneState},
     scene_camera::NamedCrossing,
     sums::{Owner, Sums, Totals},
 };

@@ -13,10 +13,8 @@ use lookdown_tracking::{
     lines::{DEFAULT_BAND_M, Line},
     zones::Zone,
 };
-
 use nalgebra::Vector2;
-
-use crate::definition_key::DefinitionKey;
+use serde::{Deserialize, Serialize};
 
 /// Half the width of the hysteresis band of a line in the frame, as a share of the frame's width.
 const BAND_OF_FRAME: f64 = 0.02;
@@ -221,4 +219,15 @@ impl Planes<'_> {
         let floor = floor_position(pixel, &self.geometry.lens, &self.geometry.mount)?;
         Some(self.pose.to_site([floor.x_m, floor.y_m]))
     }
+}
+
+/// The calibration and the frame size that a definition belongs to.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct DefinitionKey {
+    /// The ID of the calibration; `None` without one.
+    pub(crate) calibration: Option<String>,
+    /// Its revision.
+    pub(crate) revision: String,
+    pub(crate) width: u32,
+    pub(crate) height: u32,
 }

@@ -13,16 +13,15 @@ use tokio::{
 };
 
 use crate::{
-    batch::Batch,
     calibrations::Calibrations,
     counter::{Accepted, Counter},
     event_parser::{Event, EventParser, TooLarge},
-    message::Message,
     metrics::Metrics,
     now::Now,
     report::ReceivedReport,
+    scene::Batch,
     snapshot::Snapshot,
-    store::Store,
+    store::{Store, write::Message},
     webhooks::{Conditions, Deliveries},
 };
 

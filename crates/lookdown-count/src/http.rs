@@ -6,7 +6,6 @@ mod furniture;
 mod heat_map;
 mod reference_crossings;
 mod shared;
-mod suggested_area;
 mod time;
 mod tracks;
 
@@ -66,7 +65,7 @@ fn routes() -> OpenApiRouter<Shared> {
         .routes(routes!(heat_map::json_of_camera))
         .routes(routes!(heat_map::png_of_camera))
         .routes(routes!(heat_map::png_of_frame))
-        .routes(routes!(suggested_area::get))
+        .routes(routes!(heat_map::suggest_area))
         .routes(routes!(counts::site_counts))
         .routes(routes!(tracks::site_tracks))
         .routes(routes!(heat_map::json_of_site))

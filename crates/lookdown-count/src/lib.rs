@@ -9,20 +9,17 @@
 //! with the state and the ID of the last report, and the HTTP API answers from both.
 
 mod bars;
-mod batch;
 mod calibrations;
 #[cfg(test)]
 mod clock_simulation;
 mod counter;
 mod definition;
-mod definition_key;
 mod drops;
 mod event_image;
 mod event_parser;
 mod floor;
 mod follower;
 mod http;
-mod message;
 mod metrics;
 mod now;
 mod options;
@@ -30,14 +27,12 @@ mod presence;
 mod recording;
 mod remote_persons;
 mod report;
-mod report_time;
 mod run;
 mod scene;
 mod scene_camera;
 mod snapshot;
 mod store;
 mod sums;
-mod time_span;
 mod webhooks;
 
 pub use event_image::latest_image;

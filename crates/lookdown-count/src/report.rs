@@ -10,7 +10,7 @@ use lookdown_lens::geometry::{BoxAngles, OrientedBox, Pixel};
 use lookdown_tracking::Observation;
 use serde::{Deserialize, Serialize};
 
-use crate::{definition::CameraDefinition, definition_key::DefinitionKey};
+use crate::definition::{CameraDefinition, DefinitionKey};
 
 /// The capture time of a camera alone may be this much after and before the arrival, milliseconds.
 const MAX_AHEAD_MS: i64 = 5_000;

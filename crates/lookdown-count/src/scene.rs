@@ -9,12 +9,10 @@ use lookdown_tracking::{
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    definition::CameraDefinition,
-    definition_key::DefinitionKey,
-    presence::Presence,
-    report_time::ReportTime,
+    definition::{CameraDefinition, DefinitionKey},
+    presence::{Presence, ReportTime},
     scene_camera::{CameraState, NamedCrossing, SceneCamera},
-    sums::{DAY_MS, Owner, Sums},
+    sums::{DAY_MS, Owner, Sums, Totals},
 };
 
 /// A tracker, the counters of its cameras, and the state of their sums.
@@ -236,6 +234,17 @@ impl Scene {
 /// Returns seconds of milliseconds.
 pub(crate) fn seconds(milliseconds: i64) -> f64 {
     milliseconds as f64 / 1000.0
+}
+
+/// The content of the next transaction of the store.
+#[derive(Default)]
+pub(crate) struct Batch {
+    pub(crate) last_event: u64,
+    /// The totals with these sums.
+    pub(crate) totals: Totals,
+    pub(crate) sums: Sums,
+    /// Changed scenes; `None` for those that are gone.
+    pub(crate) scenes: Vec<(Owner, Option<SceneState>)>,
 }
 
 #[cfg(test)]

@@ -15,15 +15,12 @@ use lookdown_tracking::{
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    definition::CameraDefinition,
-    definition_key::DefinitionKey,
+    definition::{CameraDefinition, DefinitionKey},
     floor::Floor,
     now::{LogPause, Now, milliseconds},
-    presence::Presence,
+    presence::{Presence, ReportTime},
     report::ReportKey,
-    report_time::ReportTime,
-    sums::{LineDirection, MINUTE_MS, Sums, ZoneOf},
-    time_span::TimeSpan,
+    sums::{LineDirection, MINUTE_MS, Sums, TimeSpan, ZoneOf},
 };
 
 /// Reports of a camera that are late for this long mean that a clock was set back: tracks begin

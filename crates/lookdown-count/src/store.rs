@@ -4,7 +4,7 @@
 //! none after it, however the process ends.
 
 mod read;
-mod write;
+pub(crate) mod write;
 
 use std::{
     fmt::Display,

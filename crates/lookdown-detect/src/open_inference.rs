@@ -2,18 +2,13 @@
 //! tensors as lists in JSON or as bytes after it (the extension `binary_tensor_data`). Without I/O;
 //! shared by the server and the client of the protocol.
 
-mod binary_data;
-pub mod bounded_json;
-mod datatype;
 pub mod message;
 pub mod metadata;
-pub mod parameters;
 mod tensor_data;
 
 pub use self::{
-    datatype::Datatype,
     message::TensorValues,
-    tensor_data::{TensorData, element_count},
+    tensor_data::{Datatype, TensorData, element_count},
 };
 
 /// The header with the length of the JSON, when bytes follow it.

@@ -4,22 +4,18 @@
 #[macro_use]
 mod parameter_spec;
 
-mod checked_defaults;
-mod defaults;
 mod detect_parameters;
 mod given_parameters;
-mod parameter_error;
 mod priority;
 mod profile;
 mod score_calibration;
-mod tuning;
 
-pub use defaults::{DefaultSource, DefaultUsed, DetectDefaults};
 pub use detect_parameters::{DetectParameters, parse_profile};
 pub use given_parameters::GivenParameters;
-pub use parameter_error::{ParameterError, ParameterFault, whole_number};
+pub use given_parameters::{DefaultSource, DefaultUsed, DetectDefaults};
 pub use parameter_spec::{Interface, JsonType, ParameterDefault, ParameterKind, ParameterSpec};
+pub use parameter_spec::{ParameterError, ParameterFault, whole_number};
 pub use priority::Priority;
 pub use profile::Profile;
+pub use profile::Tuning;
 pub(crate) use score_calibration::ScoreCalibration;
-pub use tuning::Tuning;

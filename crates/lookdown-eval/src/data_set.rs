@@ -6,18 +6,15 @@
 
 mod coco;
 mod content;
-mod error;
 mod heads;
-mod image_files;
-mod image_id;
-pub(crate) mod text;
+pub(crate) mod image_files;
 mod voc;
 
 use std::path::Path;
 
+pub use content::ImageId;
+pub use content::ScoringMismatch;
 pub use content::{DataSet, DataSetImage};
-pub use error::ScoringMismatch;
-pub use image_id::ImageId;
 
 use lookdown_common::files::FileError;
 

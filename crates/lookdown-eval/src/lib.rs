@@ -3,7 +3,6 @@
 //! [`DataSet`] reads the annotations, [`detect`] runs a detector on them, [`Summary`] has the
 //! figures.
 
-mod average_precision;
 mod counts;
 mod data_set;
 mod ground_truth;
@@ -17,12 +16,12 @@ mod saved;
 mod strata;
 mod summary;
 
-pub use average_precision::AveragePrecision;
 pub use counts::{CalibrationError, CountFigures, Counts, DEFAULT_COUNT_THRESHOLD};
 pub use data_set::{DataSet, DataSetImage, ImageId, ScoringMismatch};
 pub use ground_truth::{AnnotatedPerson, EvaluatedImage, GroundTruth, ScoredBox};
 pub use matching::Outcome;
 pub use outline::{Outline, Scoring};
+pub use precision_recall::AveragePrecision;
 pub use precision_recall::{OperatingPoint, PrecisionRecallCurve};
 pub use rotated_box::{Region, RotatedBox};
 pub use row::{DetectedRow, EvaluatedRow, FoundPerson, RowCost, RowName};

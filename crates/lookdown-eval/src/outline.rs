@@ -1,5 +1,7 @@
 //! The outline of a person, annotated or detected, in the shape that is compared.
 
+use std::fmt;
+
 use lookdown_detect::detection::{BBox, FramePixels};
 use lookdown_lens::geometry::OrientedBox;
 
@@ -51,6 +53,16 @@ impl Scoring {
             }
         };
         rotated.map_or(Outline::AxisParallel(bbox), Outline::Rotated)
+    }
+}
+
+impl fmt::Display for Scoring {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::AxisParallel => "axis-parallel boxes",
+            Self::Rotated => "rotated boxes",
+            Self::HeadPoint => "head points",
+        })
     }
 }
 

@@ -10,7 +10,9 @@ use lookdown_detect::detection::BBox;
 use lookdown_lens::geometry::{OrientedBox, Pixel};
 use serde::{Deserialize, Serialize};
 
-use super::{DataSet, DetectedRow, FoundPerson, ImageId, RowName, data_set::text::read_text};
+use crate::{
+    DataSet, DetectedRow, FoundPerson, ImageId, RowName, data_set::image_files::read_text,
+};
 
 /// The category ID of `person` in COCO. Detections of other categories are skipped.
 const PERSON: u64 = 1;

@@ -1,6 +1,12 @@
 //! Entity tags and conditional requests (RFC 9110, sections 8.8.3 and 13.1.2).
 
-use axum::http::{HeaderMap, HeaderName, HeaderValue, header::IF_NONE_MATCH};
+use axum::{
+    http::{
+        HeaderMap, HeaderName, HeaderValue, StatusCode,
+        header::{CACHE_CONTROL, ETAG, IF_NONE_MATCH},
+    },
+    response::{IntoResponse, IntoResponseParts, Response},
+};
 
 use crate::problem::{Kind, Problem};
 
@@ -22,6 +28,37 @@ pub fn entity_tag(value: &str) -> HeaderValue {
 /// Returns the weak entity tag of an opaque value, for responses that are the same but for times.
 pub fn weak_entity_tag(value: &str) -> HeaderValue {
     HeaderValue::from_str(&format!("W/\"{value}\"")).unwrap_or(HeaderValue::from_static("W/\"\""))
+}
+
+/// Returns the headers of a response that clients may cache, but must revalidate before use.
+pub fn revalidated(tag: HeaderValue) -> [(HeaderName, HeaderValue); 2] {
+    [
+        (ETAG, tag),
+        (CACHE_CONTROL, HeaderValue::from_static("no-cache")),
+    ]
+}
+
+/// Returns the headers of a response that only the client may cache, and must revalidate.
+pub fn private(value: &str) -> [(HeaderName, HeaderValue); 2] {
+    let cache_control = HeaderValue::from_static("private, no-cache");
+    [(ETAG, entity_tag(value)), (CACHE_CONTROL, cache_control)]
+}
+
+/// Returns the response with the headers `about` its version, which is `value`: without content and
+/// with the status 304 for a client that has this version.
+///
+/// # Errors
+/// A [`Problem`] for a header that is malformed.
+pub fn unless_known(
+    headers: &HeaderMap,
+    value: &str,
+    about: impl IntoResponseParts,
+    response: impl IntoResponse,
+) -> Result<Response, Problem> {
+    if is_unmodified(headers, value)? {
+        return Ok((StatusCode::NOT_MODIFIED, about, ()).into_response());
+    }
+    Ok((about, response).into_response())
 }
 
 /// Returns `true` if `If-None-Match` lists this value: the client has the current version.

@@ -5,16 +5,12 @@
 //! 3. Chains are split at corners into pieces that a parabola describes (`pieces`). The image of a
 //!    straight edge in a fisheye frame is such a piece.
 
-mod gradient;
-mod plane;
-mod surround;
-
 use lookdown_lens::{saturating::to_usize, self_calibration::EdgeCurve};
 
-use crate::{frame::Frame, lens_circle::LensCircle};
-
-use gradient::Gradient;
-use plane::Plane;
+use crate::{
+    frame::Frame,
+    lens_circle::{LensCircle, surround_threshold},
+};
 
 /// Rasters with a shorter side have no edges of a room.
 const MIN_SIDE: u32 = 32;
@@ -38,7 +34,7 @@ fn curves_of_raster(frame: &Frame, circle: &LensCircle, divisor: u32) -> Vec<Edg
         return Vec::new();
     }
     let luminance = Plane::luminance(frame, divisor);
-    let surround = surround::mask(frame, divisor);
+    let surround = surround_mask(frame, divisor);
     let gradient = Gradient::new(&luminance);
     let scale = f64::from(divisor);
     // The center of the first pixel of the smaller plane.
@@ -286,4 +282,220 @@ fn supports(piece: &[[f64; 2]]) -> Vec<[f64; 2]> {
         })
     };
     (0..wanted).map(mean).collect()
+}
+
+/// Gaussian of 1.1 pixels.
+const KERNEL: [f32; 7] = [
+    0.008_831, 0.069_737, 0.241_062, 0.360_740, 0.241_062, 0.069_737, 0.008_831,
+];
+/// Least gradient of an edge, luminance per pixel, whatever the noise.
+const MIN_EDGE: f32 = 0.7;
+/// Largest threshold, luminance per pixel: a textured room has its edges nevertheless.
+const MAX_EDGE: f32 = 4.0;
+/// Threshold in medians of the gradient.
+const EDGE_IN_MEDIANS: f32 = 2.5;
+
+/// Gradient per pixel.
+struct Gradient {
+    pub width: usize,
+    pub height: usize,
+    pub along_x: Vec<f32>,
+    pub along_y: Vec<f32>,
+    pub size: Vec<f32>,
+    /// Smaller gradients are not edges.
+    pub threshold: f32,
+}
+
+impl Gradient {
+    fn new(luminance: &Plane) -> Self {
+        let smooth = luminance.blurred(&KERNEL);
+        let (width, height) = (smooth.width, smooth.height);
+        let count = width * height;
+        let mut gradient = Self {
+            width,
+            height,
+            along_x: vec![0.0; count],
+            along_y: vec![0.0; count],
+            size: vec![0.0; count],
+            threshold: MIN_EDGE,
+        };
+        for y in 4..height.saturating_sub(4) {
+            for x in 4..width.saturating_sub(4) {
+                let at = y * width + x;
+                let across = 0.5 * (smooth.values[at + 1] - smooth.values[at - 1]);
+                let down = 0.5 * (smooth.values[at + width] - smooth.values[at - width]);
+                gradient.along_x[at] = across;
+                gradient.along_y[at] = down;
+                gradient.size[at] = (across * across + down * down).sqrt();
+            }
+        }
+        let mut sample: Vec<f32> = gradient
+            .size
+            .iter()
+            .step_by(7)
+            .copied()
+            .filter(|size| *size > 0.05)
+            .collect();
+        if !sample.is_empty() {
+            let middle = sample.len() / 2;
+            let (_, median, _) = sample.select_nth_unstable_by(middle, f32::total_cmp);
+            gradient.threshold = (EDGE_IN_MEDIANS * *median).clamp(MIN_EDGE, MAX_EDGE);
+        }
+        gradient
+    }
+}
+
+/// Side of a cell, in pixels of the divided frame.
+const CELL: usize = 4;
+
+/// Cells that are dark and connected with the border of the frame, and their neighbors.
+struct SurroundMask {
+    columns: usize,
+    dark: Vec<bool>,
+}
+
+impl SurroundMask {
+    fn contains(&self, [x, y]: [f64; 2]) -> bool {
+        let [column, row] = [x, y].map(|at| to_usize(at) / CELL);
+        self.dark
+            .get(row * self.columns + column)
+            .copied()
+            .unwrap_or(true)
+    }
+}
+
+/// Returns the surround of a frame, each side divided.
+fn surround_mask(frame: &Frame, divisor: u32) -> SurroundMask {
+    let side = CELL * divisor as usize;
+    let (columns, rows) = (
+        (frame.width() as usize).div_ceil(side),
+        (frame.height() as usize).div_ceil(side),
+    );
+    let mut mask = SurroundMask {
+        columns,
+        dark: vec![false; columns * rows],
+    };
+    let Some(threshold) = surround_threshold(frame) else {
+        return mask;
+    };
+    let is_dark = |cell: usize| {
+        let (left, top) = ((cell % columns) * side, (cell / columns) * side);
+        let mut lit = 0;
+        for y in (top..(top + side).min(frame.height() as usize)).step_by(divisor as usize) {
+            for x in (left..(left + side).min(frame.width() as usize)).step_by(divisor as usize) {
+                #[expect(clippy::cast_possible_truncation, reason = "in the frame")]
+                let [red, green, blue] = frame.pixel(x as u32, y as u32);
+                lit += u32::from(f64::from(red.max(green).max(blue)) > threshold);
+            }
+        }
+        lit <= 2
+    };
+    let border = (0..columns * rows).filter(|cell| {
+        let (column, row) = (cell % columns, cell / columns);
+        column == 0 || row == 0 || column + 1 == columns || row + 1 == rows
+    });
+    let mut open: Vec<usize> = border.collect();
+    let mut seen = vec![false; columns * rows];
+    let mut filled = Vec::new();
+    while let Some(cell) = open.pop() {
+        if std::mem::replace(&mut seen[cell], true) || !is_dark(cell) {
+            continue;
+        }
+        filled.push(cell);
+        open.extend(neighbors(cell, columns, rows));
+    }
+    for cell in filled {
+        mask.dark[cell] = true;
+        for neighbor in neighbors(cell, columns, rows) {
+            mask.dark[neighbor] = true;
+            for further in neighbors(neighbor, columns, rows) {
+                mask.dark[further] = true;
+            }
+        }
+    }
+    mask
+}
+
+fn neighbors(cell: usize, columns: usize, rows: usize) -> impl Iterator<Item = usize> {
+    let (column, row) = (cell % columns, cell / columns);
+    let left = (column > 0).then(|| cell - 1);
+    let right = (column + 1 < columns).then(|| cell + 1);
+    let above = (row > 0).then(|| cell - columns);
+    let below = (row + 1 < rows).then(|| cell + columns);
+    [left, right, above, below].into_iter().flatten()
+}
+
+/// A raster of numbers, row by row.
+struct Plane {
+    pub width: usize,
+    pub height: usize,
+    pub values: Vec<f32>,
+}
+
+impl Plane {
+    /// The luminance of a frame (ITU-R BT.601), each side divided.
+    pub(super) fn luminance(frame: &Frame, divisor: u32) -> Self {
+        let step = divisor as usize;
+        let (width, height) = (
+            frame.width() as usize / step,
+            frame.height() as usize / step,
+        );
+        let line = 3 * frame.width() as usize;
+        let pixels = frame.pixels();
+        let mut values = vec![0.0; width * height];
+        let share = 1.0 / (step * step) as f32;
+        for (y, row) in values.chunks_exact_mut(width).enumerate() {
+            for inner in 0..step {
+                let source = &pixels[(y * step + inner) * line..][..3 * step * width];
+                for (value, group) in row.iter_mut().zip(source.chunks_exact(3 * step)) {
+                    for rgb in group.chunks_exact(3) {
+                        *value += share
+                            * (0.299 * f32::from(rgb[0])
+                                + 0.587 * f32::from(rgb[1])
+                                + 0.114 * f32::from(rgb[2]));
+                    }
+                }
+            }
+        }
+        Self {
+            width,
+            height,
+            values,
+        }
+    }
+
+    /// The plane after a Gaussian blur. The border of the width of the kernel stays as it was.
+    pub(super) fn blurred(&self, kernel: &[f32]) -> Self {
+        let reach = kernel.len() / 2;
+        let mut across = self.values.clone();
+        for (target, source) in across
+            .chunks_exact_mut(self.width)
+            .zip(self.values.chunks_exact(self.width))
+        {
+            for (value, window) in target[reach..].iter_mut().zip(source.windows(kernel.len())) {
+                *value = window
+                    .iter()
+                    .zip(kernel)
+                    .map(|(value, weight)| value * weight)
+                    .sum();
+            }
+        }
+        let mut values = across.clone();
+        let rows = self.height.saturating_sub(2 * reach);
+        for y in 0..rows {
+            let target = &mut values[(y + reach) * self.width..][..self.width];
+            target.fill(0.0);
+            for (offset, weight) in kernel.iter().enumerate() {
+                let source = &across[(y + offset) * self.width..][..self.width];
+                for (value, source) in target.iter_mut().zip(source) {
+                    *value += weight * source;
+                }
+            }
+        }
+        Self {
+            width: self.width,
+            height: self.height,
+            values,
+        }
+    }
 }

@@ -15,16 +15,15 @@ mod masked_pixels;
 mod network_input;
 mod remap_table;
 pub mod room_fit;
-mod thumbnail;
 mod view_signature;
 
 pub use cell_motion::{MovedCell, NEW_LEVELS, is_noise};
 pub use even_light::with_even_light;
+pub use frame::narrowed;
 pub use frame::{Frame, FrameError};
 pub use frame_signature::FrameSignature;
 pub use letterbox::Letterbox;
 pub use masked_pixels::MaskedPixels;
 pub use network_input::{ChannelOrder, NetworkInput, ViewBatch};
 pub use remap_table::RemapTable;
-pub use thumbnail::narrowed;
 pub use view_signature::ViewSignature;

@@ -7,7 +7,6 @@ mod band;
 mod block_size;
 mod frame_from_plane;
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
-mod frame_lines;
 #[cfg(target_arch = "aarch64")]
 #[expect(unsafe_code, reason = "vector instructions")]
 mod neon;

@@ -6,12 +6,8 @@
 
 mod camera;
 mod camera_height;
-mod climb;
-mod edge_curve;
-mod evaluation;
 mod evidence;
 mod fit;
-mod followed_edges;
 mod known_camera;
 mod level_from_people;
 mod maxima;
@@ -20,12 +16,10 @@ mod refusal;
 mod search;
 #[cfg(test)]
 mod tests;
-mod triples;
 mod uncertainty;
-mod visible_people;
 
 pub use camera_height::{CameraHeight, HeightRefusal};
-pub use edge_curve::EdgeCurve;
+pub use evidence::EdgeCurve;
 pub use fit::{CLEARLY_EXPLAINED, RoomFit};
 pub use known_camera::{FieldOfView, FieldOfViewError, IdealLens, KnownCamera};
 pub use level_from_people::LevelFromPeople;

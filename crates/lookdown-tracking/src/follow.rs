@@ -5,18 +5,17 @@
 //! instead of those of all views, so that each person keeps the odds that the search gave it
 //! relative to its first crop. The caller detects motion, places crops and finds people in them.
 
-mod boxes;
 mod target;
 
 use lookdown_lens::geometry::OrientedBox;
 
 use self::{
-    boxes::iou,
+    target::iou,
     target::{SAME_IOU, Target, targets_of},
 };
 pub use self::{
-    boxes::{overlap, widened},
     target::{FoundPerson, from_logit, logit},
+    target::{overlap, widened},
 };
 
 /// Time from a search to the next one, seconds: a little less than a second, because frames jitter.

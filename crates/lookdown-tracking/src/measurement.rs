@@ -3,9 +3,10 @@
 //! Errors along the ray's floor direction (radial) are larger than those across it: the box of a
 //! person is several times as long as wide, and its lower end decides the place.
 
+use lookdown_lens::geometry::BoxAngles;
 use nalgebra::{Matrix2, Unit, Vector2, Vector3};
 
-use crate::{CameraPose, MeasurementNoise, Observation, place::Place};
+use crate::{CameraPose, MeasurementNoise, settings::Place};
 
 /// Extents in the radial direction and across it: meters, or radians.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -151,4 +152,30 @@ impl Measurement {
 /// The factor of the error of a person with this score: low scores are badly placed boxes.
 fn distrust(score: f64, noise: &MeasurementNoise) -> f64 {
     1.0 + noise.low_score_factor * (1.0 - score.clamp(0.0, 1.0))
+}
+
+/// One person of one report.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Observation {
+    /// Place on the floor in meters (x, y of the camera); absent without the camera's height.
+    pub floor_m: Option<[f64; 2]>,
+    /// Direction of the person's center: clockwise from the top of the frame, in degrees (0 to
+    /// 360).
+    pub azimuth_deg: f64,
+    /// Angle between that direction and the optical axis, in degrees (0 to 180).
+    pub off_axis_deg: f64,
+    /// Center of the oriented box in frame pixels (x, y).
+    pub center_px: [f64; 2],
+    /// Width and height of the oriented box in frame pixels.
+    pub size_px: [f64; 2],
+    /// Middle of the oriented box's lower side in frame pixels (x, y): lines and zones in the frame
+    /// count this point.
+    pub foot_px: [f64; 2],
+    /// The same box in angles, which tell the posture; absent near the rim of the lens.
+    pub angles: Option<BoxAngles>,
+    /// Probability that this is a person (0 to 1).
+    pub score: f64,
+    /// True for a person in the margin around the camera's areas, who continues tracks but does not
+    /// count.
+    pub is_in_margin: bool,
 }

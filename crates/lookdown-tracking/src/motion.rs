@@ -10,8 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     kalman::{Bias, Innovation, Kalman, Measured},
     measurement::Measurement,
-    place::Place,
-    settings::PlaneSettings,
+    settings::{Place, PlaneSettings},
 };
 
 /// Meters on the floor for a radian around the camera, at usual heights.

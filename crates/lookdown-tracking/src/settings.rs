@@ -1,8 +1,9 @@
 //! Settings of the tracker, with their units.
 
+use nalgebra::{Unit, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::{evidence::EvidenceSettings, place::Place};
+use crate::evidence::EvidenceSettings;
 
 /// Settings of a tracker. The defaults are tuned on simulated walks (`docs/lab/count-accuracy.md`),
 /// the errors of places on those of real people (`docs/lab/real-walks.md`).
@@ -165,4 +166,13 @@ impl Default for MeasurementNoise {
             same_person_across_deg: 4.3,
         }
     }
+}
+
+/// A measured place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Place {
+    /// Meters on the site's floor.
+    Floor(Vector2<f64>),
+    /// A direction in the camera's frame.
+    Bearing(Unit<Vector3<f64>>),
 }

@@ -10,10 +10,11 @@ use std::{
 };
 
 use bytes::Bytes;
+use lookdown_common::text::one_line;
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt},
-    process::{Child, ChildStdout, Command},
-    time::{Interval, interval},
+    process::{Child, ChildStderr, ChildStdout, Command},
+    time::{Duration, Interval, interval, timeout},
 };
 
 use crate::{
@@ -21,9 +22,7 @@ use crate::{
     child::{self, Task, USAGE_INTERVAL, Usage},
     jpeg_splitter::JpegSplitter,
     memory_budget::Reservation,
-    stderr_line::LastLine,
 };
-use lookdown_common::text::one_line;
 
 /// Most pixels of a frame that `ffmpeg` decodes: those that the server accepts.
 const MAX_PIXELS: &str = "50000000";
@@ -213,4 +212,68 @@ pub(crate) fn file_url(path: &Path) -> OsString {
     let mut url = OsString::from("file:");
     url.push(path);
     url
+}
+
+/// Most bytes of a line that are kept.
+const MAX_BYTES: usize = 1000;
+/// Longest time to wait for the last line after the output has ended.
+const LAST_WORDS: Duration = Duration::from_secs(1);
+
+/// The last line of standard error, as far as it was read.
+pub(crate) struct LastLine {
+    stderr: ChildStderr,
+    line: Vec<u8>,
+    is_ended: bool,
+    is_complete: bool,
+}
+
+impl LastLine {
+    pub(crate) fn new(stderr: ChildStderr) -> Self {
+        Self {
+            stderr,
+            line: Vec::new(),
+            is_ended: false,
+            is_complete: false,
+        }
+    }
+
+    /// Reads further text. Never ends after the end of the text. May be cancelled.
+    pub(crate) async fn read(&mut self) {
+        if self.is_ended {
+            std::future::pending::<()>().await;
+        }
+        let mut bytes = [0; 512];
+        match self.stderr.read(&mut bytes).await {
+            Ok(0) | Err(_) => self.is_ended = true,
+            Ok(count) => self.push(&bytes[..count]),
+        }
+    }
+
+    fn push(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            if byte == b'\n' || byte == b'\r' {
+                self.is_complete = true;
+                continue;
+            }
+            if std::mem::take(&mut self.is_complete) {
+                self.line.clear();
+            }
+            if self.line.len() < MAX_BYTES {
+                self.line.push(byte);
+            }
+        }
+    }
+
+    /// Reads the rest, and returns the last line. The wait for the rest is bounded, so a child that
+    /// still runs is not waited for.
+    pub(crate) async fn last(&mut self) -> String {
+        let rest = async {
+            while !self.is_ended {
+                self.read().await;
+            }
+        };
+        // A child that keeps its standard error open loses its last line.
+        let _ = timeout(LAST_WORDS, rest).await;
+        one_line(&String::from_utf8_lossy(&self.line))
+    }
 }

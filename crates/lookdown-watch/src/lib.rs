@@ -23,7 +23,6 @@ mod server;
 mod slot;
 mod source;
 mod source_error;
-mod stderr_line;
 mod video;
 mod viewers;
 mod watcher;

@@ -13,8 +13,7 @@ use tokio::{
 use crate::{
     SourceError, VideoOptions,
     child::{self, Task},
-    ffmpeg::{Ffmpeg, Input, command, decoding, file_input, file_restrictions, file_url},
-    stderr_line::LastLine,
+    ffmpeg::{Ffmpeg, Input, LastLine, command, decoding, file_input, file_restrictions, file_url},
 };
 
 /// Longest duration of a recording, a year: a header with a longer one is damaged.

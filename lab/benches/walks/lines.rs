@@ -5,7 +5,7 @@ use crate::{data::Sequence, view::View};
 use lookdown_tracking::{
     Plane,
     lines::{Direction, Line},
-    taught_crossings::ReferenceCrossings,
+    taught::ReferenceCrossings,
 };
 use std::collections::BTreeMap;
 

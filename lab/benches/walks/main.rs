@@ -27,7 +27,7 @@ use anyhow::{Context, Result, bail};
 use lookdown_tracking::{
     CameraPose, Observation, Tracker, TrackerSettings,
     lines::{LineCounter, LineState},
-    taught_crossings::{CrossingRatio, ReferenceCrossings},
+    taught::{CrossingRatio, ReferenceCrossings},
 };
 use serde_json::{Value, json};
 

@@ -10,15 +10,14 @@ use axum::{
 use lookdown_common::report::Report;
 use lookdown_detect::pipeline::DetectJob;
 
+use super::{
+    answer::{AnswerOptions, Content},
+    report::report_headers,
+    run::{AnswerInput, detect_parameters, run_detection},
+    upload::Upload,
+};
 use crate::api::{
     ApiState,
-    detect::{
-        answer::{AnswerOptions, Content},
-        defaults::detect_parameters,
-        report::report_headers,
-        run::{AnswerInput, run_detection},
-        upload::Upload,
-    },
     http::{problem::Problem, query::pairs},
     openapi::{DetectForm, DetectQuery, RawBytes},
 };

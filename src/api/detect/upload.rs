@@ -5,6 +5,8 @@
 
 mod form;
 
+pub(in crate::api) use form::{FieldUse, frames_among};
+
 use std::{sync::Arc, time::Instant};
 
 use axum::{
@@ -16,6 +18,7 @@ use axum::{
     },
 };
 use bytes::Bytes;
+use form::{Form, frame_in_query, use_in_detection};
 use jiff::Timestamp;
 use lookdown_common::text::Quoted;
 use lookdown_detect::{parameters::DetectParameters, pipeline::DetectJob};
@@ -25,19 +28,15 @@ use crate::{
     api::{
         ApiState,
         http::{
-            caller::Caller,
+            access::Caller,
             context::RequestContext,
             problem::{Problem, ProblemKind},
             query::query_parameters,
             request_body::{BodyReader, Held, UploadBudget},
         },
-        readiness::Phase,
+        state::Phase,
     },
 };
-
-use form::{Form, frame_in_query, use_in_detection};
-
-pub(in crate::api) use form::{FieldUse, frames_among};
 
 /// A frame in memory with the parameters of its request.
 pub(in crate::api) struct Upload {

@@ -14,7 +14,11 @@ use axum::{
 };
 use lookdown_http::request_id::RequestId;
 
-use super::{access::Access, caller::Caller, deadline::Deadline, problem::Problem};
+use super::{
+    access::{Access, Caller},
+    deadline::Deadline,
+    problem::Problem,
+};
 use crate::{
     access::Holder,
     telemetry::{RequestTrace, Tracer},

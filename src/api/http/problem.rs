@@ -4,8 +4,7 @@
 //! an ID of the occurrence, logs its cause and counts it. The table of
 //! [`lookdown_http::problem`] declares the kinds.
 
-mod calibration;
-mod pipeline;
+pub(in crate::api) use lookdown_http::problem::{Kind as ProblemKind, ProblemBody};
 
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
@@ -16,10 +15,15 @@ use axum::{
     },
     response::{IntoResponse, Response},
 };
+use lookdown_detect::{
+    parameters::{ParameterError, ParameterFault},
+    pipeline::PipelineError,
+};
+use lookdown_imaging::decode::DecodeError;
 use serde_json::Value;
 use uuid::Uuid;
 
-pub(in crate::api) use lookdown_http::problem::{Kind as ProblemKind, ProblemBody};
+use crate::calibration_store::{ChangeError, StoreError};
 
 /// The longest `Retry-After`.
 const MAX_RETRY_AFTER_SECONDS: u64 = 60;
@@ -224,5 +228,132 @@ fn remedy_for_method(method: &str, path: &str) -> String {
     match camera.filter(|camera| method == "GET" && !camera.contains('/')) {
         Some(camera) => format!("/results/{camera}/latest"),
         None => "a method of the header Allow".to_owned(),
+    }
+}
+
+/// Failed changes of calibrations as problems: the only place that decides their kind.
+impl From<ChangeError> for Problem {
+    fn from(error: ChangeError) -> Self {
+        let parameter = parameter_of_change(&error).map(ToOwned::to_owned);
+        let kind = match error {
+            ChangeError::NotWritable => ProblemKind::Forbidden,
+            ChangeError::Unknown { .. } => ProblemKind::UnknownCalibration,
+            ChangeError::Content(_)
+            | ChangeError::SeveralCameras { .. }
+            | ChangeError::UnknownCamera { .. } => ProblemKind::InvalidCalibration,
+            ChangeError::Outdated { .. } => ProblemKind::PreconditionFailed,
+            ChangeError::Shared { .. } | ChangeError::Sample { .. } => {
+                ProblemKind::CalibrationConflict
+            }
+            ChangeError::Unseen(_) => {
+                tracing::warn!("{error}");
+                let detail = "the calibration was changed, but cannot be read now: get it \
+                              before you send the change again";
+                return Self::new(ProblemKind::CalibrationsUnreachable, detail);
+            }
+            ChangeError::Store(StoreError::ReadOnly { .. }) => {
+                tracing::warn!("a calibration was not changed: {error}");
+                let detail = "calibrations cannot be changed: their store is read-only";
+                return Self::new(ProblemKind::Forbidden, detail);
+            }
+            // A full disk, for example, is not a fault of the server.
+            ChangeError::Store(StoreError::Failed { .. }) => {
+                tracing::error!("a calibration was not changed: {error}");
+                let detail =
+                    "the calibrations cannot be changed now: the server's log has the reason";
+                return Self::new(ProblemKind::CalibrationsUnreachable, detail);
+            }
+            ChangeError::Store(_) => return Self::internal(error),
+        };
+        Self {
+            parameter,
+            ..Self::new(kind, error.to_string())
+        }
+    }
+}
+
+/// The parameter of the request, or the field of the calibration, at fault.
+fn parameter_of_change(error: &ChangeError) -> Option<&str> {
+    match error {
+        ChangeError::Content(error) => error.parameter(),
+        ChangeError::SeveralCameras { .. } | ChangeError::UnknownCamera { .. } => Some("camera"),
+        _ => None,
+    }
+}
+
+/// Errors of the pipeline as problems: no other place decides their kind.
+impl From<PipelineError> for Problem {
+    fn from(error: PipelineError) -> Self {
+        let kind = match &error {
+            PipelineError::Parameter(error) => kind_of_parameter_error(error),
+            PipelineError::Image(error) => kind_of_decode_error(error),
+            PipelineError::UnknownCalibration { .. }
+            | PipelineError::UnusableCalibration { .. } => ProblemKind::UnknownCalibration,
+            PipelineError::UnknownModel { .. } => ProblemKind::UnknownModel,
+            PipelineError::AspectMismatch { .. } | PipelineError::FrameTooSmall { .. } => {
+                ProblemKind::UnfitImage
+            }
+            PipelineError::ModelStarting => ProblemKind::WarmingUp,
+            PipelineError::Overloaded { .. }
+            | PipelineError::ShareUsed { .. }
+            | PipelineError::InferenceBusy { .. } => ProblemKind::Overloaded,
+            PipelineError::InferenceUnavailable => ProblemKind::InferenceUnavailable,
+            PipelineError::ShuttingDown => ProblemKind::ShuttingDown,
+            PipelineError::Withdrawn => ProblemKind::Timeout,
+            PipelineError::Internal(_) => ProblemKind::Internal,
+        };
+        let parameter = parameter_of(&error).map(ToOwned::to_owned);
+        let problem = match error {
+            PipelineError::Internal(cause) => Self::internal(cause),
+            PipelineError::Overloaded { retry_after, .. }
+            | PipelineError::ShareUsed { retry_after, .. }
+            | PipelineError::InferenceBusy { retry_after } => {
+                Self::new(kind, error.to_string()).with_retry_after(retry_after)
+            }
+            other => Self::new(kind, other.to_string()),
+        };
+        Self {
+            parameter,
+            ..problem
+        }
+    }
+}
+
+/// The parameter of the request at fault.
+fn parameter_of(error: &PipelineError) -> Option<&str> {
+    match error {
+        PipelineError::Parameter(error) => Some(&error.name),
+        PipelineError::Image(_)
+        | PipelineError::AspectMismatch { .. }
+        | PipelineError::FrameTooSmall { .. } => Some(FRAME),
+        PipelineError::UnknownCalibration { .. } | PipelineError::UnusableCalibration { .. } => {
+            Some("calibration")
+        }
+        PipelineError::UnknownModel { .. } => Some("model"),
+        _ => None,
+    }
+}
+
+impl From<ParameterError> for Problem {
+    fn from(error: ParameterError) -> Self {
+        let kind = kind_of_parameter_error(&error);
+        Self::new(kind, error.to_string()).with_parameter(error.name)
+    }
+}
+
+fn kind_of_parameter_error(error: &ParameterError) -> ProblemKind {
+    match error.fault {
+        ParameterFault::UnknownName => ProblemKind::UnknownParameter,
+        ParameterFault::Repeated => ProblemKind::RepeatedParameter,
+        ParameterFault::BadValue => ProblemKind::InvalidParameter,
+    }
+}
+
+fn kind_of_decode_error(error: &DecodeError) -> ProblemKind {
+    match error {
+        DecodeError::Empty => ProblemKind::MissingImage,
+        DecodeError::UnsupportedFormat { .. } => ProblemKind::UnsupportedImage,
+        DecodeError::Corrupt { .. } => ProblemKind::DamagedImage,
+        DecodeError::TooLarge { .. } => ProblemKind::ImageTooLarge,
     }
 }

@@ -9,9 +9,6 @@
 //! The form that DeepStack's clients send: the frame in `image`, `min_confidence` and `api_key`.
 //! The query may have the parameters of `POST /detect`.
 
-mod answer;
-pub(in crate::api) mod status;
-
 use std::sync::Arc;
 
 use axum::{
@@ -23,10 +20,12 @@ use axum::{
     routing::any,
 };
 use lookdown_calibration::CalibrationId;
+use lookdown_common::report::{Report, ReportPerson};
 use lookdown_detect::{
     parameters::{DetectParameters, ParameterError},
     pipeline::DetectJob,
 };
+use serde::Serialize;
 use tower_http::catch_panic::CatchPanicLayer;
 use utoipa::ToSchema;
 
@@ -35,8 +34,7 @@ use crate::{
     api::{
         ApiState,
         detect::{
-            defaults::detect_parameters,
-            run::run_detection,
+            run::{detect_parameters, run_detection},
             upload::{FieldUse, Upload, is_multipart},
         },
         http::{
@@ -49,9 +47,8 @@ use crate::{
         openapi::{CalibratedDetectionQuery, DetectionQuery},
         require_scope::RequireRead,
     },
+    calibration_store::CalibrationRow,
 };
-
-use answer::{DeepStackAnswer, DeepStackModels};
 
 /// Detect persons (DeepStack)
 ///
@@ -305,4 +302,239 @@ fn renamed(error: ParameterError) -> ParameterError {
         name: MIN_CONFIDENCE.to_owned(),
         ..error
     }
+}
+
+/// The responses that DeepStack's clients read.
+const LABEL: &str = "person";
+const MILLIS_PER_SECOND: f64 = 1000.0;
+
+/// The persons in one frame, in DeepStack's format.
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(example = json!({
+    "success": true,
+    "predictions": [{
+        "label": "person", "confidence": 0.8731,
+        "x_min": 1102, "y_min": 700, "x_max": 1342, "y_max": 843
+    }],
+    "duration": 0.614,
+    "message": "Found person",
+    "count": 1,
+    "code": 200,
+    "command": "detect",
+    "moduleId": "Lookdown",
+    "inferenceMs": 581,
+    "processMs": 614,
+    "analysisRoundTripMs": 614
+}))]
+#[serde(rename_all = "camelCase")]
+pub(in crate::api) struct DeepStackAnswer {
+    /// Always true; failures have false.
+    success: bool,
+    /// Persons, highest confidence first.
+    predictions: Vec<DeepStackPrediction>,
+    /// Time from the arrival of the frame to its report, seconds.
+    duration: f64,
+    /// The result in words, of CodeProject.AI as the fields below.
+    message: &'static str,
+    /// The number of persons.
+    count: usize,
+    /// Always 200.
+    code: u16,
+    /// Always `detect`.
+    command: &'static str,
+    /// Always `Lookdown`.
+    module_id: &'static str,
+    /// Time of the inference, whole milliseconds.
+    inference_ms: i64,
+    /// Time from the arrival of the frame to its report, whole milliseconds.
+    process_ms: i64,
+    /// The same as `processMs`: no other process is involved.
+    analysis_round_trip_ms: i64,
+}
+
+/// A person.
+#[derive(Debug, PartialEq, Serialize, ToSchema)]
+pub(in crate::api) struct DeepStackPrediction {
+    /// Always `person`.
+    label: &'static str,
+    /// The score, 0 to 1.
+    confidence: f64,
+    /// Left edge, pixels of the frame.
+    x_min: i64,
+    /// Top edge.
+    y_min: i64,
+    /// Right edge.
+    x_max: i64,
+    /// Bottom edge.
+    y_max: i64,
+}
+
+impl From<&Report> for DeepStackAnswer {
+    fn from(report: &Report) -> Self {
+        let total_ms = whole(report.timings_ms.total.round());
+        Self {
+            success: true,
+            predictions: report.persons.iter().map(Into::into).collect(),
+            duration: report.timings_ms.total / MILLIS_PER_SECOND,
+            message: match report.persons.len() {
+                0 => "No objects found",
+                _ => "Found person",
+            },
+            count: report.persons.len(),
+            code: 200,
+            command: "detect",
+            module_id: "Lookdown",
+            inference_ms: whole(report.timings_ms.inference.round()),
+            process_ms: total_ms,
+            analysis_round_trip_ms: total_ms,
+        }
+    }
+}
+
+impl From<&ReportPerson> for DeepStackPrediction {
+    /// These clients expect whole pixels. The box is rounded outwards, within the frame.
+    fn from(person: &ReportPerson) -> Self {
+        let bbox = &person.bbox;
+        Self {
+            label: LABEL,
+            confidence: person.score,
+            x_min: whole(bbox.x_min.floor()),
+            y_min: whole(bbox.y_min.floor()),
+            x_max: whole(bbox.x_max.ceil()),
+            y_max: whole(bbox.y_max.ceil()),
+        }
+    }
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "boxes lie within the frame, and times within deadlines"
+)]
+fn whole(number: f64) -> i64 {
+    number as i64
+}
+
+/// The calibrations, in place of custom models.
+#[derive(Debug, Serialize, ToSchema)]
+pub(in crate::api) struct DeepStackModels {
+    /// Always true; failures have false.
+    success: bool,
+    /// The IDs of the calibrations in use.
+    models: Vec<String>,
+}
+
+impl FromIterator<CalibrationRow> for DeepStackModels {
+    fn from_iter<T: IntoIterator<Item = CalibrationRow>>(rows: T) -> Self {
+        let serving = rows.into_iter().filter(|row| row.entry.is_some());
+        Self {
+            success: true,
+            models: serving.map(|row| row.id.to_string()).collect(),
+        }
+    }
+}
+
+/// A server that responds.
+#[derive(Debug, Serialize, ToSchema)]
+pub(in crate::api) struct Pong {
+    /// Always true.
+    success: bool,
+}
+
+/// Newer versions of the server.
+#[derive(Debug, Serialize, ToSchema)]
+#[serde(rename_all = "camelCase")]
+pub(in crate::api) struct VersionStatus {
+    /// Always true.
+    success: bool,
+    /// An explanation.
+    message: &'static str,
+    /// Always false: the server looks for no updates.
+    update_available: bool,
+    /// The version that runs.
+    version: VersionNumbers,
+    /// The version that runs.
+    current: VersionNumbers,
+    /// The version that runs: no newer one is known.
+    latest: VersionNumbers,
+}
+
+/// A version.
+#[derive(Debug, Serialize, ToSchema)]
+#[serde(rename_all = "camelCase")]
+struct VersionNumbers {
+    /// The first number.
+    major: u32,
+    /// The second number.
+    minor: u32,
+    /// The third number.
+    patch: u32,
+    /// The name of a version before a release; empty for a release.
+    pre_release: &'static str,
+    /// Always 0.
+    build: u32,
+    /// Always false.
+    security_update: bool,
+    /// Always empty.
+    file: &'static str,
+    /// Always empty.
+    release_notes: &'static str,
+}
+
+impl VersionNumbers {
+    /// The version that runs.
+    fn current() -> Self {
+        // Cargo writes numbers.
+        let number = |text: &str| text.parse().unwrap_or_default();
+        Self {
+            major: number(env!("CARGO_PKG_VERSION_MAJOR")),
+            minor: number(env!("CARGO_PKG_VERSION_MINOR")),
+            patch: number(env!("CARGO_PKG_VERSION_PATCH")),
+            pre_release: env!("CARGO_PKG_VERSION_PRE"),
+            build: 0,
+            security_update: false,
+            file: "",
+            release_notes: "",
+        }
+    }
+}
+
+/// Ping the server (CodeProject.AI)
+#[utoipa::path(
+    get, path = "/v1/status/ping", tag = "operation", operation_id = "ping_as_code_project_ai",
+    security(()),
+    responses((status = OK, description = "The server responds.", body = Pong))
+)]
+pub(in crate::api) async fn ping() -> Json<Pong> {
+    Json(Pong { success: true })
+}
+
+/// Ping the server (CodeProject.AI 2)
+#[utoipa::path(
+    get, path = "/v1/server/status/ping", tag = "operation",
+    operation_id = "ping_server_as_code_project_ai",
+    security(()),
+    responses((status = OK, description = "The server responds.", body = Pong))
+)]
+pub(in crate::api) async fn server_ping() -> Json<Pong> {
+    ping().await
+}
+
+/// Get the version (CodeProject.AI)
+///
+/// Lookdown opens no connection to look for updates, so none is ever reported.
+#[utoipa::path(
+    get, path = "/v1/status/updateavailable", tag = "operation",
+    operation_id = "get_update_as_code_project_ai",
+    security(()),
+    responses((status = OK, description = "The version that runs.", body = VersionStatus))
+)]
+pub(in crate::api) async fn update_available() -> Json<VersionStatus> {
+    Json(VersionStatus {
+        success: true,
+        message: "Lookdown does not look for updates.",
+        update_available: false,
+        version: VersionNumbers::current(),
+        current: VersionNumbers::current(),
+        latest: VersionNumbers::current(),
+    })
 }

@@ -4,9 +4,7 @@
 //!
 //! The only model, `lookdown`, accepts frames and returns their persons.
 
-pub(in crate::api) mod describe;
 pub(in crate::api) mod infer;
-mod own_metadata;
-mod persons;
+pub(in crate::api) mod persons;
 mod request;
 mod tensor;

@@ -19,7 +19,7 @@ use lookdown_calibration::{
     native::{NativeCalibration, NativeImage},
 };
 use lookdown_common::report::ReportWarning;
-use lookdown_http::entity_tags::{entity_tag, is_unmodified};
+use lookdown_http::entity_tags::{entity_tag, unless_known};
 use lookdown_imaging::{
     decode::{DecodeLimits, decode},
     room_fit::{RoomFrame, fit_room},
@@ -28,6 +28,7 @@ use lookdown_lens::self_calibration::{FieldOfView, IdealLens, KnownCamera};
 use serde::Serialize;
 use strum::VariantNames;
 use tokio_util::sync::CancellationToken;
+use upload::{CalibrationAddress, CalibrationUpload, NewCalibrationAddress, write_condition};
 use utoipa::{
     IntoParams, PartialSchema, ToSchema,
     openapi::{
@@ -37,7 +38,7 @@ use utoipa::{
     },
 };
 
-use super::found_lens::FoundLens;
+use super::cameras::suggestion::FoundLens;
 use crate::{
     api::{
         ApiState,
@@ -57,8 +58,6 @@ use crate::{
     room_calibration::{FIELD_OF_VIEW_DEG, LENS, known_camera, parsed, room_calibration},
     suggestions::FRAMES,
 };
-
-use upload::{CalibrationAddress, CalibrationUpload, NewCalibrationAddress, write_condition};
 
 /// List calibrations
 ///
@@ -103,12 +102,10 @@ pub(in crate::api) async fn get(
         .calibrations
         .entry(&id)
         .ok_or_else(|| unknown(&state, &id))?;
-    let tag = [(ETAG, entity_tag(entry.calibration.revision()))];
-    if is_unmodified(&headers, entry.calibration.revision())? {
-        return Ok((StatusCode::NOT_MODIFIED, tag).into_response());
-    }
-    let content_type = [(CONTENT_TYPE, "application/json")];
-    Ok((tag, content_type, entry.native_file()).into_response())
+    let revision = entry.calibration.revision();
+    let tag = [(ETAG, entity_tag(revision))];
+    let answer = ([(CONTENT_TYPE, "application/json")], entry.native_file());
+    Ok(unless_known(&headers, revision, tag, answer)?)
 }
 
 /// Create or replace a calibration

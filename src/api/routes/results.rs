@@ -9,8 +9,8 @@ use axum::{
     Json,
     extract::{FromRequestParts, Path, State},
     http::{
-        HeaderMap, HeaderName, HeaderValue, StatusCode, Uri,
-        header::{CACHE_CONTROL, CONTENT_TYPE, ETAG},
+        HeaderMap, StatusCode, Uri,
+        header::{CACHE_CONTROL, CONTENT_TYPE},
         request::Parts,
     },
     response::{IntoResponse, Response},
@@ -23,7 +23,9 @@ use lookdown_common::{
     text::{Quoted, one_line},
 };
 use lookdown_detect::parameters::{ParameterError, whole_number};
-use lookdown_http::entity_tags::{entity_tag, is_unmodified, weak_entity_tag};
+use lookdown_http::entity_tags::{
+    entity_tag, is_unmodified, private, revalidated, unless_known, weak_entity_tag,
+};
 use lookdown_tracking::taught::NumberWithBar;
 use serde::Serialize;
 use tokio::time::timeout_at;
@@ -35,7 +37,7 @@ use crate::{
     api::{
         ApiState,
         http::{
-            caller::Caller,
+            access::Caller,
             deadline::Deadline,
             problem::{Problem, ProblemKind},
             query::{pairs, parameters_named, query_parameters},
@@ -45,9 +47,6 @@ use crate::{
     },
     results::{Cameras, Headline, ListenError, ReportId, StoredReport, Unreachable, medians},
 };
-
-/// Clients may cache the response, but must revalidate it before use.
-const NO_CACHE: HeaderValue = HeaderValue::from_static("no-cache");
 
 /// List cameras with reports
 ///
@@ -83,11 +82,8 @@ pub(in crate::api) async fn list(
         )
         .as_bytes(),
     );
-    let about = [(ETAG, weak_entity_tag(&tag)), (CACHE_CONTROL, NO_CACHE)];
-    if is_unmodified(&headers, &tag)? {
-        return Ok((StatusCode::NOT_MODIFIED, about).into_response());
-    }
-    Ok((about, Json(rows)).into_response())
+    let about = revalidated(weak_entity_tag(&tag));
+    Ok(unless_known(&headers, &tag, about, Json(rows))?)
 }
 
 /// Returns the problem of a camera without a stored report.
@@ -284,7 +280,7 @@ pub(in crate::api) async fn get_history(
     let camera = Cameras::One(camera);
     let page = state.results.since(&camera, since, limit).await?;
     let content_type = [(CONTENT_TYPE, "application/json")];
-    let cache = [(CACHE_CONTROL, NO_CACHE)];
+    let cache = [(CACHE_CONTROL, "no-cache")];
     let persons = medians(&page, taught.as_deref());
     let body = write(page.iter().map(AsRef::as_ref).zip(persons));
     Ok((content_type, cache, body))
@@ -384,12 +380,10 @@ pub(in crate::api) async fn get_latest(
     };
     let report = report.ok_or_else(|| unknown(&camera))?;
     let id = report.id.to_string();
-    let about = [(ETAG, entity_tag(&id)), (CACHE_CONTROL, NO_CACHE)];
-    if is_unmodified(&headers, &id)? {
-        return Ok((StatusCode::NOT_MODIFIED, about).into_response());
-    }
     let content_type = [(CONTENT_TYPE, "application/json")];
-    Ok((about, content_type, report.report.json.clone()).into_response())
+    let answer = (content_type, report.report.json.clone());
+    let about = revalidated(entity_tag(&id));
+    Ok(unless_known(&headers, &id, about, answer)?)
 }
 
 /// Returns the first report that the client does not have, or the latest one if none arrives in
@@ -419,9 +413,6 @@ async fn wait_for_newer(
     }
     Ok(report)
 }
-
-/// Only the client may cache the image, and must revalidate it before use.
-const PRIVATE: HeaderValue = HeaderValue::from_static("private, no-cache");
 
 /// Get the latest image
 ///
@@ -461,7 +452,7 @@ pub(in crate::api) async fn get_latest_image(
     let latest = latest.ok_or_else(|| unknown(&camera))?.id;
     // A client that has the latest image needs no other, so the image is not fetched from Redis.
     if is_unmodified(&headers, &latest.to_string())? {
-        return Ok((StatusCode::NOT_MODIFIED, about(&latest.to_string())).into_response());
+        return Ok((StatusCode::NOT_MODIFIED, private(&latest.to_string())).into_response());
     }
     let kept = state.results.image(&camera).await?;
     let kept = kept.ok_or_else(|| none_kept(&camera))?;
@@ -473,11 +464,7 @@ pub(in crate::api) async fn get_latest_image(
         .wait("the image was not drawn", "send fewer requests", drawing)
         .await?;
     let image = Bytes::from(drawn.map_err(|error| undrawn(&camera, error))?);
-    Ok((about(&id), [(CONTENT_TYPE, "image/jpeg")], image).into_response())
-}
-
-fn about(id: &str) -> [(HeaderName, HeaderValue); 2] {
-    [(ETAG, entity_tag(id)), (CACHE_CONTROL, PRIVATE)]
+    Ok((private(&id), [(CONTENT_TYPE, "image/jpeg")], image).into_response())
 }
 
 /// The stored data may be from another server or another program.

@@ -7,8 +7,8 @@ use axum::{
     Json, Router,
     extract::{Path, State},
     http::{
-        HeaderMap, HeaderValue, StatusCode, Uri,
-        header::{CACHE_CONTROL, CONTENT_TYPE, ETAG},
+        HeaderMap, HeaderValue, Uri,
+        header::{CACHE_CONTROL, CONTENT_TYPE},
     },
     middleware::map_response,
     response::{IntoResponse, Response},
@@ -16,10 +16,9 @@ use axum::{
 };
 use lookdown_calibration::revision::revision_of;
 use lookdown_http::{
-    entity_tags::{entity_tag, is_unmodified},
+    entity_tags::{entity_tag, revalidated, unless_known},
     page_headers,
 };
-
 use serde::Serialize;
 
 use crate::{
@@ -181,14 +180,9 @@ fn answer(name: &str, headers: &HeaderMap, path: &str) -> Result<Response, Probl
     })?;
     // Browsers may cache the file but must revalidate it: after an update of the server, old and
     // new scripts must not mix.
-    let kept = [
-        (ETAG, entity_tag(&asset.revision)),
-        (CACHE_CONTROL, HeaderValue::from_static("no-cache")),
-    ];
-    if is_unmodified(headers, &asset.revision)? {
-        return Ok((StatusCode::NOT_MODIFIED, kept).into_response());
-    }
-    Ok((kept, [(CONTENT_TYPE, asset.media_type)], asset.content).into_response())
+    let kept = revalidated(entity_tag(&asset.revision));
+    let answer = ([(CONTENT_TYPE, asset.media_type)], asset.content);
+    Ok(unless_known(headers, &asset.revision, kept, answer)?)
 }
 
 #[cfg(test)]

@@ -3,8 +3,9 @@
 //! The focal length is in millimeters of the sensor. The principal point is an offset from the
 //! middle of the frame. `fisheye4` has the coefficients of `cv::fisheye`.
 
-use super::{Camera, FileCamera, FormatError, distortion::four, fields::Fields};
 use lookdown_lens::geometry::lens::KannalaBrandt;
+
+use super::{Camera, FileCamera, FormatError, camera_matrix::four, fields::Fields};
 
 pub(super) fn read(fields: &Fields<'_>) -> Vec<FileCamera> {
     let id = |camera: &Fields<'_>| camera.text("intrinsicId").ok().map(str::to_owned);

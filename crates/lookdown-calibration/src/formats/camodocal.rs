@@ -4,8 +4,9 @@
 //! Its coefficients of Kannala and Brandt are called `k2` to `k5`, after the index of their power:
 //! they are `k1` to `k4` everywhere else.
 
-use super::{Camera, FormatError, distortion::not_a_fisheye, fields::Fields};
 use lookdown_lens::geometry::lens::{KannalaBrandt, LensModel, Mei};
+
+use super::{Camera, FormatError, camera_matrix::not_a_fisheye, fields::Fields};
 
 pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
     let lens: LensModel = match fields.text("model_type")? {

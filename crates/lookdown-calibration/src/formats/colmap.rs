@@ -5,16 +5,17 @@
 //! principal point. `THIN_PRISM_FISHEYE` adds terms that no lens here has, so it is read only where
 //! these are 0.
 
-use super::{
-    Camera, FileCamera, FormatError,
-    distortion::{are_all_zero, not_a_fisheye},
-};
-use crate::native::NativeImage;
 use lookdown_lens::geometry::{
     Pixel,
     lens::{Equidistant, Eucm, Fov, KannalaBrandt, LensModel, Rectilinear},
     pixels::to_pixel_center,
 };
+
+use super::{
+    Camera, FileCamera, FormatError,
+    camera_matrix::{are_all_zero, not_a_fisheye},
+};
+use crate::native::NativeImage;
 
 pub(super) fn read(text: &str) -> Vec<FileCamera> {
     text.lines()

@@ -5,16 +5,17 @@
 //! `fx fy cx cy` are shares of the width and the height if `cx` and `cy` are below 1, and the first
 //! pixel then begins at 0. Old files have no name of a model: 5 parameters are `FOV`, 8 `RadTan`.
 
-use super::{
-    Camera, FormatError,
-    distortion::{are_all_zero, not_a_fisheye},
-};
-use crate::native::NativeImage;
 use lookdown_lens::geometry::{
     Pixel,
     lens::{Fov, KannalaBrandt, LensModel, Rectilinear},
     pixels::to_pixel_center,
 };
+
+use super::{
+    Camera, FormatError,
+    camera_matrix::{are_all_zero, not_a_fisheye},
+};
+use crate::native::NativeImage;
 
 /// Returns true for a text that begins with a model and the size of the frames.
 pub(super) fn is_camera(text: &str) -> bool {

@@ -4,16 +4,16 @@
 //! The parameters of the sphere models come before the focal lengths: `omni` is `xi fu fv pu pv`,
 //! `ds` is `xi alpha fu fv pu pv`, `eucm` is `alpha beta fu fv pu pv`.
 
+use lookdown_lens::geometry::lens::{
+    DoubleSphere, Eucm, Fov, KannalaBrandt, LensModel, Mei, Rectilinear,
+};
 use serde_json::Value;
 
 use super::{
     Camera, FileCamera, FormatError,
     camera_file::{alone, named},
-    distortion::{Distortion, are_all_zero, four, not_a_fisheye},
+    camera_matrix::{Distortion, are_all_zero, four, not_a_fisheye},
     fields::Fields,
-};
-use lookdown_lens::geometry::lens::{
-    DoubleSphere, Eucm, Fov, KannalaBrandt, LensModel, Mei, Rectilinear,
 };
 
 pub(super) fn read(fields: &Fields<'_>) -> Vec<FileCamera> {

@@ -4,18 +4,18 @@
 //! `camera_model` is one of COLMAP's names, or instant-ngp's `is_fisheye` is true. As in COLMAP the
 //! pixel coordinates begin at the corner of the first pixel.
 
+use lookdown_lens::geometry::{
+    Pixel,
+    lens::{KannalaBrandt, Rectilinear},
+    pixels::to_pixel_center,
+};
 use serde_json::Value;
 
 use super::{
     Camera, FileCamera, FormatError,
     camera_file::{MAX_CAMERAS, alone},
-    distortion::{Distortion, are_all_zero, not_a_fisheye},
+    camera_matrix::{Distortion, are_all_zero, not_a_fisheye},
     fields::Fields,
-};
-use lookdown_lens::geometry::{
-    Pixel,
-    lens::{KannalaBrandt, Rectilinear},
-    pixels::to_pixel_center,
 };
 
 /// The fields that make a camera; each is that of the file, else that of the frame.

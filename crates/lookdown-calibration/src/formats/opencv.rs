@@ -7,18 +7,19 @@
 //! Files of several cameras number the names (`K1`, `camera_matrix_2`), call them left and right,
 //! or have a camera in each of their fields.
 
+use lookdown_lens::geometry::lens::{LensModel, Mei};
 use serde_json::{Map, Value};
 
 use super::{
     Camera, FileCamera, FormatError,
     camera_file::{alone, named},
-    camera_matrix::CameraMatrix,
-    distortion::{Distortion, not_a_fisheye},
+    camera_matrix::{CameraMatrix, Distortion, not_a_fisheye},
     fields::Fields,
 };
-use crate::native::NativeImage;
-use crate::warning::{Warning, WarningCode};
-use lookdown_lens::geometry::lens::{LensModel, Mei};
+use crate::{
+    native::NativeImage,
+    warning::{Warning, WarningCode},
+};
 
 /// Names of the camera matrix that programs choose.
 const MATRIX: &str = "camera_matrix cameraMatrix Camera_Matrix CameraMatrix CameraMat K M mtx \

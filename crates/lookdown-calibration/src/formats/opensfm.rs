@@ -5,15 +5,15 @@
 //! `fisheye_opencv` `k1` to `k4`, `fisheye62` and `fisheye624` have `k1` to `k6` with terms that no
 //! lens here has, so they are read only where these are 0.
 
+use lookdown_lens::geometry::lens::{KannalaBrandt, LensModel, RadialPolynomial, Rectilinear};
 use serde_json::Value;
 
 use super::{
     Camera, FileCamera, FormatError,
     camera_file::named,
-    distortion::{are_all_zero, not_a_fisheye},
+    camera_matrix::{are_all_zero, not_a_fisheye},
     fields::Fields,
 };
-use lookdown_lens::geometry::lens::{KannalaBrandt, LensModel, RadialPolynomial, Rectilinear};
 
 pub(super) fn read(fields: &Fields<'_>) -> Vec<FileCamera> {
     let is_camera = |entry: &Value| entry.get("projection_type").is_some();

@@ -3,7 +3,7 @@
 use serde_json::Value;
 use strum::IntoEnumIterator as _;
 
-use super::{Format, dso, fields::Fields, matlab, opencv, slam};
+use super::{Format, dso, fields::Fields, ocam, opencv, slam};
 
 /// The line-based format of a text, if it is in one.
 pub(super) fn recognize_lines(text: &str) -> Option<Format> {
@@ -69,7 +69,7 @@ pub(super) fn recognize_tree(fields: &Fields<'_>) -> Option<Format> {
         Format::DepthAi => has("cameraData"),
         Format::OpenSfm => any_entry_has(&["projection_type"]),
         Format::Matlab => {
-            let mut names = matlab::FIELDS.iter();
+            let mut names = ocam::MATLAB_FIELDS.iter();
             names.any(|name| has(name) || any_entry_has(&[name]))
         }
         Format::AliceVision => first_has("intrinsics", "intrinsicId"),

@@ -6,7 +6,9 @@
 //! fisheye, even under a camera name that says so.
 
 use super::{
-    Camera, FormatError, camera_matrix::CameraMatrix, distortion::Distortion, fields::Fields,
+    Camera, FormatError,
+    camera_matrix::{CameraMatrix, Distortion},
+    fields::Fields,
 };
 use crate::native::NativeImage;
 

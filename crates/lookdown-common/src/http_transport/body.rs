@@ -10,10 +10,9 @@ use std::{
 use bytes::Bytes;
 use http_body::{Body, Frame, SizeHint};
 use hyper::body::Incoming;
+use hyper_util::client::legacy;
 use tokio::time::{Instant, Sleep, sleep_until};
 use tower::BoxError;
-
-use super::error::HttpError;
 
 /// A body that fails at its deadline.
 pub(super) struct UntilDeadline {
@@ -54,5 +53,39 @@ impl Body for UntilDeadline {
 
     fn size_hint(&self) -> SizeHint {
         self.body.size_hint()
+    }
+}
+
+/// Most provisional responses before a response.
+pub(super) const MAX_PROVISIONAL: usize = 16;
+
+/// A reason why there is no HTTP client.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "upstream.authorities: {0}: give a PEM file with the authorities of the server's certificate"
+)]
+pub struct ClientError(pub(crate) String);
+
+/// The reason why a request has no response, or its response no end.
+#[derive(Debug, thiserror::Error)]
+pub enum HttpError {
+    /// A request that cannot be written, or a body that ends early.
+    #[error(transparent)]
+    Message(reqwest::Error),
+    /// No connection, or one that ended.
+    #[error(transparent)]
+    Connection(#[from] legacy::Error),
+    /// No response in time.
+    #[error("there is no whole response within {0:?}")]
+    Timeout(Duration),
+    /// Provisional responses without end.
+    #[error("more than {MAX_PROVISIONAL} provisional responses (1xx) arrived before the response")]
+    Provisional,
+}
+
+impl From<reqwest::Error> for HttpError {
+    fn from(error: reqwest::Error) -> Self {
+        // A URL may be a secret.
+        Self::Message(error.without_url())
     }
 }

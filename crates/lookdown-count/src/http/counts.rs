@@ -10,8 +10,8 @@ use axum::{
     body::to_bytes,
     extract::{Path, Query, State, rejection::QueryRejection},
     http::{
-        HeaderMap, HeaderValue, StatusCode,
-        header::{ACCEPT, CACHE_CONTROL, CONTENT_TYPE, ETAG},
+        HeaderMap, StatusCode,
+        header::{ACCEPT, CONTENT_TYPE},
     },
     response::{IntoResponse, Response},
 };
@@ -19,10 +19,10 @@ use jiff::Timestamp;
 use lookdown_calibration::revision::revision_of;
 use lookdown_common::text::shortened;
 use lookdown_http::{
-    entity_tags::{entity_tag, is_unmodified},
+    entity_tags::{entity_tag, revalidated, unless_known},
     problem::Problem,
 };
-use lookdown_tracking::{taught::default_bar, taught_crossings::CrossingRatio};
+use lookdown_tracking::taught::{CrossingRatio, default_bar};
 use serde::{Deserialize, Serialize};
 use utoipa::{
     IntoParams, ToSchema,
@@ -38,8 +38,7 @@ use crate::{
     definition::CameraDefinition,
     now::time_of,
     store::{Span, Step},
-    sums::{MINUTE_MS, Owner},
-    time_span::TimeSpan,
+    sums::{MINUTE_MS, Owner, TimeSpan},
 };
 
 /// Most values of an answer: steps times directions of lines and zones. An answer has 12 MB at
@@ -142,14 +141,8 @@ async fn answer(
     let body = to_bytes(body, usize::MAX).await;
     let body = body.map_err(|_| Problem::internal())?;
     let revision = revision_of(&body);
-    let about = [
-        (ETAG, entity_tag(&revision)),
-        (CACHE_CONTROL, HeaderValue::from_static("no-cache")),
-    ];
-    if is_unmodified(headers, &revision)? {
-        return Ok((StatusCode::NOT_MODIFIED, about).into_response());
-    }
-    Ok((parts, about, body).into_response())
+    let about = revalidated(entity_tag(&revision));
+    unless_known(headers, &revision, about, (parts, body))
 }
 
 fn too_large() -> Problem {

@@ -11,7 +11,11 @@ use axum::{
 use jiff::Timestamp;
 use lookdown_http::problem::Problem;
 use lookdown_lens::saturating::{to_u8, to_u32};
-use lookdown_tracking::heat_map::{CELL_M, Cell};
+use lookdown_tracking::{
+    LEAST_WALKED_M2,
+    heat_map::{CELL_M, Cell},
+    walked_area,
+};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -22,8 +26,7 @@ use super::{
 use crate::{
     definition::CameraDefinition,
     now::time_of,
-    sums::{DAY_MS, Owner},
-    time_span::TimeSpan,
+    sums::{DAY_MS, Owner, TimeSpan},
 };
 
 /// Most cells along a side of an answer: those with the most time decide.
@@ -297,4 +300,36 @@ fn drawn(cells: &BTreeMap<Cell, u64>, definition: &Arc<CameraDefinition>) -> (Ve
         }
     }
     (pixels, height)
+}
+
+/// A polygon for `areas` of the calibration.
+#[derive(Serialize, ToSchema)]
+struct SuggestedArea {
+    /// The corners of the floor on which people walked and of 0.5 m around it, meters.
+    floor_m: Vec<[f64; 2]>,
+}
+
+/// Suggest an area from walks
+///
+/// Covers whole days (UTC). `step` and `format` have no effect.
+#[utoipa::path(
+    get, path = "/counts/{camera}/suggested-area", tag = "counts", operation_id = "suggest_area",
+    security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
+    params(("camera" = String, Path, description = "The name of the camera."), TimeParameters),
+    responses((status = OK, description = "The floor on which people walked.", body = SuggestedArea))
+)]
+pub(super) async fn suggest_area(
+    State(api): State<Shared>,
+    Path(camera): Path<String>,
+    parameters: Parameters,
+) -> Result<Json<impl Serialize>, Problem> {
+    let (_, cells) = stored(&api, Owner::Camera(camera), parameters).await?;
+    let corners = blocking(move || Ok(walked_area(&cells))).await?;
+    let floor_m = corners.ok_or_else(|| {
+        not_found(format!(
+            "no one has walked through {LEAST_WALKED_M2} m² of floor: wait until people have walked \
+             where they can be, or give an earlier time as `from`"
+        ))
+    })?;
+    Ok(Json(SuggestedArea { floor_m }))
 }

@@ -10,7 +10,7 @@ use axum::{
 use jiff::Timestamp;
 use lookdown_common::text::one_line;
 use lookdown_http::problem::Problem;
-use lookdown_tracking::taught_crossings::{CrossingRatio, ReferenceCrossings};
+use lookdown_tracking::taught::{CrossingRatio, ReferenceCrossings};
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 

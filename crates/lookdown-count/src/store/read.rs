@@ -6,15 +6,17 @@ use jiff::Timestamp;
 use lookdown_tracking::heat_map::Cell;
 use rusqlite::{Connection, OptionalExtension, params};
 
-use super::{STATE_VERSION, Store, StoreError};
+use super::{
+    STATE_VERSION, Store, StoreError,
+    write::{HeldCondition, Message},
+};
 use crate::{
-    message::{HeldCondition, Message},
     now::time_of,
     scene::SceneState,
     sums::{
-        DAY_MS, LineDirection, MINUTE_MS, Owner, PresenceSum, Totals, ZoneOf, ZoneSum, ZoneTotal,
+        DAY_MS, LineDirection, MINUTE_MS, Owner, PresenceSum, TimeSpan, Totals, ZoneOf, ZoneSum,
+        ZoneTotal,
     },
-    time_span::TimeSpan,
 };
 
 /// The content of the store at the start.

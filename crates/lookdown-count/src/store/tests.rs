@@ -1,11 +1,9 @@
 use lookdown_tracking::heat_map::Cell;
 
-use super::*;
+use super::{write::Message, *};
 use crate::{
-    batch::Batch,
-    message::Message,
-    sums::{DAY_MS, LineDirection, MINUTE_MS, Owner, PresenceSum, Sums, ZoneOf, ZoneSum},
-    time_span::TimeSpan,
+    scene::Batch,
+    sums::{DAY_MS, LineDirection, MINUTE_MS, Owner, PresenceSum, Sums, TimeSpan, ZoneOf, ZoneSum},
 };
 
 fn door() -> LineDirection {

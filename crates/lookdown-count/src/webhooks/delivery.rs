@@ -18,8 +18,12 @@ use tokio::{
 };
 use tokio_util::task::AbortOnDropHandle;
 
-use super::{Webhook, signature::SigningKey};
-use crate::{event_image::latest_image, message::Message, metrics::Metrics, store::Store};
+use super::{SigningKey, Webhook};
+use crate::{
+    event_image::latest_image,
+    metrics::Metrics,
+    store::{Store, write::Message},
+};
 
 /// Most messages that wait for a receiver.
 const QUEUE: usize = 256;

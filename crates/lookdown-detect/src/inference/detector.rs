@@ -1,9 +1,11 @@
-//! The interface of all detectors.
+//! The interface of all detectors, and the persons that one found in a batch of views.
 
 use std::num::NonZeroUsize;
 
-use super::{HeadOutput, InferenceError};
 use lookdown_imaging::{NetworkInput, ViewBatch};
+
+use super::InferenceError;
+use crate::detection::{BBox, ViewPixels};
 
 /// A person detector. Runs on one thread at a time.
 pub trait Detector: Send {
@@ -27,4 +29,35 @@ pub trait Detector: Send {
     /// # Errors
     /// [`InferenceError`] when the runtime fails or its output differs from the declared shape.
     fn detect(&mut self, batch: &ViewBatch) -> Result<HeadOutput, InferenceError>;
+}
+
+/// A person detected in a view.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ViewDetection {
+    /// Box in corner-origin view pixels, clipped to the view.
+    pub bbox: BBox<ViewPixels>,
+    /// Confidence, 0 to 1.
+    pub score: f64,
+}
+
+/// Decoded outputs of a batch of views.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct HeadOutput {
+    /// The persons of each view, in the order of the network's candidates.
+    pub per_view: Vec<Vec<ViewDetection>>,
+    /// Candidates dropped because their score was not finite, or because it reached the floor
+    /// and their box was not finite or beyond ±1e9 pixels.
+    pub non_finite: usize,
+}
+
+impl HeadOutput {
+    /// Keeps the best `count` detections of each view.
+    pub(super) fn keep_best(&mut self, count: usize) {
+        for found in &mut self.per_view {
+            if found.len() > count {
+                found.select_nth_unstable_by(count, |a, b| b.score.total_cmp(&a.score));
+                found.truncate(count);
+            }
+        }
+    }
 }

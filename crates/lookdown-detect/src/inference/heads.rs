@@ -5,40 +5,29 @@
 //! pixels, clipped to the view and not deduplicated. The arithmetic uses `f64`.
 
 mod boxes_scores;
-mod candidate_collector;
 mod decoder;
-mod detr;
 mod end_to_end;
 mod grid;
-mod nanodet;
-mod outputs;
 mod score;
 mod shape;
-mod tensor;
-mod yolo_v2;
-mod yolo_v8;
-mod yolox;
 
+pub use self::{
+    boxes_scores::{BoxesScoresHead, DetrHead},
+    end_to_end::{Column, EndToEndHead, EndToEndUnit},
+    grid::{NanodetHead, PriorPosition, YoloV2Head, YoloV8Head, YoloV8Layout, YoloxHead},
+    score::{Activation, ClassActivation},
+    shape::{OutputShape, TensorView},
+};
+
+use lookdown_imaging::NetworkInput;
 use serde::Deserialize;
 use strum::IntoStaticStr;
 
 use self::{
-    candidate_collector::CandidateCollector, decoder::Decoder, shape::Batch, tensor::Output,
+    decoder::{CandidateCollector, Decoder},
+    shape::{Batch, Output},
 };
 use super::{HeadOutput, InferenceError};
-use lookdown_imaging::NetworkInput;
-
-pub use self::{
-    boxes_scores::BoxesScoresHead,
-    detr::DetrHead,
-    end_to_end::{Column, EndToEndHead, EndToEndUnit},
-    nanodet::{NanodetHead, PriorPosition},
-    score::{Activation, ClassActivation},
-    tensor::{OutputShape, TensorView},
-    yolo_v2::YoloV2Head,
-    yolo_v8::{YoloV8Head, YoloV8Layout},
-    yolox::YoloxHead,
-};
 
 /// Declares [`Head`]: for each head a description, a variant and the type of its fields.
 macro_rules! heads {
@@ -167,5 +156,6 @@ impl Default for Head {
 
 #[cfg(test)]
 mod properties;
+
 #[cfg(test)]
 mod tests;

@@ -22,9 +22,8 @@ use parking_lot::Mutex;
 use super::{
     CandidateOptions, Device, Model, ModelLoader,
     description::{self, ModelDescription, OnnxTensor},
-    detector::Detector,
+    detector::{Detector, HeadOutput},
     error::InferenceError,
-    head_output::HeadOutput,
     heads::{Head, TensorView},
     manifest::ModelManifest,
     onnx_file,

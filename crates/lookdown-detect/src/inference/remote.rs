@@ -5,15 +5,19 @@
 
 mod connection;
 mod exchange;
-mod options;
 mod server;
+
+pub use connection::{BearerToken, InvalidToken, RemoteOptions};
+pub use server::RemoteServer;
 
 use std::{num::NonZeroUsize, path::Path, sync::Arc};
 
+use exchange::Question;
 use lookdown_calibration::revision::revision_of;
 use lookdown_common::text::{Quoted, one_line};
 use lookdown_imaging::{NetworkInput, ViewBatch};
 use serde::Deserialize;
+use server::refusal;
 
 use super::{
     CandidateOptions, Detector, HeadOutput, InferenceError, ModelManifest, OnnxTensor,
@@ -24,15 +28,9 @@ use super::{
 };
 use crate::open_inference::{
     BINARY_EXTENSION, Datatype,
-    bounded_json::MAX_ENTRIES,
+    message::MAX_ENTRIES,
     metadata::{ModelMetadata, ServerMetadata, TensorMetadata},
 };
-
-use exchange::Question;
-use server::refusal;
-
-pub use options::{BearerToken, InvalidToken, RemoteOptions};
-pub use server::RemoteServer;
 
 /// A model on an inference server.
 pub struct RemoteDetector {

@@ -16,10 +16,8 @@ use parking_lot::{Mutex, MutexGuard};
 use super::{
     error::InferenceError,
     manifest::{FILE_NAME, is_name},
-    model::{Model, ModelFiles},
-    registry::{ModelRegistry, RegistryFull},
+    model::{Model, ModelFiles, ModelRegistry, RegistryFull, Stamp, files_of, stamp},
     remote::RemoteServer,
-    stamp::{Stamp, files_of, stamp},
 };
 use crate::metrics::{DetectMetrics, replace_info, start_at_zero};
 

@@ -4,16 +4,18 @@
 //! unparsed text ([`serde_json::value::RawValue`]) when they are read, [`TensorValues`] when they
 //! are written.
 
-use std::num::TryFromIntError;
+use std::{fmt, marker::PhantomData, num::TryFromIntError};
 
 use bytes::Bytes;
-use serde::{Deserialize, Serialize, ser::Error};
+use serde::{
+    Deserialize, Serialize,
+    de::{Deserializer, Error, MapAccess, SeqAccess, Visitor, value::MapAccessDeserializer},
+    ser::{SerializeMap, Serializer},
+};
 
 use super::{
     Datatype,
-    binary_data::{LENGTH_BYTES, put_element},
-    bounded_json::{Entries, Table},
-    parameters::Parameters,
+    tensor_data::{LENGTH_BYTES, put_element},
 };
 
 /// The JSON of an inference request. Unknown members are an error.
@@ -197,6 +199,200 @@ impl TensorValues<'_> {
             }
         }
         Ok(())
+    }
+}
+
+/// Largest number of inputs, of outputs and of axes.
+pub const MAX_ENTRIES: usize = 16;
+
+/// A list of at most [`MAX_ENTRIES`].
+#[derive(Debug, Serialize)]
+pub struct Entries<T>(pub Vec<T>);
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Entries<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_seq(EntriesVisitor(PhantomData))
+    }
+}
+
+struct EntriesVisitor<T>(PhantomData<T>);
+
+impl<'de, T: Deserialize<'de>> Visitor<'de> for EntriesVisitor<T> {
+    type Value = Entries<T>;
+
+    fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("a list")
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Self::Value, A::Error> {
+        let mut entries = Vec::new();
+        while let Some(entry) = list.next_element()? {
+            if entries.len() == MAX_ENTRIES {
+                return Err(A::Error::custom(format!(
+                    "more than {MAX_ENTRIES} in a list"
+                )));
+            }
+            entries.push(entry);
+        }
+        Ok(Entries(entries))
+    }
+}
+
+/// A struct that must be a JSON object; serde would also accept a list of its fields.
+#[derive(Debug, Serialize)]
+pub struct Table<T>(pub T);
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Table<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_map(TableVisitor(PhantomData))
+    }
+}
+
+struct TableVisitor<T>(PhantomData<T>);
+
+impl<'de, T: Deserialize<'de>> Visitor<'de> for TableVisitor<T> {
+    type Value = Table<T>;
+
+    fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("an object")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
+        T::deserialize(MapAccessDeserializer::new(map)).map(Table)
+    }
+}
+
+/// Largest number of parameters of an object: all existing parameters, with room for mistakes,
+/// which have a better error message.
+const MAX_PARAMETERS: usize = 32;
+
+/// Parameters in their order, without those that are `null`.
+#[derive(Debug, Default, PartialEq)]
+pub struct Parameters(pub Vec<(String, Parameter)>);
+
+/// The value of a parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Parameter {
+    /// `true` or `false`.
+    Flag(bool),
+    /// The number as text, as in a query.
+    Number(String),
+    /// A string.
+    Text(String),
+}
+
+impl Parameters {
+    /// Returns one parameter, or none.
+    pub fn only(name: &str, value: Option<Parameter>) -> Self {
+        Self(
+            value
+                .map(|value| (name.to_owned(), value))
+                .into_iter()
+                .collect(),
+        )
+    }
+
+    /// Returns `true` if there are no parameters.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Removes and returns the parameter of this name; the last one if it is repeated.
+    pub fn take(&mut self, name: &str) -> Option<Parameter> {
+        let mut taken = self.0.extract_if(.., |(given, _)| given == name);
+        taken.by_ref().last().map(|(_, value)| value)
+    }
+}
+
+impl<'de> Deserialize<'de> for Parameters {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(ParametersVisitor)
+    }
+}
+
+struct ParametersVisitor;
+
+impl<'de> Visitor<'de> for ParametersVisitor {
+    type Value = Parameters;
+
+    fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("an object of parameters")
+    }
+
+    fn visit_unit<E: Error>(self) -> Result<Parameters, E> {
+        Ok(Parameters::default())
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Parameters, A::Error> {
+        let mut parameters = Vec::new();
+        while let Some((name, value)) = map.next_entry::<String, Option<Parameter>>()? {
+            if parameters.len() == MAX_PARAMETERS {
+                return Err(A::Error::custom(format!(
+                    "more than {MAX_PARAMETERS} parameters"
+                )));
+            }
+            parameters.extend(value.map(|value| (name, value)));
+        }
+        Ok(Parameters(parameters))
+    }
+}
+
+impl<'de> Deserialize<'de> for Parameter {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(ParameterVisitor)
+    }
+}
+
+struct ParameterVisitor;
+
+impl Visitor<'_> for ParameterVisitor {
+    type Value = Parameter;
+
+    fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("a parameter: a text, a number, true or false")
+    }
+
+    fn visit_bool<E: Error>(self, value: bool) -> Result<Parameter, E> {
+        Ok(Parameter::Flag(value))
+    }
+
+    fn visit_i64<E: Error>(self, value: i64) -> Result<Parameter, E> {
+        Ok(Parameter::Number(value.to_string()))
+    }
+
+    fn visit_u64<E: Error>(self, value: u64) -> Result<Parameter, E> {
+        Ok(Parameter::Number(value.to_string()))
+    }
+
+    fn visit_f64<E: Error>(self, value: f64) -> Result<Parameter, E> {
+        Ok(Parameter::Number(value.to_string()))
+    }
+
+    fn visit_str<E: Error>(self, value: &str) -> Result<Parameter, E> {
+        Ok(Parameter::Text(value.to_owned()))
+    }
+}
+
+impl Serialize for Parameters {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(Some(self.0.len()))?;
+        for (name, value) in &self.0 {
+            map.serialize_entry(name, value)?;
+        }
+        map.end()
+    }
+}
+
+impl Serialize for Parameter {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Flag(flag) => serializer.serialize_bool(*flag),
+            Self::Text(text) => serializer.serialize_str(text),
+            Self::Number(text) => text
+                .parse::<serde_json::Number>()
+                .map_err(serde::ser::Error::custom)?
+                .serialize(serializer),
+        }
     }
 }
 

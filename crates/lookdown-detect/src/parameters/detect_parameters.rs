@@ -308,5 +308,52 @@ pub fn parse_profile(value: &str) -> Result<Profile, ParameterError> {
     PROFILE.parse(value)
 }
 
+/// Longest text of a value: reports repeat it.
+const MAX_CHARS: usize = 128;
+
+impl DetectDefaults {
+    /// Checks `(name, value)` pairs.
+    ///
+    /// # Errors
+    /// [`ParameterError`] for a repeated name, a name of a parameter without such defaults, and a
+    /// value out of range.
+    pub fn parse<'a>(
+        pairs: impl IntoIterator<Item = (&'a str, &'a str)>,
+    ) -> Result<Self, ParameterError> {
+        let pairs: Vec<_> = pairs.into_iter().collect();
+        let mut values = Vec::with_capacity(pairs.len());
+        for (name, value) in &pairs {
+            let Some(spec) = Self::offered().find(|spec| spec.name == *name) else {
+                let known: Vec<_> = Self::offered().map(|spec| spec.name).collect();
+                let known = known.join(", ");
+                let problem = format!("no default can be set for it; use one of {known}");
+                return Err(ParameterError::unknown(name, problem));
+            };
+            if value.chars().count() > MAX_CHARS {
+                let problem = format!("it is longer than {MAX_CHARS} characters");
+                return Err(ParameterError::bad_value(name, problem));
+            }
+            values.push((spec.name, (*value).to_owned()));
+        }
+        // Motion detection needs a camera, which the request names.
+        let camera = [(DetectParameters::CAMERA, "camera")];
+        DetectParameters::parse(pairs.into_iter().chain(camera))?;
+        Ok(Self::new(values))
+    }
+
+    /// Returns the default of the parameter `follow` for a frame of a camera.
+    pub fn follow(&self) -> bool {
+        let camera = [(DetectParameters::CAMERA, "camera")];
+        let parameters = DetectParameters::parse_with(camera, &[(DefaultSource::Server, self)]);
+        parameters.is_ok_and(|parameters| parameters.follow)
+    }
+
+    /// Lists the parameters for which defaults can be set.
+    pub fn offered() -> impl Iterator<Item = &'static ParameterSpec> {
+        let table = DetectParameters::TABLE.iter();
+        table.filter(|spec| spec.is_offered_by(Interface::Defaults))
+    }
+}
+
 #[cfg(test)]
 mod tests;

@@ -2,9 +2,9 @@
 
 use std::str::FromStr;
 
-use super::{
-    DefaultSource, DefaultUsed, DetectDefaults, ParameterDefault, ParameterError, ParameterSpec,
-};
+use strum::IntoStaticStr;
+
+use super::{ParameterDefault, ParameterError, ParameterSpec};
 
 /// The parameter values of a request, at most one for each parameter of a table, and defaults for
 /// those that it omits.
@@ -102,5 +102,54 @@ impl<'a> GivenParameters<'a> {
     pub fn value<T: FromStr>(&self, spec: &ParameterSpec) -> Result<T, ParameterError> {
         let missing = || ParameterError::bad_value(spec.name, "a value is required".to_owned());
         self.optional(spec)?.ok_or_else(missing)
+    }
+}
+
+/// The origin of a default value, the one that takes precedence first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, IntoStaticStr)]
+#[strum(serialize_all = "snake_case")]
+pub enum DefaultSource {
+    /// The calibration of the camera.
+    Calibration,
+    /// The settings of the server.
+    Server,
+}
+
+impl DefaultSource {
+    /// Returns the name, as in reports.
+    pub fn name(self) -> &'static str {
+        self.into()
+    }
+}
+
+/// A default value that a request was processed with.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DefaultUsed {
+    /// The name of the parameter.
+    pub name: &'static str,
+    /// The value as a request would give it.
+    pub value: String,
+    /// The origin of the value.
+    pub source: DefaultSource,
+}
+
+/// Checked default values of some parameters.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct DetectDefaults(Vec<(&'static str, String)>);
+
+impl DetectDefaults {
+    /// Wraps checked values.
+    pub(super) fn new(values: Vec<(&'static str, String)>) -> Self {
+        Self(values)
+    }
+
+    /// Returns the values by name.
+    pub fn values(&self) -> impl Iterator<Item = (&'static str, &str)> {
+        self.0.iter().map(|(name, value)| (*name, value.as_str()))
+    }
+
+    /// Returns whether the parameter `name` has a default.
+    pub fn has(&self, name: &str) -> bool {
+        self.values().any(|(known, _)| known == name)
     }
 }

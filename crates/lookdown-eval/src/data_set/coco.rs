@@ -16,7 +16,7 @@ use lookdown_common::files::FileError;
 use lookdown_detect::detection::BBox;
 use serde::Deserialize;
 
-use super::{DataSet, DataSetImage, ImageFileIndex, ImageId, text::read_text};
+use super::{DataSet, DataSetImage, ImageFileIndex, ImageId, image_files::read_text};
 use crate::{AnnotatedPerson, Outline, RotatedBox, Scoring};
 
 /// The largest common file, that of COCO's training set, has 450 MB.

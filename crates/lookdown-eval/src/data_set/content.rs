@@ -1,12 +1,12 @@
 //! The images of a data set and their annotations.
 
-use std::{path::PathBuf, sync::Arc};
+use std::{fmt, path::PathBuf, sync::Arc};
 
 use lookdown_calibration::Calibration;
 use lookdown_detect::detection::{BBox, FramePixels};
 use lookdown_lens::geometry::{Lens, OrientedBox, Pixel, pixels::to_pixel_center};
+use serde::{Deserialize, Serialize};
 
-use super::{ImageId, ScoringMismatch};
 use crate::{AnnotatedPerson, GroundTruth, Outline, Scoring};
 
 /// Images with annotated persons.
@@ -136,4 +136,36 @@ impl DataSetImage {
 fn off_axis(lens: &Lens, pixel: &Pixel) -> f64 {
     lens.unproject(pixel)
         .map_or(lens.max_theta(), |ray| ray.x.hypot(ray.y).atan2(ray.z))
+}
+
+/// Ground truth of one shape cannot be scored as another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "this data set has {truth} and cannot be scored by {wanted}; only rotated boxes can be made \
+     axis-parallel"
+)]
+pub struct ScoringMismatch {
+    /// The shape of the ground truth.
+    pub truth: Scoring,
+    /// The requested shape.
+    pub wanted: Scoring,
+}
+
+/// The ID of an image in its data set. In JSON it is a number or a string, as in the annotations.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum ImageId {
+    /// A number, as in COCO.
+    Number(u64),
+    /// A string, as in CEPDOF. Images without an ID have their path in the data set.
+    Text(String),
+}
+
+impl fmt::Display for ImageId {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(number) => number.fmt(formatter),
+            Self::Text(text) => text.fmt(formatter),
+        }
+    }
 }

@@ -9,7 +9,10 @@ use std::path::{Path, PathBuf};
 
 use lookdown_common::files::FileError;
 
-use super::{DataSet, DataSetImage, ImageId, image_files::image_files_in, text::read_text};
+use super::{
+    DataSet, DataSetImage, ImageId,
+    image_files::{image_files_in, read_text},
+};
 use crate::{AnnotatedPerson, Outline, Scoring};
 
 const MAX_BYTES: u64 = 64 * 1024 * 1024;

@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use lookdown_common::files::{FileError, IMAGE_ENDINGS, has_ending};
+use lookdown_common::files::{self, FileError, IMAGE_ENDINGS, has_ending};
 
 /// Most levels of folders. The largest data sets have five.
 const MAX_DEPTH: usize = 12;
@@ -173,6 +173,11 @@ fn the_only(found: &[&PathBuf], name: &Path) -> Result<PathBuf, String> {
 
 fn is_image_file(path: &Path) -> bool {
     has_ending(path, &IMAGE_ENDINGS)
+}
+
+/// Reads the text of a file of at most `max_bytes`.
+pub(crate) fn read_text(path: &Path, max_bytes: u64) -> Result<String, FileError> {
+    files::read_text(path, max_bytes).map_err(|error| FileError::unreadable(path, &error))
 }
 
 #[cfg(test)]

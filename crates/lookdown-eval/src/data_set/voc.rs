@@ -12,7 +12,7 @@ use lookdown_detect::detection::BBox;
 use quick_xml::{Reader, events::Event};
 use serde::Deserialize;
 
-use super::{DataSet, DataSetImage, ImageFileIndex, ImageId, text::read_text};
+use super::{DataSet, DataSetImage, ImageFileIndex, ImageId, image_files::read_text};
 use crate::{AnnotatedPerson, Outline, Scoring};
 
 /// The file of a crowded image has some 100 kB.

@@ -21,8 +21,7 @@ use std::{
 use super::{
     band::{Band, Block, Lanes, Seen},
     block_size::LANES,
-    frame_lines::{FrameLines, pair},
-    rendering::{Planes, Source, Values, WEIGHT_ONE, render_band},
+    rendering::{FrameLines, Planes, Source, Values, WEIGHT_ONE, pair, render_band},
 };
 
 /// Exists only where the processor has AVX2.

@@ -18,8 +18,7 @@ use std::{
 use super::{
     band::{Band, Block, Lanes, Seen},
     block_size::LANES,
-    frame_lines::{FrameLines, PAIR_BYTES, pair},
-    rendering::{Planes, Source, WEIGHT_ONE, render_band},
+    rendering::{FrameLines, PAIR_BYTES, Planes, Source, WEIGHT_ONE, pair, render_band},
 };
 
 /// Pixels in a vector.

@@ -5,14 +5,11 @@
 //! ([`RadialTangential`]), and an affine [`ImagePlane`] turns it into pixels. A ray or pixel
 //! outside the valid range is refused with `None`, never mapped to a made-up place.
 //!
-//! A model is a file in `models/` and a line of the list in `models.rs`.
+//! A model is a line of the list in `models.rs` and its parameters there.
 
 use std::f64::consts::PI;
 
-mod check;
-mod continuation;
 mod curve;
-mod deserialize;
 mod distortion;
 mod error;
 mod image_plane;
@@ -20,7 +17,6 @@ mod inversion;
 #[macro_use]
 mod model;
 mod models;
-mod polynomial;
 
 pub use distortion::RadialTangential;
 pub use error::LensError;
@@ -154,6 +150,26 @@ impl Lens {
         let (x, y) = self.distorted(ray.x * scale, ray.y * scale);
         let pixel = self.plane.pixel_from_normalized(x, y);
         (pixel.x.is_finite() && pixel.y.is_finite()).then_some(pixel)
+    }
+
+    /// Returns the point at which `ray` (camera frame) meets the normalized plane, which
+    /// [`Lens::image_plane`] takes to pixels. Beyond `max_theta` the curve is its own mirror image,
+    /// `r(max_theta + t) = 2 r(max_theta) − r(max_theta − t)`: smooth across the rim, but nothing
+    /// that the lens sees. `None` exactly behind the camera and where nothing finite comes out.
+    pub fn continued_beyond_rim(&self, ray: &Ray) -> Option<Pixel> {
+        let off_axis = ray.x.hypot(ray.y);
+        if off_axis == 0.0 {
+            return (ray.z > 0.0).then(Pixel::origin);
+        }
+        let theta = off_axis.atan2(ray.z);
+        let radius = if theta <= self.max_theta {
+            self.curve.radius(theta)
+        } else {
+            2.0 * self.max_radius - self.curve.radius((2.0 * self.max_theta - theta).max(0.0))
+        };
+        let scale = radius / off_axis;
+        let (x, y) = self.distorted(ray.x * scale, ray.y * scale);
+        (x.is_finite() && y.is_finite()).then(|| Pixel::new(x, y))
     }
 
     fn distorted(&self, x: f64, y: f64) -> (f64, f64) {

@@ -9,10 +9,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::Unit;
 
-use super::{
-    level_from_people::LevelFromPeople,
-    visible_people::{MAX_INDEPENDENT, has_visible_feet},
-};
+use super::level_from_people::{LevelFromPeople, MAX_INDEPENDENT, has_visible_feet};
 use crate::geometry::{Lens, Mount, OrientedBox, PersonHeight};
 
 /// A kind of person, by the upper end of the box.

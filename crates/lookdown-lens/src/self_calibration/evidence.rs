@@ -15,9 +15,7 @@ use std::f64::consts::{PI, TAU};
 
 use super::{
     camera::{Angles, RoomCamera, SeenRay, Shape, ideal_shape_slope},
-    edge_curve::EdgeCurve,
-    evaluation::{Evaluation, Normal, PARAMETERS, Parameters},
-    prior::Prior,
+    prior::{Evaluation, Normal, PARAMETERS, Parameters, Prior},
 };
 use crate::geometry::Ray;
 
@@ -387,6 +385,26 @@ impl Residual {
             pixels: residual,
             row,
             own_slope,
+        }
+    }
+}
+
+/// A smooth piece of an edge, without corners.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EdgeCurve {
+    /// Points along the curve in pixel centers, at about the same distance from each other.
+    pub points: Vec<[f64; 2]>,
+    /// Pixels of the frame per pixel of the raster in which the edge was found. Positions are as
+    /// much less exact.
+    pub scale: f64,
+}
+
+impl EdgeCurve {
+    /// The length of the chord in pixels.
+    pub(super) fn length(&self) -> f64 {
+        match (self.points.first(), self.points.last()) {
+            (Some(first), Some(last)) => (last[0] - first[0]).hypot(last[1] - first[1]),
+            _ => 0.0,
         }
     }
 }

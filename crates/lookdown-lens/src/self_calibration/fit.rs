@@ -10,15 +10,14 @@
 
 use std::f64::consts::FRAC_PI_2;
 
+use nalgebra::{Matrix3, Rotation3};
+
 use super::{
-    camera::{MIN_SLOPE, RoomCamera, curve},
-    climb::climb,
-    edge_curve::EdgeCurve,
-    evaluation::{Evaluation, Normal, Parameters},
-    evidence::evaluate,
+    camera::{Angles, MIN_SLOPE, RoomCamera, curve, ideal_shape},
+    evidence::{EdgeCurve, evaluate, followed_direction},
     known_camera::{IdealLens, KnownCamera},
-    maxima::{Maximum, fine_maxima, maxima},
-    prior::{CircleGuess, Prior},
+    maxima::{Maximum, climb, fine_maxima, maxima},
+    prior::{CircleGuess, Evaluation, Normal, Parameters, Prior},
     refusal::FitRefusal,
     search::has_lens,
     uncertainty::{FitUncertainty, deviations, distance, loose_covariance, loose_curvature},
@@ -432,4 +431,37 @@ fn halves(
         })
     };
     (0..4).map(fitted).collect()
+}
+
+impl RoomFit {
+    /// Returns the edges that follow each of the directions, in the order of the directions. Edges
+    /// that follow none of them are left out.
+    pub fn edges_along<'a>(&self, edges: &'a [EdgeCurve]) -> [Vec<&'a EdgeCurve>; 3] {
+        let mut along: [Vec<&EdgeCurve>; 3] = Default::default();
+        let camera = RoomCamera::from(self);
+        let (radius, _) = camera.curve(self.max_theta);
+        if let Some(angles) = Angles::from_camera(&camera, self.focal * radius) {
+            for edge in edges {
+                if let Some(direction) = followed_direction(edge, &camera, &angles) {
+                    along[direction].push(edge);
+                }
+            }
+        }
+        along
+    }
+}
+
+impl From<&RoomFit> for RoomCamera {
+    fn from(fit: &RoomFit) -> Self {
+        let [k1, k2, ..] = fit.k;
+        let [down, x, y] = fit.directions;
+        let axes = Matrix3::from_columns(&[x, y, down]);
+        Self {
+            focal: fit.focal,
+            k1,
+            k2_offset: k2 - ideal_shape(k1)[1],
+            center: fit.center,
+            room: Rotation3::from_matrix_unchecked(axes),
+        }
+    }
 }

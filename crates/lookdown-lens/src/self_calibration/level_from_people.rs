@@ -8,7 +8,6 @@
 
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 
-use super::visible_people::{MAX_INDEPENDENT, has_visible_feet};
 use crate::geometry::{Lens, Mount, OrientedBox, PersonHeight};
 
 /// Fewer people say nothing.
@@ -104,6 +103,17 @@ fn row(person: &OrientedBox, lens: &Lens, mount: &Mount) -> Option<(f64, f64, f6
         along(Vector3::x_axis())?,
         along(Vector3::y_axis())?,
     ))
+}
+
+/// Reports repeat the same people: more boxes are no more evidence than these.
+pub(super) const MAX_INDEPENDENT: f64 = 30.0;
+/// Least angle between the feet of a person and straight down, radians. Nearer people hide their
+/// feet, so that they seem taller than they are: by 7 % at 30° to 45°, and by 18 % below.
+const LEAST_FOOT_ANGLE: f64 = 0.698;
+
+/// Returns true for people far enough away to show their feet.
+pub(super) fn has_visible_feet(person: &PersonHeight) -> bool {
+    person.foot_angle >= LEAST_FOOT_ANGLE
 }
 
 #[cfg(test)]

@@ -9,11 +9,11 @@ use nalgebra::{Rotation3, Vector3};
 use super::{
     CircleGuess, EdgeCurve, FieldOfView, FitRefusal, IdealLens, KnownCamera, RoomFit,
     camera::{Angles, RoomCamera},
-    climb::stepped,
-    evaluation::{PARAMETERS, Parameters},
     evidence::evaluate,
     fit::prior,
-    triples::Triples,
+    maxima::stepped,
+    prior::{PARAMETERS, Parameters},
+    search::Triples,
 };
 use crate::geometry::Ray;
 

@@ -2,8 +2,7 @@
 
 use super::{
     camera::{RoomCamera, ideal_shape_slope},
-    evaluation::{Evaluation, Normal, Parameters},
-    prior::Prior,
+    prior::{Evaluation, Normal, Parameters, Prior},
 };
 use crate::geometry::Ray;
 

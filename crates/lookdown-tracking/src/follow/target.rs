@@ -6,8 +6,6 @@ use lookdown_lens::geometry::{
 };
 use nalgebra::Vector2;
 
-use super::boxes::{iou, widened};
-
 /// The margin around a person's box that belongs to the person, as a share of its larger side. It
 /// holds shadows and the next step.
 const MARGIN: f64 = 0.5;
@@ -219,4 +217,28 @@ pub fn logit(score: f64) -> f64 {
 /// Returns the probability of a logit.
 pub fn from_logit(logit: f64) -> f64 {
     1.0 / (1.0 + (-logit).exp())
+}
+
+/// Returns a box with a margin (pixels) on all sides.
+pub fn widened([x_min, y_min, x_max, y_max]: [f64; 4], margin: f64) -> [f64; 4] {
+    [
+        x_min - margin,
+        y_min - margin,
+        x_max + margin,
+        y_max + margin,
+    ]
+}
+
+/// Returns true if two boxes share more than a border.
+pub fn overlap(one: &[f64; 4], other: &[f64; 4]) -> bool {
+    one[0] < other[2] && other[0] < one[2] && one[1] < other[3] && other[1] < one[3]
+}
+
+/// Returns the intersection over union, 0 to 1.
+pub(super) fn iou(one: &[f64; 4], other: &[f64; 4]) -> f64 {
+    let side = |at: usize| (one[at + 2].min(other[at + 2]) - one[at].max(other[at])).max(0.0);
+    let area = |of: &[f64; 4]| (of[2] - of[0]) * (of[3] - of[1]);
+    let both = side(0) * side(1);
+    let union = area(one) + area(other) - both;
+    if union > 0.0 { both / union } else { 0.0 }
 }

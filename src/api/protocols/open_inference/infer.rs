@@ -17,8 +17,7 @@ use utoipa::{
 };
 
 use super::{
-    own_metadata::require_frame_model,
-    persons::{self, ArrivalTimes},
+    persons::{self, ArrivalTimes, require_frame_model},
     request::{InferRequest, decompressed},
 };
 use crate::api::{

@@ -3,37 +3,43 @@
 use std::time::Instant;
 
 use axum::{
+    Json,
+    extract::{Path, State},
     http::{HeaderName, HeaderValue, header::CONTENT_TYPE},
     response::{AppendHeaders, IntoResponse, Response},
 };
 use bytes::Bytes;
 use jiff::Timestamp;
-use lookdown_common::report::ReportPerson;
+use lookdown_common::{report::ReportPerson, text::Quoted};
 use lookdown_detect::{
     open_inference::{
-        Datatype, HEAD_LENGTH, TensorValues,
-        bounded_json::Entries,
-        message::{InferResponse, Message, OutputParameters, OutputTensor},
-        metadata::ModelMetadata,
-        parameters::Parameter,
+        BINARY_EXTENSION, Datatype, HEAD_LENGTH, TensorValues,
+        message::{Entries, InferResponse, Message, OutputParameters, OutputTensor, Parameter},
+        metadata::{
+            ModelMetadata, ModelReady, ServerLive, ServerMetadata, ServerReady, TensorMetadata,
+        },
     },
     parameters::{DetectParameters, JsonType, ParameterError},
     pipeline::DetectJob,
 };
 
 use super::{
-    own_metadata::{FRAME_MODEL, FRAME_MODEL_VERSION, NAME, tensor},
     request::InferRequest,
     tensor::{Wanted, misfit},
 };
 use crate::api::{
     ApiState,
     detect::{
-        defaults::detect_parameters,
         report::{PERSON_COUNT, report_headers},
-        run::{AnswerInput, Answered, run_detection},
+        run::{AnswerInput, Answered, detect_parameters, run_detection},
     },
-    http::{context::RequestContext, problem::Problem, query::pairs, rate_limit::RequestTokens},
+    http::{
+        context::RequestContext,
+        problem::{Problem, ProblemKind},
+        query::pairs,
+        rate_limit::RequestTokens,
+    },
+    require_scope::RequireDetect,
 };
 
 const INPUT: &str = "image";
@@ -327,6 +333,117 @@ impl IntoResponse for InferAnswer {
         }
         response
     }
+}
+
+/// The name of the server, and the platform of its model.
+pub(super) const NAME: &str = "lookdown";
+/// The supported extensions of the protocol.
+pub(super) const EXTENSIONS: [&str; 1] = [BINARY_EXTENSION];
+/// The model that detects persons in frames.
+pub(super) const FRAME_MODEL: &str = "lookdown";
+/// The version of its inputs and outputs.
+pub(super) const FRAME_MODEL_VERSION: &str = "1";
+
+/// Refuses the name of any other model.
+pub(super) fn require_frame_model(name: &str) -> Result<(), Problem> {
+    if name == FRAME_MODEL {
+        return Ok(());
+    }
+    let name = Quoted(name);
+    let detail =
+        format!("model: there is no model {name}: use {FRAME_MODEL}, which accepts frames");
+    Err(Problem::new(ProblemKind::UnknownModel, detail))
+}
+
+/// Returns the metadata of a tensor.
+pub(super) fn tensor(name: &str, datatype: Datatype, shape: impl Into<Vec<i64>>) -> TensorMetadata {
+    TensorMetadata {
+        name: name.to_owned(),
+        datatype: datatype.to_string(),
+        shape: shape.into(),
+    }
+}
+
+/// Get server metadata
+#[utoipa::path(
+    get, path = "/v2", tag = "operation", operation_id = "get_server_metadata",
+    responses((status = OK, description = "The name, version, extensions and default of `follow` of the server.", body = ServerMetadata))
+)]
+pub(in crate::api) async fn server(State(state): State<ApiState>) -> Json<ServerMetadata> {
+    Json(ServerMetadata {
+        name: NAME.to_owned(),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        extensions: EXTENSIONS.map(ToOwned::to_owned).into(),
+        follow: state.options.settings.detect.follow(),
+    })
+}
+
+/// Check liveness (Open Inference Protocol)
+///
+/// Equivalent to `/livez`.
+#[utoipa::path(
+    get, path = "/v2/health/live", tag = "operation", operation_id = "get_server_liveness",
+    responses((status = OK, description = "The process is alive.", body = ServerLive))
+)]
+pub(in crate::api) async fn live() -> Json<ServerLive> {
+    Json(ServerLive { live: true })
+}
+
+/// Check readiness (Open Inference Protocol)
+///
+/// Equivalent to `/readyz`.
+#[utoipa::path(
+    get, path = "/v2/health/ready", tag = "operation", operation_id = "get_server_readiness",
+    responses(
+        (status = OK, description = "The server accepts frames.", body = ServerReady),
+    )
+)]
+pub(in crate::api) async fn ready(
+    State(state): State<ApiState>,
+) -> Result<Json<ServerReady>, Problem> {
+    state.require_ready()?;
+    Ok(Json(ServerReady { ready: true }))
+}
+
+/// Get model metadata
+///
+/// The only model, `lookdown`, accepts a frame and returns persons.
+#[utoipa::path(
+    get, path = "/v2/models/{name}", tag = "inference", operation_id = "get_model",
+    params(("name" = String, Path, description = "`lookdown`.")),
+    security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
+    responses(
+        (status = OK, description = "The inputs and outputs of the model.", body = ModelMetadata),
+    )
+)]
+pub(in crate::api) async fn model(
+    _scope: RequireDetect,
+    Path(name): Path<String>,
+) -> Result<Json<ModelMetadata>, Problem> {
+    require_frame_model(&name)?;
+    Ok(Json(metadata()))
+}
+
+/// Check the readiness of a model
+#[utoipa::path(
+    get, path = "/v2/models/{name}/ready", tag = "inference", operation_id = "get_model_readiness",
+    params(("name" = String, Path, description = "`lookdown`.")),
+    security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
+    responses(
+        (status = OK, description = "It can.", body = ModelReady),
+    )
+)]
+pub(in crate::api) async fn model_ready(
+    State(state): State<ApiState>,
+    _scope: RequireDetect,
+    Path(name): Path<String>,
+) -> Result<Json<ModelReady>, Problem> {
+    require_frame_model(&name)?;
+    state.require_ready()?;
+    Ok(Json(ModelReady {
+        name: FRAME_MODEL.to_owned(),
+        ready: true,
+    }))
 }
 
 #[cfg(test)]

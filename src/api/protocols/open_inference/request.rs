@@ -11,9 +11,7 @@ use flate2::read::{MultiGzDecoder, ZlibDecoder};
 use lookdown_common::text::{Quoted, shortened};
 use lookdown_detect::open_inference::{
     BINARY_SIZE, HEAD_LENGTH, TensorData,
-    bounded_json::Table,
-    message::{InputTensor, Message, read_request},
-    parameters::{Parameter, Parameters},
+    message::{InputTensor, Message, Parameter, Parameters, Table, read_request},
 };
 use serde_json::value::RawValue;
 

@@ -6,8 +6,7 @@ use bytes::Bytes;
 use lookdown_common::text::{Quoted, shortened};
 use lookdown_detect::open_inference::{
     BINARY_OUTPUT, Datatype, TensorData, element_count,
-    message::RequestedOutput,
-    parameters::{Parameter, Parameters},
+    message::{Parameter, Parameters, RequestedOutput},
 };
 
 use crate::api::http::{

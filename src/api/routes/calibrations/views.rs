@@ -23,7 +23,7 @@ use super::{
 use crate::{
     api::{
         ApiState,
-        http::{caller::Caller, deadline::Deadline, problem::Problem, query::parameters_named},
+        http::{access::Caller, deadline::Deadline, problem::Problem, query::parameters_named},
         openapi::RawBytes,
         require_scope::RequireRead,
     },

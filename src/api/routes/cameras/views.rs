@@ -8,7 +8,7 @@ use axum::{
     extract::{FromRequestParts, Path, Request, State},
     http::{
         HeaderMap, HeaderValue, StatusCode,
-        header::{CACHE_CONTROL, CONTENT_TYPE, ETAG, WWW_AUTHENTICATE},
+        header::{CACHE_CONTROL, CONTENT_TYPE, WWW_AUTHENTICATE},
         request::Parts,
     },
     response::{IntoResponse, Response},
@@ -17,7 +17,7 @@ use bytes::{BufMut, Bytes, BytesMut};
 use futures_util::stream::unfold;
 use lookdown_common::text::Quoted;
 use lookdown_detect::parameters::{ParameterError, whole_number};
-use lookdown_http::entity_tags::{entity_tag, is_unmodified};
+use lookdown_http::entity_tags::{is_unmodified, private};
 use lookdown_watch::Viewing;
 use serde_json::Value;
 use tokio::time::{timeout, timeout_at};
@@ -28,7 +28,7 @@ use crate::{
     api::{
         ApiState,
         http::{
-            caller::Caller,
+            access::Caller,
             context::RequestContext,
             deadline::{CAMERAS, Deadline},
             problem::{Problem, ProblemKind},
@@ -237,10 +237,7 @@ async fn get_image(
     let live = request.live(&state, camera, name)?;
     let frame = newest(&state, &live, camera, deadline).await?;
     let tag = frame.tag(&rendering);
-    let about = [
-        (ETAG, entity_tag(&tag)),
-        (CACHE_CONTROL, HeaderValue::from_static("private, no-cache")),
-    ];
+    let about = private(&tag);
     if is_unmodified(&parts.headers, &tag)? {
         return Ok((StatusCode::NOT_MODIFIED, about).into_response());
     }

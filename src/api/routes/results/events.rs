@@ -25,7 +25,7 @@ use super::CameraAddress;
 use crate::{
     api::{
         ApiState,
-        http::{caller::Caller, problem::Problem, query::parameters_named},
+        http::{access::Caller, problem::Problem, query::parameters_named},
         require_scope::RequireRead,
     },
     results::{Cameras, Listening, ReportId, ResultStore, StoredReport},

@@ -1,16 +1,15 @@
-//! Graphs that decode boxes and scores.
+//! Heads whose boxes and scores are outputs of their own.
 
 use serde::Deserialize;
 
 use super::{
-    candidate_collector::{CandidateCollector, four},
-    decoder::{Decoder, Selected},
-    outputs::named,
-    score::Activation,
-    shape::{Axis, Batch},
-    tensor::{Output, TensorView},
+    decoder::{CandidateCollector, Decoder, Selected, corners_around, four},
+    score::{Activation, ClassActivation},
+    shape::{Axis, Batch, Output, TensorView, boxes_and_scores, named},
 };
 
+/// Graphs that decode boxes and scores.
+///
 /// Boxes `[views, candidates, 4]` (`x_min, y_min, x_max, y_max`, view pixels) and scores
 /// `[views, candidates]` or `[views, candidates, 1]` of being a person, 0 to 1.
 ///
@@ -63,6 +62,74 @@ impl Decoder for BoxesScoresHead {
             for (corners, &raw) in boxes.chunks_exact(4).zip(scores) {
                 let score = Activation::None.score(raw, collector.floor);
                 collector.offer(view, score, || four(corners));
+            }
+        }
+    }
+}
+
+/// DETR and its successors (RT-DETR, D-FINE, RF-DETR) before decoding: class logits `[views,
+/// queries, classes]` and boxes `[views, queries, 4]` (center x, center y, width, height, as shares
+/// of the view).
+///
+/// The score is a sigmoid per class. The original DETR uses a softmax over the classes and "no
+/// object".
+///
+/// Sources: Carion et al., "End-to-End Object Detection with Transformers", 2020, section 3;
+/// Zhao et al., "DETRs Beat YOLOs on Real-time Object Detection", 2024.
+///
+/// ```toml
+/// [output]
+/// head = "detr"
+/// person_class = 0               # 80 COCO classes; RF-DETR, DETR, numbered as in COCO: 1
+/// score_activation = "sigmoid"   # default; DETR: "softmax"
+/// # boxes = "pred_boxes"         # if the shapes are ambiguous
+/// # scores = "logits"
+/// ```
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DetrHead {
+    /// Index of the person among the classes.
+    pub person_class: u16,
+    /// Activation applied to the class scores.
+    #[serde(default)]
+    pub score_activation: ClassActivation,
+    /// The output with the boxes. Default: the one whose last axis is 4.
+    #[serde(default)]
+    pub boxes: Option<String>,
+    /// The output with the class scores. Default: the other one with three axes.
+    #[serde(default)]
+    pub scores: Option<String>,
+}
+
+impl Decoder for DetrHead {
+    fn select<'o>(&self, outputs: &'o [Output<'o>], batch: &Batch) -> Selected<'o> {
+        let names = [self.boxes.as_deref(), self.scores.as_deref()];
+        let [boxes, scores] = boxes_and_scores(outputs, names)?;
+        let queries = Axis::AtLeast(0, "queries");
+        let classes = Axis::AtLeast(usize::from(self.person_class) + 1, "classes");
+        batch.require(&[
+            (boxes, &[Axis::Views, queries, Axis::Exactly(4)]),
+            (scores, &[Axis::Views, queries, classes]),
+        ])?;
+        Ok(vec![boxes, scores])
+    }
+
+    fn decode(&self, tensors: &[&TensorView<'_>], collector: &mut CandidateCollector) {
+        let (boxes, scores) = (tensors[0], tensors[1]);
+        let person = usize::from(self.person_class);
+        let [view_width, view_height] =
+            [collector.batch.width, collector.batch.height].map(f64::from);
+        for (view, (boxes, all_scores)) in boxes.views().zip(scores.views()).enumerate() {
+            let queries = boxes
+                .chunks_exact(4)
+                .zip(all_scores.chunks_exact(scores.shape[2]));
+            for (sides, scores) in queries {
+                let score = self.score_activation.score(scores, person, collector.floor);
+                collector.offer(view, score, || {
+                    let [x, y, width, height] = four(sides);
+                    let center = [x * view_width, y * view_height];
+                    corners_around(center, [width * view_width, height * view_height])
+                });
             }
         }
     }

@@ -4,12 +4,9 @@ use lookdown_lens::saturating::to_usize;
 use serde::Deserialize;
 
 use super::{
-    candidate_collector::CandidateCollector,
-    decoder::{Decoder, Selected},
-    outputs::named_or_only,
+    decoder::{CandidateCollector, Decoder, Selected},
     score::Activation,
-    shape::{Axis, Batch},
-    tensor::{Output, TensorView},
+    shape::{Axis, Batch, Output, TensorView, named_or_only},
 };
 
 /// Graphs that suppress overlaps: rows of final detections in `[views, rows, columns]`. If a column

@@ -1,8 +1,9 @@
-//! Comparison of output shapes with the requirements of a head.
+//! Outputs of a network: their declared shapes and values, the selection of a head's outputs, and
+//! the comparison of their shapes with the requirements of the head.
 
 use std::fmt;
 
-use super::tensor::Output;
+use lookdown_common::text::Quoted;
 
 /// Properties of a batch that are known when shapes are checked.
 #[derive(Debug, Clone, Copy)]
@@ -137,4 +138,143 @@ pub(super) fn check_positive<'n>(
             "`{field}` in the manifest's [output] contains {number}; only numbers above 0 are valid"
         )),
     }
+}
+
+/// An output declared by the model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct OutputShape<'a> {
+    /// The output's name in the model.
+    pub name: &'a str,
+    /// Its dimensions. -1 (or any negative number) stands for one that is known only at run time.
+    pub shape: &'a [i64],
+}
+
+/// An output of one run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TensorView<'a> {
+    /// The output's name in the model.
+    pub name: &'a str,
+    /// Its dimensions. Their product must be the number of values, otherwise
+    /// [`super::Head::decode`] refuses the tensor.
+    pub shape: &'a [usize],
+    /// Its values, row-major.
+    pub values: &'a [f32],
+}
+
+/// Properties of an output for shape checks before and after a run.
+pub(super) struct Output<'a> {
+    /// Its place among the outputs of the model.
+    pub(super) index: usize,
+    pub(super) name: &'a str,
+    /// The dimensions. `None` for one that is not known yet.
+    pub(super) dimensions: Vec<Option<usize>>,
+}
+
+impl<'a> Output<'a> {
+    /// The outputs with these names and dimensions, in the order of the model.
+    pub(super) fn all<D: TryInto<usize> + Copy + 'a>(
+        outputs: impl Iterator<Item = (&'a str, &'a [D])>,
+    ) -> Vec<Self> {
+        let outputs = outputs.enumerate().map(|(index, (name, shape))| Self {
+            index,
+            name,
+            dimensions: shape.iter().map(|&side| side.try_into().ok()).collect(),
+        });
+        outputs.collect()
+    }
+}
+
+impl<'a> TensorView<'a> {
+    /// Refuses a shape whose product differs from the number of values.
+    pub(super) fn check_len(&self) -> Result<(), String> {
+        let product = self.shape.iter().try_fold(1_usize, |product, &dimension| {
+            product.checked_mul(dimension)
+        });
+        if product == Some(self.values.len()) {
+            return Ok(());
+        }
+        Err(format!(
+            "its output {:?} has {} values for the shape {:?}",
+            self.name,
+            self.values.len(),
+            self.shape
+        ))
+    }
+
+    /// The values of each entry of the first axis.
+    pub(super) fn views(&self) -> impl Iterator<Item = &'a [f32]> + use<'a> {
+        let views = self.shape.first().copied().unwrap_or(0);
+        let values = self.values;
+        let len = values.len().checked_div(views).unwrap_or(0);
+        (0..views).map(move |view| &values[view * len..][..len])
+    }
+}
+
+/// Most names of outputs in a message.
+const MAX_NAMES: usize = 16;
+
+/// Returns the output with that name.
+pub(super) fn named<'o>(outputs: &'o [Output<'o>], name: &str) -> Result<&'o Output<'o>, String> {
+    let found = outputs.iter().find(|output| output.name == name);
+    found.ok_or_else(|| {
+        format!(
+            "it has no output {name:?}, only {}; name the right one in the manifest's [output]",
+            names(outputs)
+        )
+    })
+}
+
+/// Returns the output with that name. Without a name, the only output.
+pub(super) fn named_or_only<'o>(
+    outputs: &'o [Output<'o>],
+    name: Option<&str>,
+) -> Result<&'o Output<'o>, String> {
+    match (name, outputs) {
+        (Some(name), _) => named(outputs, name),
+        (None, [only]) => Ok(only),
+        (None, _) => Err(format!(
+            "it has the outputs {}; select one with `name` in the manifest's [output]",
+            names(outputs)
+        )),
+    }
+}
+
+/// Returns the outputs with boxes and with the scores of all classes, by name or else by shape.
+/// Both have three axes, and the last axis of the boxes is 4.
+pub(super) fn boxes_and_scores<'o>(
+    outputs: &'o [Output<'o>],
+    [boxes, scores]: [Option<&str>; 2],
+) -> Result<[&'o Output<'o>; 2], String> {
+    let find = |name: Option<&str>, last_axis_is_four: bool| {
+        if let Some(name) = name {
+            return named(outputs, name).map(Some);
+        }
+        // An axis of unknown length could be either.
+        let mut fitting = outputs.iter().filter(|output| {
+            let dimensions = &output.dimensions;
+            let last = dimensions.last().copied().flatten();
+            dimensions.len() == 3
+                && last.is_none_or(|last| last_axis_is_four == (last == 4))
+                && ![boxes, scores].contains(&Some(output.name))
+        });
+        Ok(fitting.next().filter(|_| fitting.next().is_none()))
+    };
+    if let (Some(boxes), Some(scores)) = (find(boxes, true)?, find(scores, false)?) {
+        return Ok([boxes, scores]);
+    }
+    Err(format!(
+        "its outputs {} with boxes and scores cannot be distinguished by shape; name them with \
+         `boxes` and `scores` in the manifest's [output]",
+        names(outputs)
+    ))
+}
+
+/// Lists the first names of the outputs.
+pub(super) fn names(outputs: &[Output<'_>]) -> String {
+    let names = outputs.iter().take(MAX_NAMES);
+    let mut names: Vec<_> = names.map(|o| Quoted(o.name).to_string()).collect();
+    if outputs.len() > MAX_NAMES {
+        names.push("…".to_owned());
+    }
+    names.join(", ")
 }

@@ -1,17 +1,17 @@
-//! HTTP connection to the server: keep-alive, and limits on the time and size of every response.
+//! The options of an inference server, and the HTTP connection to it: keep-alive, and limits on the
+//! time and size of every response.
 
-use std::{io::Read, time::Duration};
+use std::{io::Read, str::FromStr, time::Duration};
 
 use bytes::Bytes;
 use lookdown_common::text::{one_line, with_causes};
 use reqwest::{
     blocking::{Client, RequestBuilder, Response},
-    header::{AUTHORIZATION, CONTENT_TYPE, RETRY_AFTER},
+    header::{AUTHORIZATION, CONTENT_TYPE, HeaderValue, RETRY_AFTER},
     redirect,
 };
 use url::Url;
 
-use super::RemoteOptions;
 use crate::open_inference::{HEAD_LENGTH, message::Message};
 
 /// Connect timeout.
@@ -152,4 +152,51 @@ fn read(response: Response, max_bytes: u64) -> Result<Reply, String> {
         head_length,
         body,
     })
+}
+
+/// Settings of the inference server.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RemoteOptions {
+    /// The server's address, without `/v2`.
+    pub url: Url,
+    /// Token sent with every request, if any.
+    pub token: Option<BearerToken>,
+    /// Name on the server of the model whose readiness represents the server's.
+    pub model: String,
+    /// Manifest name of the model that is called `model` on the server. Other names are the same in
+    /// both.
+    pub called: String,
+    /// Timeout of one inference request.
+    pub timeout: Duration,
+}
+
+/// A token sent with every request. The header is marked as sensitive and never logged.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BearerToken(HeaderValue);
+
+/// Invalid token text. It is not repeated in the error.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "use only the token that the inference server's operator issued: letters, digits and signs \
+     without spaces"
+)]
+pub struct InvalidToken;
+
+impl BearerToken {
+    /// The header `Authorization` with the token (RFC 6750, section 2.1).
+    pub(super) fn authorization(&self) -> HeaderValue {
+        self.0.clone()
+    }
+}
+
+impl FromStr for BearerToken {
+    type Err = InvalidToken;
+
+    fn from_str(text: &str) -> Result<Self, InvalidToken> {
+        let is_token = !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_graphic());
+        let header = HeaderValue::try_from(format!("Bearer {text}"));
+        let mut header = header.ok().filter(|_| is_token).ok_or(InvalidToken)?;
+        header.set_sensitive(true);
+        Ok(Self(header))
+    }
 }

@@ -5,11 +5,11 @@ use serde::ser::Error;
 use serde_json::value::RawValue;
 
 use crate::open_inference::{
-    BINARY_OUTPUT, BINARY_SIZE, Datatype, TensorData, TensorValues,
-    bounded_json::{Entries, Table},
-    element_count,
-    message::{InferRequest, InferResponse, InputTensor, Message, RequestedOutput},
-    parameters::{Parameter, Parameters},
+    BINARY_OUTPUT, BINARY_SIZE, Datatype, TensorData, TensorValues, element_count,
+    message::{
+        Entries, InferRequest, InferResponse, InputTensor, Message, Parameter, Parameters,
+        RequestedOutput, Table,
+    },
 };
 
 /// An inference request with views for a model.

@@ -17,9 +17,8 @@ use std::{
 use parking_lot::Mutex;
 
 use super::{
-    connection::{Connection, Reply},
+    connection::{Connection, RemoteOptions, Reply},
     exchange::{Output, Question},
-    options::RemoteOptions,
 };
 use crate::{
     inference::InferenceError,

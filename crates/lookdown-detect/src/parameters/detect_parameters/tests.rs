@@ -181,3 +181,64 @@ fn nine_priority_levels_map_to_three_priorities() {
     let expected = [Priority::High, Priority::Normal, Priority::Low].map(|priority| [priority; 3]);
     assert_eq!(priorities.collect::<Vec<_>>(), expected.concat());
 }
+
+fn defaults(pairs: &[(&str, &str)]) -> DetectDefaults {
+    DetectDefaults::parse(pairs.iter().copied()).unwrap()
+}
+
+fn parse_with_server(pairs: &[(&str, &str)], camera: &DetectDefaults) -> DetectParameters {
+    let server = defaults(&[("profile", "fast"), ("score_threshold", "0.6")]);
+    let layers = [
+        (DefaultSource::Calibration, camera),
+        (DefaultSource::Server, &server),
+    ];
+    DetectParameters::parse_with(pairs.iter().copied(), &layers).unwrap()
+}
+
+#[test]
+fn request_precedes_calibration_and_calibration_the_server() {
+    let camera = defaults(&[("score_threshold", "0.5"), ("motion", "true")]);
+    let used = |parameters: &DetectParameters| -> Vec<_> {
+        let defaults = parameters.defaults.iter();
+        defaults
+            .map(|used| (used.name, used.value.clone(), used.source.name()))
+            .collect()
+    };
+    let parameters = parse_with_server(&[("calibration", "lobby")], &camera);
+    assert_eq!(parameters.refinement.score_threshold, 0.5);
+    assert_eq!(parameters.profile.name(), "fast");
+    assert!(parameters.motion);
+    assert_eq!(
+        used(&parameters),
+        [
+            ("score_threshold", "0.5".to_owned(), "calibration"),
+            ("motion", "true".to_owned(), "calibration"),
+            ("profile", "fast".to_owned(), "server"),
+        ]
+    );
+    let request = [("camera", "hall"), ("score_threshold", "0.7")];
+    let parameters = parse_with_server(&request, &camera);
+    assert_eq!(parameters.refinement.score_threshold, 0.7);
+    assert_eq!(used(&parameters).len(), 2);
+}
+
+#[test]
+fn default_motion_detection_skips_unnamed_cameras() {
+    let parameters = parse_with_server(&[], &defaults(&[("motion", "true")]));
+    assert!(!parameters.motion);
+    assert!(parameters.defaults.iter().all(|used| used.name != "motion"));
+}
+
+#[test]
+fn invalid_defaults_are_refused_by_name() {
+    for (name, value) in [
+        ("profile", "best"),
+        ("motion", "yes"),
+        ("camera", "hall"),
+        ("captured_at", "2026-11-21T09:30:00Z"),
+        ("threshold", "1"),
+    ] {
+        let error = DetectDefaults::parse([(name, value)]).unwrap_err();
+        assert_eq!(error.name, name);
+    }
+}

@@ -2,10 +2,7 @@
 
 use std::f64::consts::PI;
 
-use super::{
-    inversion::{Tabulated, first_stationary_point},
-    polynomial::{Polynomial, Rising},
-};
+use super::inversion::{Polynomial, Rising, Tabulated, first_stationary_point};
 
 /// Curves with a pole end this far before it, in radians.
 pub(super) const POLE_MARGIN: f64 = 1e-6;

@@ -1,6 +1,6 @@
 //! Radial and tangential distortion in the normalized image plane.
 
-use super::{LensError, check::finite, inversion::rising_root};
+use super::{LensError, error::finite, inversion::rising_root};
 
 /// Bound on Newton steps in the plane; a handful suffice from the radial solution.
 const MAX_STEPS: usize = 32;

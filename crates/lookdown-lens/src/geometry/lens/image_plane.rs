@@ -2,7 +2,7 @@
 
 use super::{
     LensError,
-    check::{finite, positive},
+    error::{finite, positive},
 };
 use crate::geometry::Pixel;
 

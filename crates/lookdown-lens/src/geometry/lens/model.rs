@@ -1,7 +1,7 @@
 //! The pieces that every lens model is made of: [`Model`], and the macros that declare the
 //! parameters of one model (`lens_parameters`) and the list of all models (`lens_models`).
 
-use super::{ImagePlane, LensError, check::positive, curve::Curve, distortion::RadialTangential};
+use super::{ImagePlane, LensError, curve::Curve, distortion::RadialTangential, error::positive};
 
 /// The path from the parameters in a calibration file to a checked curve.
 pub(super) trait Model {
@@ -28,7 +28,7 @@ pub(super) fn one() -> f64 {
 /// * `Ideal`: `focal`, or `fx` and `fy`, for a curve without parameters;
 /// * `Pinhole`: `fx` and `fy`;
 /// * `SkewedPinhole`: `fx`, `fy` and `skew`;
-/// * `Centered`: none but `cx` and `cy`; the model's file has a `plane` function for the rest.
+/// * `Centered`: none but `cx` and `cy`; the model has a `plane` function for the rest.
 macro_rules! lens_parameters {
     (
         $(#[$doc:meta])* pub struct $Model:ident: Ideal with $Curve:ident {
@@ -53,7 +53,7 @@ macro_rules! lens_parameters {
 
         impl $Model {
             /// Creates the lens with these focal lengths and center.
-            pub fn new([fx, fy, cx, cy]: $crate::geometry::lens::Pinhole) -> Self {
+            pub fn new([fx, fy, cx, cy]: Pinhole) -> Self {
                 Self { focal: None, fx: Some(fx), fy: Some(fy), cx, cy, max_theta: None }
             }
 
@@ -65,15 +65,13 @@ macro_rules! lens_parameters {
             }
 
             /// Returns the focal lengths and the center, unless a focal length is missing.
-            pub fn pinhole(&self) -> Option<$crate::geometry::lens::Pinhole> {
+            pub fn pinhole(&self) -> Option<Pinhole> {
                 Some([self.fx.or(self.focal)?, self.fy.or(self.focal)?, self.cx, self.cy])
             }
 
-            pub(in $crate::geometry::lens) fn plane(
-                &self,
-            ) -> Result<$crate::geometry::lens::ImagePlane, $crate::geometry::LensError> {
+            pub(super) fn plane(&self) -> Result<ImagePlane, LensError> {
                 let focal_lengths = (self.focal, self.fx, self.fy);
-                $crate::geometry::lens::model::ideal_plane(focal_lengths, self.cx, self.cy)
+                ideal_plane(focal_lengths, self.cx, self.cy)
             }
         }
 
@@ -81,15 +79,15 @@ macro_rules! lens_parameters {
         #[derive(Debug, Clone, Copy, PartialEq)]
         pub struct $Curve;
 
-        impl $crate::geometry::lens::model::Model for $Model {
+        impl Model for $Model {
             type Curve = $Curve;
 
-            fn curve(&self) -> Result<$Curve, $crate::geometry::LensError> {
+            fn curve(&self) -> Result<$Curve, LensError> {
                 Ok($Curve)
             }
         }
 
-        impl $crate::geometry::lens::curve::Curve for $Curve {
+        impl Curve for $Curve {
             fn limit(&self) -> f64 {
                 $limit
             }
@@ -136,21 +134,19 @@ macro_rules! lens_parameters {
 
         impl $Model {
             /// Creates the lens with these focal lengths, center and parameters, without skew.
-            pub fn new([fx, fy, cx, cy]: $crate::geometry::lens::Pinhole, $($own: $Own),*) -> Self {
+            pub fn new([fx, fy, cx, cy]: Pinhole, $($own: $Own),*) -> Self {
                 Self { fx, fy, cx, cy, $($own,)* $($skew: 0.0,)? max_theta: None }
             }
 
             /// Returns the focal lengths and the center.
-            pub fn pinhole(&self) -> $crate::geometry::lens::Pinhole {
+            pub fn pinhole(&self) -> Pinhole {
                 [self.fx, self.fy, self.cx, self.cy]
             }
 
-            pub(in $crate::geometry::lens) fn plane(
-                &self,
-            ) -> Result<$crate::geometry::lens::ImagePlane, $crate::geometry::LensError> {
-                Ok($crate::geometry::lens::ImagePlane {
+            pub(super) fn plane(&self) -> Result<ImagePlane, LensError> {
+                Ok(ImagePlane {
                     $($skew: self.$skew,)?
-                    ..$crate::geometry::lens::ImagePlane::new(self.fx, self.fy, self.cx, self.cy)
+                    ..ImagePlane::new(self.fx, self.fy, self.cx, self.cy)
                 })
             }
         }
@@ -159,7 +155,7 @@ macro_rules! lens_parameters {
         @struct $(#[$doc:meta])* $Model:ident { $($before:tt)* } { $($after:tt)* }
     ) => {
         $(#[$doc])*
-        #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
         #[serde(deny_unknown_fields)]
         pub struct $Model {
             $($before)*
@@ -195,17 +191,15 @@ pub(super) fn ideal_plane(
     Ok(ImagePlane::new(fx, fy, cx, cy))
 }
 
-/// Declares the list of all models: `module::Struct`, where the module's name is that of the model
-/// in calibration files. Makes of it the modules, [`LensModel`](super::LensModel), and its curve.
+/// Declares the list of all models: `name: Struct`, with the name of the model in calibration
+/// files.
+/// Makes of it [`LensModel`](super::LensModel) and its curve.
 macro_rules! lens_models {
-    ($($module:ident::$Model:ident,)+) => {
+    ($($name:ident: $Model:ident,)+) => {
         $(
-            mod $module;
-            pub use self::$module::$Model;
-
             impl $Model {
                 /// The model's name in calibration files.
-                pub const NAME: &'static str = stringify!($module);
+                pub const NAME: &'static str = stringify!($name);
             }
 
             impl From<$Model> for LensModel {
@@ -221,7 +215,7 @@ macro_rules! lens_models {
         /// models `theta` is the angle of a ray from the optical axis in radians. `r` is its
         /// distance from the principal point in units of the focal length, or in pixels where the
         /// model says so.
-        #[derive(Debug, Clone, PartialEq, serde::Serialize)]
+        #[derive(Debug, Clone, PartialEq, Serialize)]
         #[serde(tag = "model", rename_all = "snake_case")]
         pub enum LensModel {
             $(#[doc = concat!("The model [`", stringify!($Model), "`].")] $Model($Model),)+
@@ -249,20 +243,18 @@ macro_rules! lens_models {
             ///
             /// # Errors
             /// Errors of the deserializer: a field of another type, a missing or an unknown field.
-            pub fn deserialize_named<'de, D: serde::Deserializer<'de>>(
+            pub fn deserialize_named<'de, D: Deserializer<'de>>(
                 name: &str,
                 parameters: D,
             ) -> Option<Result<Self, D::Error>> {
                 $(if name == $Model::NAME {
-                    return Some(serde::Deserialize::deserialize(parameters).map(Self::$Model));
+                    return Some(Deserialize::deserialize(parameters).map(Self::$Model));
                 })+
                 None
             }
 
             /// Returns the checked curve of the model and the distortion that follows it.
-            pub(super) fn curve(
-                &self,
-            ) -> Result<(AnyCurve, Option<RadialTangential>), LensError> {
+            pub(super) fn curve(&self) -> Result<(AnyCurve, Option<RadialTangential>), LensError> {
                 Ok(match self {
                     $(Self::$Model(model) => (AnyCurve::$Model(model.curve()?), model.distortion()?),)+
                 })

@@ -347,3 +347,48 @@ fn the_rim_of_a_folding_distortion_still_belongs_to_the_lens() {
         assert!((theta - lens.max_theta()).abs() < 1e-6, "{theta}");
     }
 }
+
+fn stereographic(plane: ImagePlane) -> Lens {
+    let model = Stereographic::with_focal(1.0, 0.0, 0.0, 1.4);
+    Lens::on_plane(&model.into(), plane, Some(1.4)).unwrap()
+}
+
+#[test]
+fn the_continuation_within_the_rim_is_the_lens_itself() {
+    let plane = ImagePlane::new(210.0, 205.0, 299.5, 301.25);
+    let lens = stereographic(plane);
+    for theta in [0.0, 0.3, 1.399] {
+        let normalized = lens.continued_beyond_rim(&ray_at(theta, 0.9)).unwrap();
+        let pixel = plane.pixel_from_normalized(normalized.x, normalized.y);
+        assert!((pixel - lens.project(&ray_at(theta, 0.9)).unwrap()).norm() < 1e-9);
+    }
+}
+
+#[test]
+fn continuation_keeps_the_slope_at_the_rim() {
+    let plane = ImagePlane::new(1.0, 1.0, 0.0, 0.0);
+    let lens = stereographic(plane);
+    let radius = |theta: f64| {
+        lens.continued_beyond_rim(&ray_at(theta, 0.9))
+            .unwrap()
+            .coords
+            .norm()
+    };
+    let rim = radius(1.4);
+    assert!((radius(1.5) - rim - (rim - radius(1.3))).abs() < 1e-12);
+    assert!(
+        (radius(3.0) - 2.0 * rim).abs() < 1e-12,
+        "it ends where the curve began"
+    );
+}
+
+#[test]
+fn no_continuation_for_what_is_exactly_behind_or_not_finite() {
+    let lens = Lens::equidistant_circle(0.0, 0.0, 1.0, 1.5).unwrap();
+    assert_eq!(lens.continued_beyond_rim(&-Ray::z()), None);
+    assert_eq!(
+        lens.continued_beyond_rim(&Ray::new(f64::NAN, 0.0, 1.0)),
+        None
+    );
+    assert_eq!(lens.continued_beyond_rim(&Ray::z()), Some(Pixel::origin()));
+}
