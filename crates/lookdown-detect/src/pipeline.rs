@@ -18,6 +18,7 @@ mod network;
 mod outline;
 mod pass;
 mod planned_views;
+mod plausibility;
 mod report;
 mod rig_cache;
 mod service_rate;
