@@ -146,7 +146,8 @@ def frames_of(scene: str, folder: Path) -> Path:
     images = ["-q:v", "2", "-start_number", "0", folder / "%d.jpg"]
     clip = ["-i", CLIP / "walks.mp4"]
     if scene == "walkers":
-        subprocess.run([*ffmpeg, *clip, *images], check=True)
+        # At the pace of the clip, which has fewer frames per second.
+        subprocess.run([*ffmpeg, *clip, "-r", str(STREAM_RATE), *images], check=True)
         return folder
     empty = folder / "empty.png"
     subprocess.run([*ffmpeg, *clip, "-vf", "tmedian=radius=85", "-frames:v", "1", empty], check=True)
