@@ -4,6 +4,7 @@
 pub(super) mod calibrations;
 pub(super) mod cameras;
 pub(super) mod counts;
+mod found_lens;
 pub(super) mod health;
 pub(super) mod problems;
 pub(super) mod results;

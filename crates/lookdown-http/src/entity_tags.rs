@@ -45,20 +45,20 @@ pub fn private(value: &str) -> [(HeaderName, HeaderValue); 2] {
 }
 
 /// Returns the response with the headers `about` its version, which is `value`: without content and
-/// with the status 304 for a client that has this version.
+/// with the status 304 for a client that has this version. Only others need the `response`.
 ///
 /// # Errors
 /// A [`Problem`] for a header that is malformed.
-pub fn unless_known(
+pub fn unless_known<R: IntoResponse>(
     headers: &HeaderMap,
     value: &str,
     about: impl IntoResponseParts,
-    response: impl IntoResponse,
+    response: impl FnOnce() -> R,
 ) -> Result<Response, Problem> {
     if is_unmodified(headers, value)? {
         return Ok((StatusCode::NOT_MODIFIED, about, ()).into_response());
     }
-    Ok((about, response).into_response())
+    Ok((about, response()).into_response())
 }
 
 /// Returns `true` if `If-None-Match` lists this value: the client has the current version.

@@ -38,7 +38,7 @@ use utoipa::{
     },
 };
 
-use super::cameras::suggestion::FoundLens;
+use super::found_lens::FoundLens;
 use crate::{
     api::{
         ApiState,
@@ -104,7 +104,8 @@ pub(in crate::api) async fn get(
         .ok_or_else(|| unknown(&state, &id))?;
     let revision = entry.calibration.revision();
     let tag = [(ETAG, entity_tag(revision))];
-    let answer = ([(CONTENT_TYPE, "application/json")], entry.native_file());
+    let content_type = [(CONTENT_TYPE, "application/json")];
+    let answer = || (content_type, entry.native_file());
     Ok(unless_known(&headers, revision, tag, answer)?)
 }
 

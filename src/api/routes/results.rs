@@ -83,7 +83,7 @@ pub(in crate::api) async fn list(
         .as_bytes(),
     );
     let about = revalidated(weak_entity_tag(&tag));
-    Ok(unless_known(&headers, &tag, about, Json(rows))?)
+    Ok(unless_known(&headers, &tag, about, || Json(rows))?)
 }
 
 /// Returns the problem of a camera without a stored report.
@@ -381,7 +381,7 @@ pub(in crate::api) async fn get_latest(
     let report = report.ok_or_else(|| unknown(&camera))?;
     let id = report.id.to_string();
     let content_type = [(CONTENT_TYPE, "application/json")];
-    let answer = (content_type, report.report.json.clone());
+    let answer = || (content_type, report.report.json.clone());
     let about = revalidated(entity_tag(&id));
     Ok(unless_known(&headers, &id, about, answer)?)
 }

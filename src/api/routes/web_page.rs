@@ -181,7 +181,7 @@ fn answer(name: &str, headers: &HeaderMap, path: &str) -> Result<Response, Probl
     // Browsers may cache the file but must revalidate it: after an update of the server, old and
     // new scripts must not mix.
     let kept = revalidated(entity_tag(&asset.revision));
-    let answer = ([(CONTENT_TYPE, asset.media_type)], asset.content);
+    let answer = || ([(CONTENT_TYPE, asset.media_type)], asset.content);
     Ok(unless_known(headers, &asset.revision, kept, answer)?)
 }
 

@@ -142,7 +142,7 @@ async fn answer(
     let body = body.map_err(|_| Problem::internal())?;
     let revision = revision_of(&body);
     let about = revalidated(entity_tag(&revision));
-    unless_known(headers, &revision, about, (parts, body))
+    unless_known(headers, &revision, about, || (parts, body))
 }
 
 fn too_large() -> Problem {

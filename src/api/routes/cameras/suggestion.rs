@@ -7,7 +7,7 @@ use axum::{
     response::IntoResponse,
 };
 use lookdown_calibration::native::NativeCalibration;
-use lookdown_lens::self_calibration::{CameraHeight, RoomFit};
+use lookdown_lens::self_calibration::CameraHeight;
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -16,9 +16,9 @@ use crate::{
         ApiState,
         http::problem::{Problem, ProblemKind},
         require_scope::RequireRead,
+        routes::found_lens::FoundLens,
     },
-    room_calibration::tilt_deg,
-    rounding::{degrees, pixels, share},
+    rounding::pixels,
     suggestions::{FRAMES, Suggestion},
 };
 
@@ -184,33 +184,6 @@ impl Refusal {
         Self {
             reason,
             detail: refusal.to_string(),
-        }
-    }
-}
-
-/// The lens that was found.
-#[derive(Serialize, ToSchema)]
-pub(in crate::api::routes) struct FoundLens {
-    /// Field of view of the lens circle, degrees.
-    #[schema(example = 183.2)]
-    field_of_view_deg: f64,
-    /// Angle between the axis of the camera and straight down, degrees.
-    #[schema(example = 4.1)]
-    tilt_deg: f64,
-    /// Number of edges in the frames.
-    edges: usize,
-    /// Share of the length of the edges along three orthogonal directions, 0 to 1.
-    #[schema(example = 0.71)]
-    explained: f64,
-}
-
-impl From<&RoomFit> for FoundLens {
-    fn from(fit: &RoomFit) -> Self {
-        Self {
-            field_of_view_deg: degrees(2.0 * fit.max_theta),
-            tilt_deg: pixels(tilt_deg(fit)),
-            edges: fit.edges,
-            explained: share(fit.explained),
         }
     }
 }
