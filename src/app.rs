@@ -173,7 +173,7 @@ impl App {
                 "detect.follow: persons are followed between searches of the whole frame"
             );
         }
-        let to_load = models_to_load(engine.default_models(), &settings.model.also_load);
+        let to_load = models_to_load(engine.default_models(), &settings);
         let (workers, capacity) = (
             settings.threads.frame_workers,
             settings.limits.max_frames_in_flight,
@@ -278,9 +278,13 @@ impl App {
     }
 }
 
-fn models_to_load(defaults: &DefaultModels, also: &[String]) -> Vec<String> {
+fn models_to_load(defaults: &DefaultModels, settings: &Settings) -> Vec<String> {
     let mut names: Vec<_> = defaults.names().map(ToOwned::to_owned).collect();
-    for name in also {
+    let floor = settings
+        .detect
+        .floor()
+        .then(|| defaults.floor_model().to_owned());
+    for name in settings.model.also_load.iter().chain(&floor) {
         if !names.contains(name) {
             names.push(name.clone());
         }
@@ -367,9 +371,10 @@ fn open(
         }
         None => None,
     };
+    let defaults = DefaultModels::for_device(settings.inference.device);
     let defaults = match &elsewhere {
-        Some((name, _)) => DefaultModels::one(name.clone()),
-        None => DefaultModels::for_device(settings.inference.device),
+        Some((name, _)) => defaults.with_one(name.clone()),
+        None => defaults,
     };
     let called = defaults.model().to_owned();
     let options = RepositoryOptions {

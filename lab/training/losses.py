@@ -1,7 +1,7 @@
 """The losses of NanoDet for a batch: quality focal loss for scores, GIoU for boxes, distribution focal loss for sides; SimOTA assignment.
 
-Shapes: b images, n cells, g boxes of the fullest image. Boxes are left, top, right, bottom in pixels. `kind` (b × g) tells what
-a box is: `ABSENT` fills the rows of images with fewer boxes.
+Shapes: b images, c classes, n cells, g boxes of the fullest image. Boxes are left, top, right, bottom in pixels. `kind` (b × g)
+tells what a box is: `ABSENT` fills the rows of images with fewer boxes, and `PERSON` is the first class.
 """
 
 import torch
@@ -10,7 +10,7 @@ from network import BINS
 
 LARGEST_SIDE = BINS - 1.01
 """The largest distance from a cell to a box side, in strides, that the distribution can express."""
-ABSENT, PERSON, IGNORED = 0, 1, 2
+ABSENT, IGNORED, PERSON = 0, 1, 2
 MOST_CELLS = 10
 """The most cells that answer for one person."""
 
@@ -39,7 +39,7 @@ def within(points, boxes):
 
 def assign(logits, found, points, strides, truth, kind):
     """SimOTA: which cells answer for which true box. Returns the positive cells (b × n) and the box of each cell (b × n)."""
-    person = (kind == PERSON)[..., None]
+    person = (kind >= PERSON)[..., None]
     centre = (truth[..., :2] + truth[..., 2:]) / 2
     off = (points - centre[:, :, None]).abs()
     sides = torch.cat([points - truth[:, :, None, :2], truth[:, :, None, 2:] - points], -1).amax(-1) / strides
@@ -49,7 +49,7 @@ def assign(logits, found, points, strides, truth, kind):
     distance = off.pow(2).sum(-1) + 1e6 * (sides >= LARGEST_SIDE) + 1e3 * (strides > strides.min())
     nearest = torch.zeros_like(allowed).scatter(2, distance.argmin(2, keepdim=True), True)
     allowed = torch.where(allowed.any(2, keepdim=True), allowed, nearest) & person
-    iou, score = pair_iou(truth, found), logits.sigmoid()[:, None]
+    iou, score = pair_iou(truth, found), logits.amax(1).sigmoid()[:, None]
     entropy = -(iou * score.clamp(1e-7).log() + (1 - iou) * (1 - score).clamp(1e-7).log())
     cost = (
         entropy * (iou - score).pow(2) - 3 * (iou + 1e-7).log() + 0.3 * (off / strides[:, None]).pow(2).sum(-1).sqrt()
@@ -66,12 +66,12 @@ def assign(logits, found, points, strides, truth, kind):
 
 
 def hold_loss(logits, sides, first_logits, first_sides, held):
-    """Divergence from the answers of the first network at the cells `held` (b × n); 0 for equal answers.
+    """Divergence from the answers of the first network, of one class, at the cells `held` (b × n); 0 for equal answers.
 
     Of the scores, and of the distributions of box sides with the score of the first network as weight.
     """
-    target = first_logits[held].sigmoid()
-    entropy = lambda x: F.binary_cross_entropy_with_logits(x[held], target, reduction="sum")
+    target = first_logits[:, 0][held].sigmoid()
+    entropy = lambda x: F.binary_cross_entropy_with_logits(x[:, 0][held], target, reduction="sum")
     log, first_log = sides[held].log_softmax(-1), first_sides[held].log_softmax(-1)
     side = ((first_log.exp() * (first_log - log)).sum(-1).mean(1) * target).sum()
     return entropy(logits) - entropy(first_logits) + 0.25 * side
@@ -89,10 +89,11 @@ def batch_losses(logits, sides, found, points, strides, truth, kind, trust):
     image, cell = positive.nonzero(as_tuple=True)
     owner = which[image, cell]
     true, trusted = truth[image, owner], trust[image, owner]
+    which_class = (kind[image, owner] - PERSON).long()
     iou, giou = iou_and_giou(found[image, cell], true)
-    target[image, cell] = iou.detach().clamp(0, 1) * trusted
-    weight = weight.masked_fill(positive, 1.0)
-    w = logits[image, cell].detach().sigmoid().clamp(0.1) * trusted
+    target[image, which_class, cell] = iou.detach().clamp(0, 1) * trusted
+    weight = weight.masked_fill(positive, 1.0)[:, None]
+    w = logits[image, which_class, cell].detach().sigmoid().clamp(0.1) * trusted
     box = ((1 - giou) * w).sum()
     at = points[cell]
     distance = torch.cat([at - true[:, :2], true[:, 2:] - at], 1) / strides[cell][:, None]

@@ -33,7 +33,7 @@ def _read(path):
 
 
 class Network(nn.Module):
-    """NanoDet-g. `forward` returns logits, box-side distributions, and the point and stride of every cell."""
+    """NanoDet-g. `forward` returns the logits of each class, box-side distributions, and the point and stride of every cell."""
 
     def __init__(self, path):
         super().__init__()
@@ -107,15 +107,16 @@ class Network(nn.Module):
         logits, sides, points, strides = [], [], [], []
         for head, stride in zip(HEADS, STRIDES):
             f = values[head]
-            n, _, h, w = f.shape
-            logits.append(f[:, 0].reshape(n, -1))
-            sides.append(f[:, 1:].reshape(n, 4, BINS, -1).permute(0, 3, 1, 2))
+            n, channels, h, w = f.shape
+            classes = channels - 4 * BINS
+            logits.append(f[:, :classes].reshape(n, classes, -1))
+            sides.append(f[:, classes:].reshape(n, 4, BINS, -1).permute(0, 3, 1, 2))
             ys, xs = torch.meshgrid(
                 torch.arange(h, device=f.device) + 0.5, torch.arange(w, device=f.device) + 0.5, indexing="ij"
             )
             points.append(torch.stack([xs, ys], -1).reshape(-1, 2) * stride)
             strides.append(torch.full((h * w,), float(stride), device=f.device))
-        return torch.cat(logits, 1), torch.cat(sides, 1), torch.cat(points), torch.cat(strides)
+        return torch.cat(logits, 2), torch.cat(sides, 1), torch.cat(points), torch.cat(strides)
 
 
 def _fused(steps):

@@ -1,10 +1,11 @@
 """Draws training samples once, as arrays that are mapped into memory, with what teachers say of each person. Numpy, OpenCV, ONNX Runtime.
 
-    python lab/training/pool.py --frames WORK/frames/train --empty WORK/frames/train-empty --views 1 --count 20000 \\
+    python lab/training/pool.py --frames WORK/frames/train --empty WORK/frames/train-empty --count 20000 \\
         --teacher TEACHER.onnx --workers 16 --out WORK/pools/views
 
 `POOL/images.npy`: count × size × size × 3, RGB. `POOL/boxes.npz`: `first` (the first box of each sample), `boxes` (left, top,
-right, bottom), `ignore`, and `teacher`: the highest score of a teacher's box that matches, 1 without teachers.
+right, bottom), `ignore`, `posture` (1 lying, 2 low), and `teacher`: the highest score of a teacher's box that matches, 1
+without teachers.
 """
 
 import argparse
@@ -14,7 +15,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from samples import EmptyFrames, Frames, Mixed
+from samples import EmptyFrames, Frames, Mixed, varied
 
 CHUNK = 100
 """Samples that are drawn with one random generator: the pool does not depend on the number of workers."""
@@ -37,25 +38,30 @@ def source_of(o):
     return Mixed(people, EmptyFrames(o.empty, o.false_alarms), o.empty_share) if o.empty else people
 
 
-def draw(o, number):
-    """Writes the images of chunk `number`. Returns its number, and the boxes, ignore flags and teachers' scores of its samples."""
+def session_of(path):
+    """A teacher on one thread."""
     import onnxruntime
 
-    cv2.setNumThreads(1)
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1
-    teachers = [onnxruntime.InferenceSession(str(path), options) for path in o.teacher]
+    return onnxruntime.InferenceSession(str(path), options)
+
+
+def draw(o, number):
+    """Writes the images of chunk `number`. Returns its number, and boxes, ignore flags, teachers' scores and postures of its samples."""
+    cv2.setNumThreads(1)
+    teachers = [session_of(path) for path in o.teacher]
     images, source = np.load(o.out / "images.npy", mmap_mode="r+"), source_of(o)
     rng, drawn = np.random.default_rng([o.seed, number]), []
     for k in range(number * CHUNK, min(o.count, (number + 1) * CHUNK)):
-        image, boxes, ignore = source.sample(rng, o.size, o.tiles, o.views)
-        images[k] = image
+        image, boxes, ignore, posture = source.sample(rng, o.size, o.crops, o.aimed, o.floor)
+        images[k] = image = varied(image, rng)
         scores = np.zeros(len(boxes), np.float32) if teachers else np.ones(len(boxes), np.float32)
         for teacher in teachers if len(boxes) else ():
             given = image.transpose(2, 0, 1)[None].astype(np.float32)
             found, certain = teacher.run(["boxes", "scores"], {"images": given})
             scores = np.maximum(scores, teacher_scores(boxes, found[0], certain[0].reshape(-1)))
-        drawn.append((np.asarray(boxes, np.float32).reshape(-1, 4), np.asarray(ignore, bool), scores))
+        drawn.append((boxes, ignore, scores, posture))
     return number, drawn
 
 
@@ -65,8 +71,9 @@ def main():
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--count", type=int, default=20_000)
     parser.add_argument("--size", type=int, default=416)
-    parser.add_argument("--tiles", type=float, default=0.5, help="share of quarter-turn tiles; the rest are crops")
-    parser.add_argument("--views", type=float, default=0.0, help="share of upright perspective views among all samples")
+    parser.add_argument("--crops", type=float, default=0.0, help="share of narrow views around a person")
+    parser.add_argument("--aimed", type=float, default=0.0, help="share of wide views that look toward a person")
+    parser.add_argument("--floor", action="store_true", help="look at people on the floor most of the time")
     parser.add_argument("--empty", type=Path, help="a folder of frames without people: hard negatives")
     parser.add_argument("--empty-share", type=float, default=0.5, help="share of samples without people")
     parser.add_argument("--false-alarms", type=Path, help="COCO results in the empty frames: places of crops")
@@ -85,9 +92,10 @@ def main():
             if done % 10 == 0 or done == chunks:
                 left = (time.time() - start) / done * (chunks - done)
                 print(f"{done * CHUNK}/{o.count} samples, {left:.0f} s left", flush=True)
-    boxes, ignore, teacher = zip(*(sample for number in range(chunks) for sample in samples[number]))
+    boxes, ignore, teacher, posture = zip(*(sample for number in range(chunks) for sample in samples[number]))
     first = np.cumsum([0, *map(len, boxes)])
-    gathered = dict(boxes=np.concatenate(boxes), ignore=np.concatenate(ignore), teacher=np.concatenate(teacher))
+    gathered = dict(boxes=boxes, ignore=ignore, teacher=teacher, posture=posture)
+    gathered = {name: np.concatenate(parts) for name, parts in gathered.items()}
     np.savez(o.out / "boxes.npz", first=first, **gathered)
     seen = np.mean(gathered["teacher"][~gathered["ignore"]] >= 0.3)
     print(f"{o.out}: {o.count} samples, {first[-1]} boxes, {100 * seen:.0f} % with a teacher's score of 0.3 or more")

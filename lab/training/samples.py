@@ -1,8 +1,4 @@
-"""Training samples out of composed frames: quarter-turn tiles, crops, and upright perspective views. Numpy and OpenCV only.
-
-A frame is turned by a multiple of 90°, so that axis-parallel boxes stay exact; persons who then stand farther than
-`UPRIGHT_LIMIT` from upright are ignored, since another turn has them upright.
-"""
+"""Training samples out of composed frames: upright perspective views, and narrow ones around a person. Numpy and OpenCV only."""
 
 import json
 import math
@@ -10,15 +6,9 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from generator import pose as poses
 from generator.boxes import axis_box
-from generator.geometry import circle_radius, lens_of, pixels_of
-
-UPRIGHT_LIMIT = 62.0
-"""Degrees between a person's foot-to-head direction and the sample's up."""
-BELOW_CAMERA = 12.0
-"""Degrees from straight down within which a person has no upright direction and counts in every turn."""
-TILE_WIDTH = 1.5
-"""Side of a tile in radii of the lens circle: from the rim down to half a radius beyond the center."""
+from generator.geometry import lens_of, pixels_of
 
 RINGS = ((0.05, 75.0, 0.15), (0.85, 90.0, 0.45), (1.25, 45.0, 0.4))
 """Perspective views as the profiles have them: angle from straight down (radians), field of view (degrees), share."""
@@ -26,49 +16,47 @@ VIEW_MARGIN = 0.5
 """Persons are followed this far beyond each border of a view, in its width, to know how much of them it cuts off."""
 OUTSIDE = -1e4
 """A column and row outside of every frame."""
-
-
-def turned(width, height, boxes, angles, quarter):
-    """Boxes (x0, y0, x1, y1) and upright angles in an image turned by `quarter` · 90° counter-clockwise, and its size."""
-    boxes, angles = boxes.copy(), (np.asarray(angles, float) - 90 * quarter + 180) % 360 - 180
-    for _ in range(quarter % 4):
-        boxes = np.stack([boxes[:, 1], width - boxes[:, 2], boxes[:, 3], width - boxes[:, 0]], 1)
-        width, height = height, width
-    return width, height, boxes, angles
-
-
-def cut(image, boxes, ignore, x, y, scale, size):
-    """The square sample at (x, y) with `scale` sample pixels an image pixel. Boxes are clipped; scraps are ignored."""
-    matrix = np.array([[scale, 0, -x * scale + 0.5 * scale - 0.5], [0, scale, -y * scale + 0.5 * scale - 0.5]])
-    source = cv2.GaussianBlur(image, (0, 0), 0.45 / scale) if scale < 0.75 else image
-    sample = cv2.warpAffine(source, matrix, (size, size), flags=cv2.INTER_LINEAR, borderValue=(0, 0, 0))
-    return sample, *kept((boxes - (x, y, x, y)) * scale, ignore, size)
+NEAR_NADIR = 0.25
+"""Angle from straight down, radians, within which a crop has no upright direction."""
+FILL = (0.22, 0.75)
+"""The share of a crop's side that its person fills."""
+STANDING_SHARE = 0.2
+"""How often a person who is not on the floor is a place to look at, where those on the floor are learned."""
+FAR_DEG = 68
+"""Angle from straight down beyond which no view looks for people on the floor: 6 m from a camera 2.5 m above them."""
+LYING, LOW = 1, 2
+POSTURES = dict.fromkeys(poses.LYING, LYING) | dict.fromkeys((*poses.LOW, "crouching"), LOW)
+"""The postures on the floor by pose; 0 for all others."""
 
 
 def kept(moved, ignore, size):
-    """Boxes of a sample, clipped to it, and ignore flags. Scraps are ignored, and less than those dropped."""
+    """Boxes of a sample, clipped to it, ignore flags, and which are kept. Scraps are ignored, and less than those dropped."""
     clipped = np.clip(moved, 0, size)
     area = lambda b: np.clip(b[:, 2] - b[:, 0], 0, None) * np.clip(b[:, 3] - b[:, 1], 0, None)
     left = area(clipped) / np.maximum(area(moved), 1e-6)
     sides = np.minimum(clipped[:, 2] - clipped[:, 0], clipped[:, 3] - clipped[:, 1])
     keep = (left > 0.05) & (sides > 1)
-    return clipped[keep].astype(np.float32), (ignore | (left < 0.5) | (sides < 5))[keep]
+    return clipped[keep].astype(np.float32), (ignore | (left < 0.5) | (sides < 5))[keep], keep
 
 
-def jitter(image, rng):
-    """Small changes of color."""
+def varied(image, rng):
+    """Small changes of color and of sharpness; a quarter is gray with noise, as at night."""
     out = image.astype(np.float32) * rng.uniform(0.75, 1.3) + rng.uniform(-18, 18)
+    if rng.random() < 0.25:
+        noise = rng.normal(size=(*out.shape[:2], 1)) * rng.uniform(0, 8)
+        out = np.repeat(out.mean(2, keepdims=True) + noise, 3, 2)
+    out = out * rng.uniform(0.93, 1.07, 3)
     if rng.random() < 0.15:
-        out = np.repeat(out.mean(2, keepdims=True), 3, 2)
-    return np.clip(out * rng.uniform(0.93, 1.07, 3), 0, 255).astype(np.uint8)
+        out = cv2.GaussianBlur(out, (0, 0), rng.uniform(0.4, 1.2))
+    return np.clip(out, 0, 255).astype(np.uint8)
 
 
-def varied(image, boxes, rng):
-    """A square sample with its boxes, mirrored half of the time, with small changes of color."""
-    if rng.random() < 0.5:
-        image, size = image[:, ::-1], image.shape[1]
-        boxes = np.stack([size - boxes[:, 2], boxes[:, 1], size - boxes[:, 0], boxes[:, 3]], 1)
-    return jitter(image, rng), boxes
+def ring_axes(up):
+    """The world's down in the camera, and the two directions across it at azimuth 0 and at a quarter turn."""
+    down = -np.asarray(up, float)
+    across = np.cross(down, [1.0, 0, 0] if abs(down[0]) < 0.9 else [0, 1.0, 0])
+    across /= np.linalg.norm(across)
+    return down, across, np.cross(down, across)
 
 
 def view_rays(up, theta, phi, field_of_view, roll, size, margin):
@@ -77,10 +65,8 @@ def view_rays(up, theta, phi, field_of_view, roll, size, margin):
     `up`: the world's up in the camera. The view looks `theta` away from straight down, at azimuth `phi`; angles in radians.
     The array reaches `margin` pixels beyond each border.
     """
-    down = -np.asarray(up, float)
-    across = np.cross(down, [1.0, 0, 0] if abs(down[0]) < 0.9 else [0, 1.0, 0])
-    across /= np.linalg.norm(across)
-    outward = math.cos(phi) * across + math.sin(phi) * np.cross(down, across)
+    down, across, along = ring_axes(up)
+    outward = math.cos(phi) * across + math.sin(phi) * along
     ahead = math.cos(theta) * down + math.sin(theta) * outward
     below = math.sin(theta) * down - math.cos(theta) * outward
     right = np.cross(below, ahead)
@@ -97,6 +83,17 @@ def frame_maps(rays, native_lens):
     return [np.where(outside, OUTSIDE, at).astype(np.float32) for at in (columns, rows)]
 
 
+def ray_at(native_lens, x, y):
+    """The direction in the camera of a pixel."""
+    lens = lens_of(native_lens)
+    azimuth, theta = math.atan2(y - lens["cy"], x - lens["cx"]), np.linspace(0, lens["max_theta"], 400)
+    rays = np.stack([np.sin(theta) * math.cos(azimuth), np.sin(theta) * math.sin(azimuth), np.cos(theta)], -1)
+    columns, rows, _ = pixels_of(lens, lens["cx"], lens["cy"], rays)
+    radii = np.hypot(columns - lens["cx"], rows - lens["cy"])
+    at = np.interp(math.hypot(x - lens["cx"], y - lens["cy"]), radii, theta)
+    return np.array([math.sin(at) * math.cos(azimuth), math.sin(at) * math.sin(azimuth), math.cos(at)])
+
+
 class Frames:
     """The composed frames of one split."""
 
@@ -108,27 +105,13 @@ class Frames:
         for a in data["annotations"]:
             self.annotations[a["image_id"]].append(a)
 
-    def load(self, k):
-        """Image (RGB), boxes, upright angles (NaN below the camera: upright in every turn), ignore flags, circle's center and radius."""
-        about = self.images[k]
-        image = cv2.cvtColor(cv2.imread(str(self.folder / "images" / about["file_name"])), cv2.COLOR_BGR2RGB)
-        found = self.annotations[about["id"]]
-        boxes = np.array([(x, y, x + w, y + h) for x, y, w, h in (a["bbox"] for a in found)], float).reshape(-1, 4)
-        lens = json.loads((self.folder / "calibrations" / f"{about['calibration']}.json").read_text())["lens"]
-        radius = circle_radius(lens)
-        angles = np.array([a["upright_deg"] if a["nadir_deg"] > BELOW_CAMERA else np.nan for a in found])
-        return (
-            image,
-            boxes,
-            angles,
-            np.array([a["ignore"] for a in found], bool),
-            (lens["cx"], lens["cy"], radius),
-        )
+    def calibration(self, k):
+        """The native calibration of frame `k`."""
+        return json.loads((self.folder / "calibrations" / f"{self.images[k]['calibration']}.json").read_text())
 
     def view(self, k, size, theta, phi, field_of_view, roll=0.0):
-        """An upright perspective view of frame `k`: image (size × size × 3), boxes, ignore flags. Angles in radians."""
-        about = self.images[k]
-        native = json.loads((self.folder / "calibrations" / f"{about['calibration']}.json").read_text())
+        """An upright perspective view of frame `k`: image (size × size × 3), boxes, ignore flags, postures. Angles in radians."""
+        about, native = self.images[k], self.calibration(k)
         margin = round(VIEW_MARGIN * size)
         rays = view_rays(native["mount"]["world_up"], theta, phi, field_of_view, roll, size, margin)
         columns, rows = frame_maps(rays, native["lens"])
@@ -137,62 +120,57 @@ class Frames:
         inner = slice(margin, margin + size)
         frame = cv2.imread(str(self.folder / "images" / about["file_name"]))
         image = cv2.remap(frame, columns[inner, inner], rows[inner, inner], cv2.INTER_LINEAR)
-        found = [(axis_box(ids == a["id_value"]), a["ignore"]) for a in self.annotations[about["id"]]]
-        found = [(box, ignore) for box, ignore in found if box]
+        found = [(axis_box(ids == a["id_value"]), a) for a in self.annotations[about["id"]]]
+        found = [(box, a) for box, a in found if box]
         boxes = np.array([box for box, _ in found], float).reshape(-1, 4)
         boxes[:, 2:] += boxes[:, :2]
-        boxes, ignore = kept(boxes - margin, np.array([ignore for _, ignore in found], bool), size)
-        return cv2.cvtColor(image, cv2.COLOR_BGR2RGB), boxes, ignore
+        boxes, ignore, keep = kept(boxes - margin, np.array([a["ignore"] for _, a in found], bool), size)
+        postures = np.array([POSTURES.get(a["pose"], 0) for _, a in found], np.int8)[keep]
+        return cv2.cvtColor(image, cv2.COLOR_BGR2RGB), boxes, ignore, postures
 
-    def random_view(self, rng, size):
-        """A random upright perspective view."""
-        theta, field_of_view, _ = RINGS[rng.choice(len(RINGS), p=[share for _, _, share in RINGS])]
-        theta, phi = theta + rng.normal() * 0.12, rng.uniform(0, 2 * math.pi)
-        field_of_view = math.radians(field_of_view * rng.uniform(0.85, 1.15))
-        k = int(rng.integers(len(self.images)))
-        return self.view(k, size, theta, phi, field_of_view, roll=rng.normal() * 0.04)
+    def places(self, k, rng, floor):
+        """The boxes of frame `k` that a view may look at."""
+        seen = [a for a in self.annotations[self.images[k]["id"]] if not a["ignore"]]
+        is_near = lambda a: a["nadir_deg"] < FAR_DEG and (a["pose"] in POSTURES or rng.random() < STANDING_SHARE)
+        wanted = lambda a: not floor or is_near(a)
+        return [a["bbox"] for a in seen if wanted(a)]
 
-    def sample(self, rng, size, tile_share=0.5, view_share=0.0):
-        """One random sample: image (size × size × 3), boxes, ignore flags."""
-        if rng.random() < view_share:
-            image, boxes, ignore = self.random_view(rng, size)
+    def sample(self, rng, size, crops=0.35, aimed=0.0, floor=False):
+        """One random sample: image (size × size × 3), boxes, ignore flags, postures.
+
+        A share of `crops` lies closely around a place, and the share `aimed` has it in a view as the profiles have them.
+        With `floor`, most places are people on the floor.
+        """
+        k, which, roll = int(rng.integers(len(self.images))), rng.random(), rng.normal() * 0.04
+        places = self.places(k, rng, floor) if which < crops + aimed else []
+        if not places:
+            theta, field_of_view, _ = RINGS[rng.choice(len(RINGS), p=[share for _, _, share in RINGS])]
+            theta, phi = theta + rng.normal() * 0.1, rng.uniform(0, 2 * math.pi)
+            field_of_view = math.radians(field_of_view * rng.uniform(0.85, 1.15))
+            return self.view(k, size, theta, phi, field_of_view, roll)
+        x, y, width, height = places[int(rng.integers(len(places)))]
+        native = self.calibration(k)
+        ray = ray_at(native["lens"], x + width / 2, y + height / 2)
+        down, across, along = ring_axes(native["mount"]["world_up"])
+        at, phi = math.acos(np.clip(ray @ down, -1, 1)), math.atan2(ray @ along, ray @ across)
+        if which < crops:
+            corners = [ray_at(native["lens"], x, y), ray_at(native["lens"], x + width, y + height)]
+            fill = math.exp(rng.uniform(*np.log(FILL)))
+            field_of_view = float(np.clip(math.acos(np.clip(corners[0] @ corners[1], -1, 1)) / fill, 0.12, 1.5))
+            theta, aside = at + rng.normal() * 0.12 * field_of_view, 0.12
+            roll = rng.uniform(0, 2 * math.pi) if at < NEAR_NADIR else 2 * roll
         else:
-            image, boxes, ignore = self.turned_sample(rng, size, tile_share)
-        return *varied(image, boxes, rng), ignore
-
-    def turned_sample(self, rng, size, tile_share):
-        """A random tile or crop of a turned frame."""
-        image, boxes, angles, ignore, (cx, cy, radius) = self.load(int(rng.integers(len(self.images))))
-        quarter = int(rng.integers(4))
-        centre = np.array([[cx, cy, cx, cy]]) + 0.5  # Boxes count from a pixel's corner.
-        _, _, (*boxes, centre), angles = turned(
-            image.shape[1], image.shape[0], np.concatenate([boxes, centre]), angles, quarter
-        )
-        boxes, (cx, cy) = np.array(boxes).reshape(-1, 4), centre[:2]
-        image = np.ascontiguousarray(np.rot90(image, quarter))
-        ignore = ignore | (np.abs(angles) > UPRIGHT_LIMIT)
-        usable = np.flatnonzero(~ignore)
-        if rng.random() < tile_share or not len(usable):
-            scale = size / (TILE_WIDTH * radius) * rng.uniform(0.9, 1.15)
-            x, y = (
-                cx - TILE_WIDTH * radius / 2 + rng.normal() * 0.05 * radius,
-                cy - radius + rng.normal() * 0.04 * radius,
-            )
-        else:
-            x0, y0, x1, y1 = boxes[rng.choice(usable)]
-            scale = size * math.exp(rng.uniform(math.log(0.12), math.log(0.7))) / max(x1 - x0, y1 - y0)
-            scale = min(scale, 4.0)
-            x, y = (
-                (x0 + x1) / 2 - size / scale * rng.uniform(0.25, 0.75),
-                (y0 + y1) / 2 - size / scale * rng.uniform(0.25, 0.75),
-            )
-        return cut(image, boxes, ignore, x, y, scale, size)
+            theta, field_of_view, _ = min(RINGS, key=lambda ring: abs(ring[0] - at) + rng.uniform(0, 0.5))
+            theta, aside = theta + rng.normal() * 0.1, 0.35
+            field_of_view = math.radians(field_of_view * rng.uniform(0.85, 1.15))
+        phi += rng.normal() * aside * field_of_view / max(0.3, math.sin(at))
+        return self.view(k, size, theta, phi, field_of_view, roll)
 
 
 class EmptyFrames(Frames):
-    """Frames without people, all of whose cells are negatives. Crops lie around what is taken for a person.
+    """Frames without people, all of whose cells are negatives. Views look at what is taken for a person.
 
-    `false_alarms`: COCO results of detections in these frames, for more places of crops than the annotated distractors.
+    `false_alarms`: COCO results of detections in these frames, for more places than the annotated distractors.
     """
 
     def __init__(self, folder, false_alarms=None):
@@ -201,26 +179,12 @@ class EmptyFrames(Frames):
             raise SystemExit(f"{folder} has people; --empty takes frames of `make.py empty`")
         data = json.loads((self.folder / "annotations.json").read_text())
         found = json.loads(Path(false_alarms).read_text()) if false_alarms else []
-        self.places = {image["id"]: [] for image in self.images}
+        self.looked_at = {image["id"]: [] for image in self.images}
         for place in data["distractors"] + found:
-            self.places[place["image_id"]].append(place["bbox"])
+            self.looked_at[place["image_id"]].append(place["bbox"])
 
-    def load(self, k):
-        """As of frames with people, with the places of crops instead of persons."""
-        image, _, _, _, (cx, cy, radius) = super().load(k)
-        places = self.places[self.images[k]["id"]]
-        boxes = np.array([(x, y, x + w, y + h) for x, y, w, h in places], float).reshape(-1, 4)
-        return image, boxes, outward_angles(boxes, cx, cy), np.zeros(len(boxes), bool), (cx, cy, radius)
-
-    def sample(self, rng, size, tile_share=0.5, view_share=0.0):
-        image, boxes, ignore = super().sample(rng, size, tile_share, view_share)
-        return image, boxes[:0], ignore[:0]
-
-
-def outward_angles(boxes, cx, cy):
-    """Directions from the center of the lens circle to the middles of boxes, degrees clockwise from the image's up."""
-    middle = (boxes[:, :2] + boxes[:, 2:]) / 2
-    return np.degrees(np.arctan2(middle[:, 0] - cx, cy - middle[:, 1]))
+    def places(self, k, rng, floor):
+        return self.looked_at[self.images[k]["id"]]
 
 
 class Mixed:
@@ -229,6 +193,6 @@ class Mixed:
     def __init__(self, people, empty, share):
         self.people, self.empty, self.share = people, empty, share
 
-    def sample(self, rng, size, tile_share=0.5, view_share=0.0):
+    def sample(self, rng, size, *how):
         source = self.empty if rng.random() < self.share else self.people
-        return source.sample(rng, size, tile_share, view_share)
+        return source.sample(rng, size, *how)

@@ -17,7 +17,9 @@ from assets.runtime import pinned_runtime
 
 ROOT = Path(__file__).resolve().parents[2]
 # Our networks: every package has them.
-MODELS = tuple(f"nanodet_g_{views}_416{precision}" for views in ("views", "fisheye") for precision in ("", "_fp16"))
+MODELS = tuple(
+    f"nanodet_g_{views}_416{precision}" for views in ("views", "fisheye", "floor") for precision in ("", "_fp16")
+)
 NOT_STATED = "NOASSERTION"
 # A namespace of our own; the identifiers that are derived from it must never change.
 NAMESPACE = uuid.UUID("6c1f4a52-3c0e-4b57-9f59-0f6b1f0f6d35")

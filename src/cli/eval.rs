@@ -188,6 +188,7 @@ fn group(
             ("profile", Some(profile.name())),
             ("refine", Some(refinement.name())),
             ("model", arguments.model.as_deref()),
+            (DetectParameters::FLOOR, arguments.floor.then_some("true")),
             ("score_threshold", Some(arguments.score_threshold.as_str())),
             ("iou_threshold", arguments.iou_threshold.as_deref()),
             ("sigma", arguments.sigma.as_deref()),
@@ -222,6 +223,9 @@ pub(in crate::cli) struct Arguments {
     /// Model [default: the profile's]
     #[arg(long, value_name = "NAME")]
     model: Option<String>,
+    /// Look for people on the floor as well
+    #[arg(long)]
+    floor: bool,
     /// Ignore persons with a lower score, 0 to 1
     #[arg(long, value_name = "SCORE", default_value = DEFAULT_SCORE_THRESHOLD)]
     score_threshold: String,

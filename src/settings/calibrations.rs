@@ -7,7 +7,7 @@
 use std::{num::NonZeroU64, path::PathBuf, sync::LazyLock};
 
 use lookdown_detect::{
-    parameters::{DetectDefaults, ParameterSpec},
+    parameters::{DetectDefaults, DetectParameters, ParameterSpec},
     pipeline::EngineOptions,
 };
 use lookdown_lens::self_calibration::IdealLens;
@@ -20,6 +20,7 @@ use super::{
         Form, MAX_BYTES, Refusal, flag, optional, optional_text, path, poll_seconds, variant, whole,
     },
     locate::DEFAULT_CALIBRATIONS,
+    results::CountSettings,
     values::Values,
 };
 
@@ -80,6 +81,12 @@ impl Table for DetectDefaults {
             if let Some(Some(value)) = values.get(key, &value(spec))? {
                 given.push((spec.name, value));
             }
+        }
+        let names_floor = given
+            .iter()
+            .any(|(name, _)| *name == DetectParameters::FLOOR);
+        if !names_floor && CountSettings::read(values)?.floor_alert {
+            given.push((DetectParameters::FLOOR, "true".to_owned()));
         }
         let pairs = given.iter().map(|(name, value)| (*name, value.as_str()));
         Self::parse(pairs).map_err(|error| SettingsError::hidden("detect", error))

@@ -124,6 +124,7 @@ impl Detector for EagerDetector {
         let person = ViewDetection {
             bbox: BBox::new([24.0, 16.0, 40.0, 48.0]).unwrap(),
             score: 0.9,
+            posture: None,
         };
         let crowd = self.gate.state.lock().unwrap().crowd;
         let view: Vec<_> = std::iter::once(person)
@@ -144,5 +145,6 @@ fn passer_by(number: u32) -> ViewDetection {
     ViewDetection {
         bbox: BBox::new([x_min, y_min, x_min + side, y_min + side]).unwrap(),
         score: 0.05 + 0.8 * f64::from(number % 89) / 89.0,
+        posture: None,
     }
 }

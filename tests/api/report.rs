@@ -15,7 +15,7 @@ use lookdown_detect::{
     },
 };
 use lookdown_lens::geometry::{
-    OrientedBox, PersonHeight, Pixel, Posture,
+    FloorVotes, OrientedBox, PersonHeight, Pixel, Posture,
     floor::{Bearing, FloorPosition},
 };
 
@@ -44,6 +44,10 @@ fn person() -> Person {
             foot_angle: 1.0,
         }),
         posture: (Posture::Upright, 0.912_34),
+        floor_votes: Some(FloorVotes {
+            lying: 0.051_27,
+            low: 0.0,
+        }),
         views: 3,
         zones: Some(vec!["entrance".to_owned()]),
     }

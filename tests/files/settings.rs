@@ -209,6 +209,16 @@ fn draining_takes_as_long_as_a_request_by_default() {
 }
 
 #[test]
+fn floor_alerts_look_for_people_on_the_floor_by_default() {
+    let floor = |text: &str| from_file(text).unwrap().detect.floor();
+    assert!(!floor(""));
+    assert!(floor("counts.floor_alert = true"));
+    assert!(!floor(
+        "counts.floor_alert = true\ndetect.floor = \"false\""
+    ));
+}
+
+#[test]
 fn the_default_number_of_sessions_follows_from_the_machine() {
     let sessions = defaults().threads.sessions;
     assert_eq!(sessions, std::thread::available_parallelism().unwrap());

@@ -207,6 +207,10 @@ pub struct ReportPerson {
     /// Probability of the most likely posture; below 0.6 the posture is `unknown`.
     #[serde(default)]
     pub posture_probability: f64,
+    /// Votes for a person on the floor; absent without the parameter `floor`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub floor_votes: Option<ReportFloorVotes>,
     /// Number of views that detected the person.
     pub views: usize,
     /// Names of the zones that contain the person's foot point; absent without zones.
@@ -218,6 +222,15 @@ pub struct ReportPerson {
 /// The posture in reports of earlier versions.
 fn unknown() -> Cow<'static, str> {
     Cow::Borrowed("unknown")
+}
+
+/// Mean votes of the views for a person on the floor, 0 to 1.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ReportFloorVotes {
+    /// For a person who lies.
+    pub lying: f64,
+    /// For a person who crouches, kneels, crawls or sits on the floor.
+    pub low: f64,
 }
 
 /// Corner-origin frame pixels: a full frame is 0, 0, width, height.

@@ -6,7 +6,7 @@ use lookdown_common::{
     report::{Report, ReportCalibration, ReportImage, ReportPerson},
     text::is_camera_name,
 };
-use lookdown_lens::geometry::{BoxAngles, OrientedBox, Pixel};
+use lookdown_lens::geometry::{BoxAngles, FloorVotes, OrientedBox, Pixel, PostureSigns};
 use lookdown_tracking::Observation;
 use serde::{Deserialize, Serialize};
 
@@ -156,14 +156,20 @@ fn observation(
         .with_head_toward(&definition.up_at(center));
     let foot = oriented.foot();
     let camera = definition.geometry.as_ref();
-    let angles = camera.and_then(|camera| BoxAngles::new(&oriented, &camera.lens, &camera.mount));
+    let signs = PostureSigns {
+        angles: camera.and_then(|camera| BoxAngles::new(&oriented, &camera.lens, &camera.mount)),
+        votes: person.floor_votes.map(|votes| FloorVotes {
+            lying: votes.lying,
+            low: votes.low,
+        }),
+    };
     Some(Observation {
         floor_m: person.floor.map(|floor| [floor.x_m, floor.y_m]),
         azimuth_deg: bearing.azimuth_deg,
         off_axis_deg: bearing.off_axis_deg,
         center_px: [reported.cx, reported.cy],
         size_px: [reported.width, reported.height],
-        angles,
+        signs,
         foot_px: [foot.x, foot.y],
         score: person.score,
         is_in_margin,

@@ -38,7 +38,7 @@ pub use oriented_box::OrientedBox;
 pub use panorama::Panorama;
 pub use person_height::PersonHeight;
 pub use polygon::{Polygon, PolygonError};
-pub use posture::{BoxAngles, Posture, PostureBelief};
+pub use posture::{BoxAngles, FloorVotes, Posture, PostureBelief, PostureSigns};
 pub use view_plan::{FieldOfViewReading, ViewPlan};
 pub use virtual_view::VirtualView;
 pub use zone::{Zone, ZoneArea};

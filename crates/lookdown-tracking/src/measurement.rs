@@ -3,7 +3,7 @@
 //! Errors along the ray's floor direction (radial) are larger than those across it: the box of a
 //! person is several times as long as wide, and its lower end decides the place.
 
-use lookdown_lens::geometry::BoxAngles;
+use lookdown_lens::geometry::PostureSigns;
 use nalgebra::{Matrix2, Unit, Vector2, Vector3};
 
 use crate::{CameraPose, MeasurementNoise, settings::Place};
@@ -171,8 +171,8 @@ pub struct Observation {
     /// Middle of the oriented box's lower side in frame pixels (x, y): lines and zones in the frame
     /// count this point.
     pub foot_px: [f64; 2],
-    /// The same box in angles, which tell the posture; absent near the rim of the lens.
-    pub angles: Option<BoxAngles>,
+    /// Signs of the posture.
+    pub signs: PostureSigns,
     /// Probability that this is a person (0 to 1).
     pub score: f64,
     /// True for a person in the margin around the camera's areas, who continues tracks but does not

@@ -1,5 +1,7 @@
 //! Persons and trackers for tests.
 
+use lookdown_lens::geometry::PostureSigns;
+
 use crate::{CameraPose, Observation, Tracker, TrackerSettings};
 
 /// Height of the test cameras, meters.
@@ -19,7 +21,7 @@ pub(crate) fn with_score(x: f64, y: f64, score: f64) -> Observation {
         off_axis_deg: x.hypot(y).atan2(CAMERA_M).to_degrees(),
         center_px: px,
         size_px: [40.0, 80.0],
-        angles: None,
+        signs: PostureSigns::default(),
         foot_px: px,
         score,
         is_in_margin: false,

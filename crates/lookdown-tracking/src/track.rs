@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use lookdown_lens::geometry::{Posture, PostureBelief};
+use lookdown_lens::geometry::{Posture, PostureBelief, PostureSigns};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -150,14 +150,15 @@ impl Track {
 
     fn record(&mut self, seen: &Sighting) {
         self.missed = 0;
-        if let Some(angles) = &seen.person.angles {
+        let signs = &seen.person.signs;
+        if *signs != PostureSigns::default() {
             let is_first = self.seen_by.is_empty();
             let elapsed_s = if is_first {
                 f64::INFINITY
             } else {
                 seen.at_s - self.seen_s
             };
-            self.posture.add(angles, seen.camera_m, elapsed_s);
+            self.posture.add(signs, seen.camera_m, elapsed_s);
         }
         self.seen_s = self.seen_s.max(seen.at_s);
         self.last_person = seen.source;

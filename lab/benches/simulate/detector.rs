@@ -3,7 +3,7 @@
 //! The figures of the detector are in `figures`; docs/lab/count-accuracy.md has the assumptions.
 
 use lookdown_lens::geometry::{
-    Lens, Mount, OrientedBox, Pixel, Ray,
+    Lens, Mount, OrientedBox, Pixel, PostureSigns, Ray,
     floor::{FloorPosition, bearing, floor_position, pixel_of},
     oriented_box::vertical_in_frame,
 };
@@ -293,7 +293,7 @@ impl Camera {
                 off_axis_deg: seen.off_axis.to_degrees(),
                 center_px: [oriented.center.x, oriented.center.y],
                 size_px: [oriented.width, oriented.height],
-                angles: None,
+                signs: PostureSigns::default(),
                 foot_px: [foot.x, foot.y],
                 score,
                 is_in_margin: false,

@@ -3,7 +3,7 @@
 use anyhow::Result;
 use lookdown_lens::{
     geometry::{
-        Lens, Mount, OrientedBox, Pixel,
+        Lens, Mount, OrientedBox, Pixel, PostureSigns,
         floor::{bearing, floor_position},
         oriented_box::vertical_in_frame,
     },
@@ -101,7 +101,7 @@ impl View {
             foot_px: foot.into(),
             score,
             is_in_margin: false,
-            angles: None,
+            signs: PostureSigns::default(),
         })
     }
 }

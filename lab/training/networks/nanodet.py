@@ -1,4 +1,6 @@
-"""NanoDet-g trained on COCO, from its TensorFlow.js form: `MODEL_JSON ONNX`.
+"""NanoDet-g trained on COCO, from its TensorFlow.js form: `MODEL_JSON ONNX [CLASSES]`.
+
+With two classes, both scores are those of a person: a start for networks that find people who lie and who are low.
 
 NanoDet predicts, per cell, the distances from the cell's center to the four sides of the box, each as a
 distribution over whole strides (Li et al., Generalized Focal Loss, 2020).
@@ -40,10 +42,10 @@ DESCRIPTION = (
 )
 
 
-def convert(model_json: Path, onnx_file: Path) -> None:
+def convert(model_json: Path, onnx_file: Path, classes: int) -> None:
     """Reads the TensorFlow.js model and writes the ONNX file."""
     graph = read_tfjs(model_json)
-    _keep_person_class(graph)
+    _keep_person_class(graph, classes)
     _take_red_first(graph)
     builder = OnnxBuilder()
     centred = builder.node("Sub", ["images", _per_channel(builder, MEAN)])
@@ -55,13 +57,17 @@ def convert(model_json: Path, onnx_file: Path) -> None:
         channels_first_feeds=frozenset({"input_1"}),
         resize_factors=RESIZE_FACTORS,
     )
-    boxes, scores = decode(builder, [translator.feature_map(output) for _, output in HEADS.values()])
-    builder.save_detector(onnx_file, boxes=boxes, scores=scores, size=SIZE, anchors=BEST_CELLS, description=DESCRIPTION)
+    boxes, scores = decode(builder, [translator.feature_map(output) for _, output in HEADS.values()], classes)
+    outputs = {
+        "boxes": (boxes, [BEST_CELLS, 4]),
+        "scores": (scores, [BEST_CELLS, classes] if classes > 1 else [BEST_CELLS]),
+    }
+    builder.save(onnx_file, outputs=outputs, height=SIZE, width=SIZE, description=DESCRIPTION)
 
 
-def _keep_person_class(graph: TfGraph) -> None:
+def _keep_person_class(graph: TfGraph, classes: int) -> None:
     """Drops the other classes from the last convolutions: channels are the classes, then 4 sides x 11 bins."""
-    channels = [PERSON_CLASS, *range(CLASSES, CLASSES + 4 * DISTANCE_BINS)]
+    channels = [PERSON_CLASS] * classes + [*range(CLASSES, CLASSES + 4 * DISTANCE_BINS)]
     for convolution, output in HEADS.values():
         for name in (graph.node(convolution).inputs[1], graph.node(output).inputs[1]):
             graph.constants[name] = graph.constant(name)[..., channels]
@@ -73,14 +79,19 @@ def _take_red_first(graph: TfGraph) -> None:
     graph.constants[name] = graph.constant(name)[:, :, ::-1, :]
 
 
-def decode(builder: OnnxBuilder, heads: list[str]) -> tuple[str, str]:
-    """Boxes `[N, BEST_CELLS, 4]` and scores `[N, BEST_CELLS]` of the heads `[N, 1 + 44, rows, columns]`, best first.
+def decode(builder: OnnxBuilder, heads: list[str], classes: int = 1) -> tuple[str, str]:
+    """Boxes `[N, BEST_CELLS, 4]` and scores `[N, BEST_CELLS]`, or `[N, BEST_CELLS, classes]`, of the heads `[N, classes + 44, rows, columns]`.
 
-    Only the best cells are decoded: the distributions of all others would be computed for nothing.
+    The best cells come first. Only they are decoded: the distributions of all others would be computed for nothing.
     """
-    flat = [builder.reshape(head, [0, 1 + 4 * DISTANCE_BINS, -1]) for head in heads]
-    logits, bins = builder.split(builder.node("Concat", flat, axis=2), [1, 4 * DISTANCE_BINS], axis=1)
-    best, cells = builder.top(builder.reshape(logits, [0, -1]), BEST_CELLS)
+    flat = [builder.reshape(head, [0, classes + 4 * DISTANCE_BINS, -1]) for head in heads]
+    logits, bins = builder.split(builder.node("Concat", flat, axis=2), [classes, 4 * DISTANCE_BINS], axis=1)
+    highest = logits if classes == 1 else builder.node("ReduceMax", [logits], axes=[1])
+    best, cells = builder.top(builder.reshape(highest, [0, -1]), BEST_CELLS)
+    if classes > 1:
+        in_each_class = builder.node("Expand", [builder.reshape(cells, [0, 1, -1]), _integers(builder, 1, classes, 1)])
+        best = builder.node("GatherElements", [logits, in_each_class], axis=2)
+        best = builder.node("Transpose", [best], perm=[0, 2, 1])
     in_each_bin = builder.node(
         "Expand", [builder.reshape(cells, [0, 1, -1]), _integers(builder, 1, 4 * DISTANCE_BINS, 1)]
     )
@@ -111,4 +122,4 @@ def _per_channel(builder: OnnxBuilder, values) -> str:
 
 
 if __name__ == "__main__":
-    convert(Path(sys.argv[1]), Path(sys.argv[2]))
+    convert(Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3]) if len(sys.argv) > 3 else 1)

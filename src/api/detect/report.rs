@@ -5,9 +5,9 @@
 use axum::http::{HeaderName, HeaderValue};
 use lookdown_calibration::warning::Warning;
 use lookdown_common::report::{
-    Report, ReportBearing, ReportBox, ReportCalibration, ReportCircle, ReportDefault, ReportImage,
-    ReportModel, ReportPerson, ReportRefinement, ReportTimings, ReportViews, ReportWarning,
-    ReportZone,
+    Report, ReportBearing, ReportBox, ReportCalibration, ReportCircle, ReportDefault,
+    ReportFloorVotes, ReportImage, ReportModel, ReportPerson, ReportRefinement, ReportTimings,
+    ReportViews, ReportWarning, ReportZone,
 };
 use lookdown_detect::{
     parameters::DefaultUsed,
@@ -126,6 +126,10 @@ fn to_person(person: &pipeline::Person) -> ReportPerson {
         height_sd_m: person.height.map(|height| meters(height.sd_m)),
         posture: person.posture.0.name().into(),
         posture_probability: share(person.posture.1),
+        floor_votes: person.floor_votes.map(|votes| ReportFloorVotes {
+            lying: share(votes.lying),
+            low: share(votes.low),
+        }),
         views: person.views,
         zones: person.zones.clone(),
     }

@@ -289,7 +289,9 @@ impl From<PipelineError> for Problem {
             PipelineError::Image(error) => kind_of_decode_error(error),
             PipelineError::UnknownCalibration { .. }
             | PipelineError::UnusableCalibration { .. } => ProblemKind::UnknownCalibration,
-            PipelineError::UnknownModel { .. } => ProblemKind::UnknownModel,
+            PipelineError::UnknownModel { .. } | PipelineError::NoFloorModel { .. } => {
+                ProblemKind::UnknownModel
+            }
             PipelineError::AspectMismatch { .. } | PipelineError::FrameTooSmall { .. } => {
                 ProblemKind::UnfitImage
             }
@@ -330,6 +332,7 @@ fn parameter_of(error: &PipelineError) -> Option<&str> {
             Some("calibration")
         }
         PipelineError::UnknownModel { .. } => Some("model"),
+        PipelineError::NoFloorModel { .. } => Some("floor"),
         _ => None,
     }
 }

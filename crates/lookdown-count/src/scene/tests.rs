@@ -4,6 +4,7 @@ use std::{
 };
 
 use lookdown_calibration::CalibrationFile;
+use lookdown_lens::geometry::PostureSigns;
 
 use super::*;
 
@@ -18,7 +19,7 @@ fn person(x: f64, y: f64) -> Observation {
         off_axis_deg: x.hypot(y).atan2(3.0).to_degrees(),
         center_px: px,
         size_px: [40.0, 80.0],
-        angles: None,
+        signs: PostureSigns::default(),
         foot_px: px,
         score: 0.95,
         is_in_margin: false,

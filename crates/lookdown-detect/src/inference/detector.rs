@@ -4,6 +4,8 @@ use std::num::NonZeroUsize;
 
 use lookdown_imaging::{NetworkInput, ViewBatch};
 
+use lookdown_lens::geometry::Posture;
+
 use super::InferenceError;
 use crate::detection::{BBox, ViewPixels};
 
@@ -38,6 +40,8 @@ pub struct ViewDetection {
     pub bbox: BBox<ViewPixels>,
     /// Confidence, 0 to 1.
     pub score: f64,
+    /// The posture, where the network finds people in certain postures only.
+    pub posture: Option<Posture>,
 }
 
 /// Decoded outputs of a batch of views.

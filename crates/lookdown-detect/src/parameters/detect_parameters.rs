@@ -155,6 +155,15 @@ parameter_table! {
         example: None,
         interfaces: REQUESTS_WITH_DEFAULTS,
     };
+    FLOOR = ParameterSpec {
+        name: "floor",
+        kind: ParameterKind::Switch,
+        default: ParameterDefault::Described("`false`; with `counts.floor_alert` `true`"),
+        help: "Looks for people on the floor with a network of its own in each search of the frame: \
+               people who lie, crouch, kneel, crawl or sit there. It costs a run for each wide view.",
+        example: None,
+        interfaces: DETECTION_WITH_DEFAULTS,
+    };
     STORE = ParameterSpec {
         name: "store",
         kind: ParameterKind::Switch,
@@ -190,6 +199,10 @@ parameter_table! {
 
 /// The checked parameters of one detection request.
 #[derive(Debug, Clone, PartialEq)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is a parameter of requests"
+)]
 pub struct DetectParameters {
     /// The calibration. Without one, the lens circle is detected in the frame.
     pub calibration: Option<CalibrationId>,
@@ -207,6 +220,8 @@ pub struct DetectParameters {
     pub motion: bool,
     /// Follows the persons of the camera between searches of the whole frame.
     pub follow: bool,
+    /// Looks for people on the floor with a network of its own.
+    pub floor: bool,
     /// Stores the report under the name of its camera.
     pub store: bool,
     /// The priority among queued frames.
@@ -226,6 +241,8 @@ impl DetectParameters {
     pub const CAMERA: &'static str = CAMERA.name;
     /// The parameter of the model.
     pub const MODEL: &'static str = MODEL.name;
+    /// The parameter of people on the floor.
+    pub const FLOOR: &'static str = FLOOR.name;
     /// The parameter of the least score.
     pub const SCORE_THRESHOLD: &'static str = SCORE_THRESHOLD.name;
 
@@ -273,6 +290,7 @@ impl DetectParameters {
             captured_at: given.optional(&CAPTURED_AT)?,
             motion: given.value(&MOTION)?,
             follow: given.value(&FOLLOW)?,
+            floor: given.optional(&FLOOR)?.unwrap_or(false),
             store: given.optional(&STORE)?.unwrap_or(is_named),
             priority: Priority::from_level(given.value(&PRIORITY)?),
             timeout: timeout.map(Duration::from_millis),
@@ -343,9 +361,18 @@ impl DetectDefaults {
 
     /// Returns the default of the parameter `follow` for a frame of a camera.
     pub fn follow(&self) -> bool {
+        self.of_camera(|parameters| parameters.follow)
+    }
+
+    /// Returns the default of the parameter `floor`.
+    pub fn floor(&self) -> bool {
+        self.of_camera(|parameters| parameters.floor)
+    }
+
+    fn of_camera(&self, switch: impl FnOnce(DetectParameters) -> bool) -> bool {
         let camera = [(DetectParameters::CAMERA, "camera")];
         let parameters = DetectParameters::parse_with(camera, &[(DefaultSource::Server, self)]);
-        parameters.is_ok_and(|parameters| parameters.follow)
+        parameters.is_ok_and(switch)
     }
 
     /// Lists the parameters for which defaults can be set.

@@ -12,6 +12,7 @@ use crate::{
 pub struct DefaultModels {
     model: String,
     crop_model: Option<String>,
+    floor_model: String,
 }
 
 impl DefaultModels {
@@ -22,14 +23,17 @@ impl DefaultModels {
         Self {
             model: format!("nanodet_g_views_416{ending}"),
             crop_model: Some(format!("nanodet_g_fisheye_416{ending}")),
+            floor_model: format!("nanodet_g_floor_416{ending}"),
         }
     }
 
     /// Uses one model for the views and the crops of all profiles.
-    pub fn one(model: String) -> Self {
+    #[must_use]
+    pub fn with_one(self, model: String) -> Self {
         Self {
             model,
             crop_model: None,
+            ..self
         }
     }
 
@@ -46,14 +50,21 @@ impl DefaultModels {
         }
     }
 
+    /// Returns the model for people on the floor.
+    pub fn floor_model(&self) -> &str {
+        &self.floor_model
+    }
+
     /// Returns the models that a request needs.
     pub fn needed_by<'a>(&'a self, request: &'a DetectParameters) -> Vec<&'a str> {
-        match &request.model {
-            Some(name) => vec![name],
+        let floor = request.floor.then_some(self.floor_model());
+        let persons = match &request.model {
+            Some(name) => vec![name.as_str()],
             None => iter::once(self.model())
                 .chain(self.crop_model(request.profile))
                 .collect(),
-        }
+        };
+        persons.into_iter().chain(floor).collect()
     }
 
     /// Returns all models, that of the views first.
@@ -99,7 +110,7 @@ mod tests {
 
     #[test]
     fn one_model_can_serve_all_profiles() {
-        let one = DefaultModels::one("mine".to_owned());
+        let one = DefaultModels::for_device(Device::Cpu).with_one("mine".to_owned());
         assert_eq!(one.names().collect::<Vec<_>>(), ["mine"]);
         assert_eq!(one.crop_model(Profile::Balanced), None);
     }

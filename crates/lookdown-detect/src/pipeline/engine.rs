@@ -39,7 +39,7 @@ use super::{
 };
 use crate::{
     detection::RefinementParameters,
-    inference::{Model, ModelRegistry},
+    inference::{Device, Model, ModelRegistry},
     metrics::{DetectMetrics, start_at_zero},
     parameters::DetectParameters,
 };
@@ -89,7 +89,8 @@ impl EngineOptions {
 
     /// Returns options for tests: `model` for all profiles, one session, large batches.
     pub fn for_testing(model: &str) -> Self {
-        let mut options = Self::new(DefaultModels::one(model.to_owned()), NonZeroUsize::MIN);
+        let models = DefaultModels::for_device(Device::Cpu).with_one(model.to_owned());
+        let mut options = Self::new(models, NonZeroUsize::MIN);
         options.batches.max_views = NonZeroUsize::MIN.saturating_add(127);
         options
     }
@@ -216,6 +217,7 @@ impl Engine {
         let rigs: Vec<_> = observation
             .passes
             .into_iter()
+            .filter(|pass| !pass.is_of_floor)
             .map(|pass| pass.rig)
             .collect();
         let has_no_masks = observation.camera.rig.has_no_masks();
@@ -300,6 +302,9 @@ impl Engine {
         let first = self.queue_pass(job, &observation, rig, model, cached);
         observation.wait_for(&first)?;
         self.look_again(job, &mut observation)?;
+        if job.parameters.floor {
+            self.look_at_the_floor(job, &mut observation)?;
+        }
         Ok(observation)
     }
 

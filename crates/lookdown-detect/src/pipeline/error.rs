@@ -38,6 +38,14 @@ pub enum PipelineError {
         /// The names of the loaded models.
         loaded: String,
     },
+    /// The model for people on the floor is not loaded.
+    #[error(
+        "floor: {name:?} is not loaded; add it to model.also_load of the server, or leave it out"
+    )]
+    NoFloorModel {
+        /// The model's name.
+        name: String,
+    },
     /// The model of the request is still being loaded.
     #[error("the server is loading its models: try again in a second")]
     ModelStarting,

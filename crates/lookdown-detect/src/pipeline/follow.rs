@@ -160,7 +160,8 @@ impl Followed {
         self.at = at;
         let least_score = self.origin.refinement.score_threshold;
         let place = |found: &Person, score, oriented_box| {
-            merge::placed(found.bbox, score, oriented_box, found.views, rig)
+            let votes = found.floor_votes;
+            merge::placed(found.bbox, score, oriented_box, found.views, votes, rig)
         };
         self.people
             .confirm(moving, found, seconds(at), least_score, place);

@@ -3,8 +3,11 @@
 #[cfg(test)]
 mod properties;
 
+use std::collections::BTreeMap;
+
 use lookdown_lens::geometry::{
-    BackProjection, BoxAngles, Footprint, OrientedBox, PersonHeight, Posture, PostureBelief,
+    BackProjection, BoxAngles, FloorVotes, Footprint, OrientedBox, PersonHeight, Posture,
+    PostureBelief, PostureSigns,
     crop_placement::CropTarget,
     floor::{bearing, floor_position},
     oriented_box::vertical_in_frame,
@@ -27,6 +30,10 @@ use crate::{
 const BORDER_WEIGHT: f64 = 0.1;
 /// The weight of the coordinates of a virtual view's box, relative to the exact box of a crop.
 const VIRTUAL_VIEW_WEIGHT: f64 = 0.1;
+/// The factor for scores of the network for people on the floor: at equal scores it invents more.
+/// Without the factor, 40 rendered frames have 1.9 to 2.8 false boxes more each, for .02 to .05
+/// more of the lying people.
+const FLOOR_VOTE: f64 = 0.7;
 
 /// A box of a view, with its footprint in the frame.
 struct Mapped {
@@ -35,6 +42,8 @@ struct Mapped {
     cut_off: bool,
     /// True for a box from a crop of the frame.
     is_exact: bool,
+    /// The posture of a person on the floor, from a network for such people.
+    posture: Option<Posture>,
 }
 
 impl Mapped {
@@ -43,16 +52,18 @@ impl Mapped {
     /// `crop_vote` is the factor for scores from crops.
     fn weighted(&self, passes: &[Pass], rig: &CameraRig, crop_vote: f64) -> Candidate {
         let mount = &rig.geometry.mount;
-        let height_ratio = self
+        // People on the floor are long and low in any direction.
+        let extremities = self
             .footprint
             .extremities
-            .and_then(|extremities| extremities.height_ratio(mount));
-        let holding = views_holding(passes, &self.footprint);
+            .filter(|_| self.posture.is_none());
+        let height_ratio = extremities.and_then(|extremities| extremities.height_ratio(mount));
+        let holding = views_holding(passes, &self.footprint, self.posture.is_some());
         let expected_views = holding.max(1) as f64;
-        let (vote, weight) = if self.is_exact {
-            (crop_vote, 1.0)
-        } else {
-            (1.0, VIRTUAL_VIEW_WEIGHT)
+        let (vote, weight) = match (self.is_exact, self.posture) {
+            (true, _) => (crop_vote, 1.0),
+            (false, None) => (1.0, VIRTUAL_VIEW_WEIGHT),
+            (false, Some(_)) => (FLOOR_VOTE, VIRTUAL_VIEW_WEIGHT),
         };
         Candidate {
             score: self.candidate.score * score_weight(self.cut_off, height_ratio, mount) * vote,
@@ -91,7 +102,7 @@ pub(super) fn persons(
                 merged.bbox,
                 calibration.reported(merged.score),
                 &members,
-                rig,
+                passes,
             )
         })
         .collect()
@@ -123,7 +134,7 @@ pub(super) fn possible_persons(
     };
     let (mapped, mut merged) = merged(passes, rig, profile, tuning, &parameters);
     if !rig.geometry.areas.foot_filter.areas.is_empty() {
-        merged.retain(|merged| may_count(merged, &mapped, rig));
+        merged.retain(|merged| may_count(merged, &mapped, passes));
     }
     let geometry = &rig.geometry;
     let targets = merged.iter().filter_map(|merged| {
@@ -139,14 +150,17 @@ pub(super) fn possible_persons(
 }
 
 /// Returns true if a merged box may become a person in the margin of an area.
-fn may_count(merged: &MergedDetection, mapped: &[Mapped], rig: &CameraRig) -> bool {
+fn may_count(merged: &MergedDetection, mapped: &[Mapped], passes: &[Pass]) -> bool {
     let members: Vec<&Mapped> = merged
         .members
         .iter()
         .map(|&member| &mapped[member])
         .collect();
+    let Some(Pass { rig, .. }) = passes.first() else {
+        return false;
+    };
     let filter = &rig.geometry.areas.foot_filter;
-    let person = person(merged.bbox, merged.score, &members, rig);
+    let person = person(merged.bbox, merged.score, &members, passes);
     person.is_none_or(|person| {
         filter.is_near(person.oriented_box.foot(), person.floor, TARGET_MARGINS)
     })
@@ -198,6 +212,7 @@ fn map(find: &PassDetection<'_>, back_projection: BackProjection) -> Option<Mapp
         footprint,
         cut_off,
         is_exact,
+        posture: found.posture,
     })
 }
 
@@ -207,8 +222,9 @@ fn person(
     bbox: BBox<FramePixels>,
     score: f64,
     members: &[&Mapped],
-    rig: &CameraRig,
+    passes: &[Pass],
 ) -> Option<Person> {
+    let Pass { rig, .. } = passes.first()?;
     let geometry = &rig.geometry;
     let bounds = bbox.corners();
     let bbox = bbox.clipped_to(&rig.frame)?;
@@ -234,7 +250,26 @@ fn person(
     let mut views: Vec<usize> = members.iter().map(|member| member.candidate.view).collect();
     views.sort_unstable();
     views.dedup();
-    Some(placed(bbox, score, oriented_box, views.len(), rig))
+    let votes = floor_votes(members, passes);
+    Some(placed(bbox, score, oriented_box, views.len(), votes, rig))
+}
+
+/// Returns the mean vote of the networks for people on the floor, over the views that show the
+/// person; `None` if there was no such pass.
+fn floor_votes(members: &[&Mapped], passes: &[Pass]) -> Option<FloorVotes> {
+    passes.iter().find(|pass| pass.is_of_floor)?;
+    let mut by_view: BTreeMap<usize, FloorVotes> = BTreeMap::new();
+    for member in members {
+        if let Some(posture) = member.posture {
+            let Candidate { view, score, .. } = member.candidate;
+            by_view.entry(view).or_default().raise(posture, score);
+        }
+    }
+    let holding = views_holding(passes, &members.first()?.footprint, true);
+    Some(FloorVotes::mean_of_best(
+        by_view.into_values().collect(),
+        holding,
+    ))
 }
 
 /// Returns the person in a box of the frame, with its place on the floor.
@@ -243,6 +278,7 @@ pub(super) fn placed(
     score: f64,
     oriented_box: OrientedBox,
     views: usize,
+    floor_votes: Option<FloorVotes>,
     rig: &CameraRig,
 ) -> Person {
     let geometry = &rig.geometry;
@@ -256,19 +292,22 @@ pub(super) fn placed(
         floor,
         views,
         height: PersonHeight::new(&oriented_box, &geometry.lens, &geometry.mount),
-        posture: posture(&oriented_box, rig),
+        posture: posture(&oriented_box, floor_votes, rig),
+        floor_votes,
         zones: Person::zones_of(&geometry.areas.zones, foot, floor),
     }
 }
 
-/// Returns the posture that the box alone tells, with its probability.
-fn posture(person: &OrientedBox, rig: &CameraRig) -> (Posture, f64) {
+/// Returns the posture that one frame tells, with its probability.
+fn posture(person: &OrientedBox, votes: Option<FloorVotes>, rig: &CameraRig) -> (Posture, f64) {
     let geometry = &rig.geometry;
     let camera_m = geometry.mount.height_m();
-    let mut belief = PostureBelief::new(camera_m.is_some());
-    if let Some(angles) = BoxAngles::new(person, &geometry.lens, &geometry.mount) {
-        belief.add(&angles, camera_m, f64::INFINITY);
-        return belief.posture();
+    let angles = BoxAngles::new(person, &geometry.lens, &geometry.mount);
+    let signs = PostureSigns { angles, votes };
+    if signs == PostureSigns::default() {
+        return (Posture::Unknown, 0.0);
     }
-    (Posture::Unknown, 0.0)
+    let mut belief = PostureBelief::new(camera_m.is_some());
+    belief.add(&signs, camera_m, f64::INFINITY);
+    belief.posture()
 }

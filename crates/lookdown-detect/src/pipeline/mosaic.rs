@@ -163,6 +163,7 @@ mod tests {
         mosaics.render(0, &frame, &input, &mut slot);
         let corners = [(5_u32, 5_u32), (45, 5), (5, 45), (45, 45)];
         let found = |(left, top): (u32, u32)| ViewDetection {
+            posture: None,
             bbox: BBox::new([left, top, left + 20, top + 20].map(f64::from)).unwrap(),
             score: 0.5,
         };

@@ -26,6 +26,8 @@ struct CachedCamera {
     views: Arc<CameraViews>,
     /// The detail views of the last frame.
     details: ChangingViews<VirtualView>,
+    /// The views in which people on the floor are looked for.
+    floor: ChangingViews<VirtualView>,
     /// The crops of the last frame.
     crops: ChangingViews<Vec<FrameCrop>>,
 }
@@ -66,6 +68,7 @@ impl MotionCache {
         let no_views = || CachedCamera {
             views: CameraViews::new(rig, model, vec![None; rig.view_count()]),
             details: ChangingViews(Mutex::default()),
+            floor: ChangingViews(Mutex::default()),
             crops: ChangingViews(Mutex::default()),
         };
         let is_stale = |known: &CachedCamera| !known.views.are_of(rig, model);
@@ -84,6 +87,19 @@ impl MotionCache {
         let views = rig.virtual_views().cloned().collect();
         let known = self.0.get(camera)?;
         Some(known.details.replace(views, rig, model))
+    }
+
+    /// Returns the cached views of a camera in which people on the floor are looked for. `None` if
+    /// the camera is not in the cache.
+    pub(super) fn floor_views(
+        &self,
+        camera: &str,
+        rig: &Arc<CameraRig>,
+        model: &Arc<Model>,
+    ) -> Option<Arc<CameraViews>> {
+        let views = rig.virtual_views().cloned().collect();
+        let known = self.0.get(camera)?;
+        Some(known.floor.replace(views, rig, model))
     }
 
     /// Returns the cached crops of a camera, filled where the last frame had the same crop. `None`

@@ -15,6 +15,8 @@ pub(super) struct Pass {
     pub(super) model: Arc<Model>,
     /// The detections in each view.
     pub(super) per_view: Vec<Vec<ViewDetection>>,
+    /// True if the model finds people on the floor alone. Its views vote on no one else.
+    pub(super) is_of_floor: bool,
 }
 
 impl Pass {
@@ -56,11 +58,11 @@ pub(super) fn detections(passes: &[Pass]) -> impl Iterator<Item = PassDetection<
     })
 }
 
-/// Returns the number of votes of views over all passes in which a person with this footprint is
-/// wholly visible.
-pub(super) fn views_holding(passes: &[Pass], footprint: &Footprint) -> usize {
-    let holding = passes.iter().map(|pass| pass.rig.views_holding(footprint));
-    holding.sum()
+/// Returns the number of votes of views in which a person with this footprint is wholly visible:
+/// over the passes for people on the floor, or over all others.
+pub(super) fn views_holding(passes: &[Pass], footprint: &Footprint, of_floor: bool) -> usize {
+    let voting = passes.iter().filter(|pass| pass.is_of_floor == of_floor);
+    voting.map(|pass| pass.rig.views_holding(footprint)).sum()
 }
 
 #[cfg(test)]
@@ -92,6 +94,7 @@ mod tests {
         let found = |left: f64| ViewDetection {
             bbox: BBox::new([left, 10.0, left + 20.0, 40.0]).unwrap(),
             score: 0.9,
+            posture: None,
         };
         // The same person in both tiles of one input.
         let per_view = rig.per_view(vec![vec![found(20.0), found(58.0)]]);
@@ -99,6 +102,7 @@ mod tests {
             rig: Arc::new(rig),
             model: Arc::new(Model::new(Box::new(BlobDetector::default()))),
             per_view,
+            is_of_floor: false,
         };
         let votes: Vec<_> = detections(&[pass]).map(|found| found.vote).collect();
         assert_eq!(votes, [0, 1]);

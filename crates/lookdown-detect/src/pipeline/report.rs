@@ -5,7 +5,7 @@ use std::time::Duration;
 use jiff::Timestamp;
 use lookdown_calibration::warning::Warning;
 use lookdown_lens::geometry::{
-    OrientedBox, PersonHeight, Pixel, Posture, Zone,
+    FloorVotes, OrientedBox, PersonHeight, Pixel, Posture, Zone,
     floor::{Bearing, FloorPosition},
 };
 
@@ -170,8 +170,10 @@ pub struct Person {
     pub floor: Option<FloorPosition>,
     /// The height of the person, where the boxes and the height of the camera give it.
     pub height: Option<PersonHeight>,
-    /// The posture that the box alone tells, and its probability.
+    /// The posture that the frame tells, and its probability.
     pub posture: (Posture, f64),
+    /// Votes for a person on the floor; `None` without a pass for such people.
+    pub floor_votes: Option<FloorVotes>,
     /// The number of supporting views.
     pub views: usize,
     /// The names of the zones that the person's foot is in; `None` when the calibration has none.

@@ -10,6 +10,7 @@ use std::{
 use bytes::Bytes;
 use jiff::Timestamp;
 use lookdown_calibration::{Calibration, CalibrationFile, CalibrationId};
+use lookdown_lens::geometry::Posture;
 
 use super::{
     BatchOptions, CalibrationLookup, DetectJob, Engine, EngineOptions, JobImage, Ticket,
@@ -22,10 +23,12 @@ use crate::{
 };
 use lookdown_imaging::{Frame, NetworkInput, ViewBatch, annotate::encode_png};
 
-/// Returns the bounding box of all pixels in a view that are brighter than this.
-const BRIGHT: f32 = 200.0;
-
 pub(super) struct BlobDetector {
+    pub(super) name: &'static str,
+    /// Finds the bounding box of all pixels in a view that are brighter than this.
+    pub(super) bright: f32,
+    /// The posture of everyone who is found.
+    pub(super) posture: Option<Posture>,
     pub(super) input: NetworkInput,
     /// Called before each batch.
     pub(super) before: Box<dyn FnMut() -> Result<(), InferenceError> + Send>,
@@ -34,6 +37,9 @@ pub(super) struct BlobDetector {
 impl Default for BlobDetector {
     fn default() -> Self {
         Self {
+            name: "blob",
+            bright: 200.0,
+            posture: None,
             input: NetworkInput::plain(96, 96),
             before: Box::new(|| Ok(())),
         }
@@ -42,7 +48,7 @@ impl Default for BlobDetector {
 
 impl Detector for BlobDetector {
     fn name(&self) -> &'static str {
-        "blob"
+        self.name
     }
 
     fn revision(&self) -> &'static str {
@@ -68,7 +74,7 @@ impl BlobDetector {
         let width = self.input.width;
         let bright = (0..)
             .zip(&view[..self.input.plane_len()])
-            .filter(|&(_, &value)| value > BRIGHT)
+            .filter(|&(_, &value)| value > self.bright)
             .map(|(index, _)| [index % width, index / width].map(f64::from));
         let hull = bright
             .map(|[x, y]| [x, y, x + 1.0, y + 1.0])
@@ -91,6 +97,7 @@ impl BlobDetector {
             .map(|bbox| ViewDetection {
                 score: if whole(&bbox) { 0.9 } else { 0.2 },
                 bbox,
+                posture: self.posture,
             })
             .into_iter()
             .collect()

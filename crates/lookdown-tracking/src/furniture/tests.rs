@@ -1,3 +1,4 @@
+use lookdown_lens::geometry::PostureSigns;
 use proptest::prelude::*;
 
 use super::*;
@@ -9,7 +10,7 @@ fn seen([right, down]: [f64; 2], [wider, higher]: [f64; 2], score: f64) -> Obser
     let (x, y) = (2.0 + right * unit / 100.0, 1.0 + down * unit / 100.0);
     Observation {
         size_px: [40.0 * (1.0 + wider), 80.0 * (1.0 + higher)],
-        angles: None,
+        signs: PostureSigns::default(),
         ..crate::test_walks::with_score(x, y, score)
     }
 }

@@ -1,6 +1,6 @@
 use super::*;
 use crate::{CameraPose, Observation, Tracker, TrackerSettings};
-use lookdown_lens::geometry::Polygon;
+use lookdown_lens::geometry::{Polygon, PostureSigns};
 use nalgebra::Point2;
 
 fn person(x: f64, y: f64) -> Observation {
@@ -10,7 +10,7 @@ fn person(x: f64, y: f64) -> Observation {
         off_axis_deg: (x.hypot(y) / 2.8).atan().to_degrees(),
         center_px: [0.0, 0.0],
         size_px: [40.0, 80.0],
-        angles: None,
+        signs: PostureSigns::default(),
         foot_px: [0.0, 0.0],
         score: 0.9,
         is_in_margin: false,

@@ -154,7 +154,7 @@ class Weights(unittest.TestCase):
         self.assert_pairs_fit_in_16_bits(integers)
 
     def test_pairs_of_the_committed_networks_do_not_saturate(self):
-        for name in ("nanodet_g_views_416", "nanodet_g_fisheye_416"):
+        for name in ("nanodet_g_views_416", "nanodet_g_fisheye_416", "nanodet_g_floor_416"):
             constants = OnnxGraph(ROOT / "models" / name / "model.onnx").constants.values()
             weights = [value for value in constants if value.dtype == numpy.int8 and value.ndim == 4]
             self.assertGreater(len(weights), 20)

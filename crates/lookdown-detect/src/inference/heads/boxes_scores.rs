@@ -1,5 +1,6 @@
 //! Heads whose boxes and scores are outputs of their own.
 
+use lookdown_lens::geometry::Posture;
 use serde::Deserialize;
 
 use super::{
@@ -11,13 +12,15 @@ use super::{
 /// Graphs that decode boxes and scores.
 ///
 /// Boxes `[views, candidates, 4]` (`x_min, y_min, x_max, y_max`, view pixels) and scores
-/// `[views, candidates]` or `[views, candidates, 1]` of being a person, 0 to 1.
+/// `[views, candidates]` or `[views, candidates, 1]` of being a person, 0 to 1. A network for
+/// people in certain postures has scores `[views, candidates, postures]`.
 ///
 /// ```toml
 /// [output]              # optional
 /// head = "boxes_scores"
 /// boxes = "boxes"       # default
 /// scores = "scores"     # default
+/// postures = ["lying", "low"]   # default: none, a score for all persons
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -26,6 +29,8 @@ pub struct BoxesScoresHead {
     pub boxes: String,
     /// The output with the scores.
     pub scores: String,
+    /// The postures of the scores.
+    pub postures: Vec<Posture>,
 }
 
 impl Default for BoxesScoresHead {
@@ -33,6 +38,7 @@ impl Default for BoxesScoresHead {
         Self {
             boxes: "boxes".to_owned(),
             scores: "scores".to_owned(),
+            postures: Vec::new(),
         }
     }
 }
@@ -42,12 +48,13 @@ impl Decoder for BoxesScoresHead {
         let boxes = named(outputs, &self.boxes)?;
         let scores = named(outputs, &self.scores)?;
         let candidates = Axis::AtLeast(0, "candidates");
-        let one_class = [Axis::Views, candidates, Axis::Exactly(1)];
-        let has_classes = scores.dimensions.len() == one_class.len();
+        let classes = self.postures.len().max(1);
+        let by_class = [Axis::Views, candidates, Axis::Exactly(classes)];
+        let has_classes = classes > 1 || scores.dimensions.len() == by_class.len();
         let scores_axes = if has_classes {
-            &one_class[..]
+            &by_class[..]
         } else {
-            &one_class[..2]
+            &by_class[..2]
         };
         batch.require(&[
             (boxes, &[Axis::Views, candidates, Axis::Exactly(4)]),
@@ -58,10 +65,16 @@ impl Decoder for BoxesScoresHead {
 
     fn decode(&self, tensors: &[&TensorView<'_>], collector: &mut CandidateCollector) {
         let (boxes, scores) = (tensors[0], tensors[1]);
+        let classes = self.postures.len().max(1);
         for (view, (boxes, scores)) in boxes.views().zip(scores.views()).enumerate() {
-            for (corners, &raw) in boxes.chunks_exact(4).zip(scores) {
-                let score = Activation::None.score(raw, collector.floor);
-                collector.offer(view, score, || four(corners));
+            for (corners, scores) in boxes.chunks_exact(4).zip(scores.chunks_exact(classes)) {
+                for (class, &raw) in scores.iter().enumerate() {
+                    let score = Activation::None.score(raw, collector.floor);
+                    if let Some(score) = collector.judge(score) {
+                        let posture = self.postures.get(class).copied();
+                        collector.add(view, score, posture, four(corners));
+                    }
+                }
             }
         }
     }

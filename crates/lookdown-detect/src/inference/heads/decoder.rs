@@ -1,5 +1,7 @@
 //! The interface of all heads, and the collection of the persons of a batch.
 
+use lookdown_lens::geometry::Posture;
+
 use super::{
     score::{Floor, Score},
     shape::{Batch, Output, TensorView},
@@ -51,7 +53,7 @@ impl CandidateCollector {
     /// y_max`, view pixels) are computed only if its score is kept.
     pub(super) fn offer(&mut self, view: usize, score: Score, corners: impl FnOnce() -> [f64; 4]) {
         if let Some(score) = self.judge(score) {
-            self.add(view, score, corners());
+            self.add(view, score, None, corners());
         }
     }
 
@@ -67,7 +69,13 @@ impl CandidateCollector {
     }
 
     /// Adds a candidate whose score is kept. Boxes without area in the view are dropped.
-    pub(super) fn add(&mut self, view: usize, score: f64, corners: [f64; 4]) {
+    pub(super) fn add(
+        &mut self,
+        view: usize,
+        score: f64,
+        posture: Option<Posture>,
+        corners: [f64; 4],
+    ) {
         let bbox = match BBox::new(corners) {
             Ok(bbox) => bbox,
             Err(BBoxError::Coordinate(_)) => return self.count_non_finite(),
@@ -75,7 +83,11 @@ impl CandidateCollector {
         };
         let clipped = self.bounds.and_then(|bounds| bbox.clipped_to(&bounds));
         if let (Some(bbox), Some(found)) = (clipped, self.output.per_view.get_mut(view)) {
-            found.push(ViewDetection { bbox, score });
+            found.push(ViewDetection {
+                bbox,
+                score,
+                posture,
+            });
         }
     }
 

@@ -6,6 +6,7 @@ mod refusals;
 use super::{Head, HeadOutput, InferenceError, TensorView};
 use crate::{detection::BBox, inference::ViewDetection};
 use lookdown_imaging::NetworkInput;
+use lookdown_lens::geometry::Posture;
 
 /// The head of a manifest's `[output]` table.
 fn head(manifest: &str) -> Head {
@@ -103,6 +104,21 @@ fn only_the_person_class_counts() {
 }
 
 #[test]
+fn each_score_of_a_box_belongs_to_its_posture() {
+    let floor = head("head = 'boxes_scores'\npostures = ['lying', 'low']");
+    let outputs: [(&str, &[usize], &[f32]); 2] = [
+        ("boxes", &[1, 1, 4], &INSIDE),
+        ("scores", &[1, 1, 2], &[0.7, 0.6]),
+    ];
+    let found = decode(&floor, &outputs, 0.5).unwrap();
+    let found: Vec<_> = found.per_view[0]
+        .iter()
+        .map(|found| found.posture)
+        .collect();
+    assert_eq!(found, [Some(Posture::Lying), Some(Posture::Low)]);
+}
+
+#[test]
 fn a_table_without_rows_is_an_empty_view() {
     let rows = head("head = 'end_to_end'\nperson_class = 0");
     let found = decode(&rows, &[("rows", &[1, 0, 6], &[])], 0.5).unwrap();
@@ -114,6 +130,7 @@ fn the_best_boxes_of_a_view_are_kept() {
     let found = (0..50).map(|index| ViewDetection {
         bbox: BBox::new([0.0, 0.0, 10.0, 10.0]).unwrap(),
         score: f64::from(index * 7 % 50) / 50.0,
+        posture: None,
     });
     let mut output = HeadOutput {
         per_view: vec![found.collect()],

@@ -37,6 +37,7 @@ impl Engine {
             per_view: vec![Vec::new(); rig.view_count()],
             rig: Arc::clone(&rig),
             model: Arc::clone(&observation.model),
+            is_of_floor: false,
         });
         if targets.is_empty() {
             return FirstPass::Nothing;

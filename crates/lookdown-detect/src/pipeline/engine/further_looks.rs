@@ -35,6 +35,29 @@ impl Engine {
         Ok(())
     }
 
+    /// Looks for people on the floor in the views of the plan.
+    pub(super) fn look_at_the_floor(
+        &self,
+        job: &DetectJob,
+        observation: &mut Observation,
+    ) -> Result<(), PipelineError> {
+        let rig = Arc::clone(&observation.camera.rig);
+        let name = self.options.default_models.floor_model();
+        let missing = || PipelineError::NoFloorModel {
+            name: name.to_owned(),
+        };
+        let model = self.models.get(name).ok_or_else(missing)?;
+        let has_views = rig.virtual_views().next().is_some();
+        let camera = job.parameters.motion_camera().filter(|_| has_views);
+        let cached = camera.and_then(|camera| self.motion_cache.floor_views(camera, &rig, &model));
+        let floor = self.queue_pass(job, observation, rig, model, cached);
+        observation.wait_for(&floor)?;
+        if let Some(pass) = observation.passes.last_mut() {
+            pass.is_of_floor = true;
+        }
+        Ok(())
+    }
+
     /// Queues a pass over a frame. Views without motion according to `cached_views` skip the
     /// network.
     pub(super) fn queue_pass(

@@ -66,7 +66,7 @@ impl Observation {
         if !self.is_searched {
             return 0;
         }
-        let later = self.passes.iter().skip(1);
+        let later = self.passes.iter().skip(1).filter(|pass| !pass.is_of_floor);
         let details = later.map(|pass| pass.rig.virtual_views().count());
         self.camera.rig.detail_count() - details.sum::<usize>()
     }
@@ -103,6 +103,7 @@ impl Observation {
             rig: Arc::clone(&task.rig),
             model: Arc::clone(&task.model),
             per_view: task.rig.per_view(output.per_view),
+            is_of_floor: false,
         });
         self.batch_count += cost.runs;
         self.unchanged_views += cost.still_views;

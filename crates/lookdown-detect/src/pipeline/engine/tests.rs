@@ -1,4 +1,6 @@
 use super::*;
+use lookdown_lens::geometry::{FloorVotes, Posture};
+
 use crate::inference::InferenceError;
 use crate::pipeline::test_support::{BlobDetector, calibration, engine, frame_with_disc, job};
 
@@ -67,6 +69,65 @@ fn a_report_names_its_camera_calibration_and_model() {
     assert_eq!(assumed.camera, "assumed");
     assert_eq!(assumed.warnings[0].code, WarningCode::LensAssumed);
     assert_eq!(assumed.persons[0].floor, None);
+}
+
+/// Returns the best person of a frame with a blob, with or without the network for people on the
+/// floor, and the number of views.
+fn best_person(floor: Option<BlobDetector>) -> (Person, usize) {
+    let engine = engine_with_lobby();
+    let has_floor = floor.is_some();
+    if let Some(detector) = floor {
+        let model = Model::new(Box::new(detector));
+        engine.models.put(Arc::new(model)).unwrap();
+    }
+    let image = frame_with_disc(600, [420.0, 300.0], 20.0);
+    let mut named = vec![("calibration", "lobby"), ("profile", "fast")];
+    if has_floor {
+        named.push(("floor", "true"));
+    }
+    let report = engine.detect(&job(image, &named)).unwrap().report;
+    (report.persons[0].clone(), report.views.inferred)
+}
+
+fn floor_detector() -> BlobDetector {
+    BlobDetector {
+        name: "nanodet_g_floor_416",
+        posture: Some(Posture::Lying),
+        ..BlobDetector::default()
+    }
+}
+
+#[test]
+fn the_network_for_the_floor_tells_who_lies() {
+    let (alone, views) = best_person(None);
+    assert_eq!(alone.floor_votes, None);
+    let (lying, more_views) = best_person(Some(floor_detector()));
+    assert_ne!(lying.posture, alone.posture);
+    assert!(lying.floor_votes.unwrap().lying > 0.3, "{lying:?}");
+    assert_eq!(more_views, views + 5);
+}
+
+#[test]
+fn the_network_for_the_floor_takes_no_score_from_others() {
+    let blind = BlobDetector {
+        bright: 300.0,
+        ..floor_detector()
+    };
+    let (alone, _) = best_person(None);
+    let (seen, _) = best_person(Some(blind));
+    assert_eq!((seen.score, seen.bbox), (alone.score, alone.bbox));
+    assert_eq!(seen.floor_votes, Some(FloorVotes::default()));
+    assert_ne!(seen.posture.0, Posture::Lying);
+}
+
+#[test]
+fn a_missing_network_for_the_floor_is_named() {
+    let engine = engine_with_lobby();
+    let image = frame_with_disc(600, [420.0, 300.0], 20.0);
+    let error = engine
+        .detect(&job(image, &[("floor", "true")]))
+        .unwrap_err();
+    assert!(error.to_string().contains("model.also_load"), "{error}");
 }
 
 #[test]

@@ -65,7 +65,15 @@ fn detections_in_two_orders() -> impl Strategy<Value = [Vec<(usize, ViewDetectio
         let scored = detections.into_iter().map(|(view, bbox)| {
             squared += 1.0 / 64.0;
             let score = squared.sqrt();
-            (view, ViewDetection { bbox, score })
+            let posture = None;
+            (
+                view,
+                ViewDetection {
+                    bbox,
+                    score,
+                    posture,
+                },
+            )
         });
         scored.collect::<Vec<_>>()
     });
@@ -97,6 +105,7 @@ fn pass(rig: &Arc<CameraRig>, detections: &[(usize, ViewDetection)]) -> Pass {
         rig: Arc::clone(rig),
         model: Arc::clone(&MODEL),
         per_view,
+        is_of_floor: false,
     }
 }
 

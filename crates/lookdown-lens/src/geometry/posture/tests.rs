@@ -227,6 +227,14 @@ impl Camera {
     }
 }
 
+/// Returns the signs of a box without votes.
+fn of_box(angles: BoxAngles) -> PostureSigns {
+    PostureSigns {
+        angles: Some(angles),
+        votes: None,
+    }
+}
+
 fn noise(chance: &mut Chance) -> [f64; 4] {
     std::array::from_fn(|_| chance.normal())
 }
@@ -245,7 +253,7 @@ fn watch(
         let fresh = noise(chance);
         let errors = std::array::from_fn(|index| (lasting[index] + fresh[index]) / f64::sqrt(2.0));
         if let Some(seen) = camera.see(limbs, place, errors) {
-            belief.add(&seen, camera.mount.height_m(), 0.2);
+            belief.add(&of_box(seen), camera.mount.height_m(), 0.2);
         }
         left -= 0.2;
     }
@@ -318,6 +326,29 @@ fn people_who_fell_lie_or_are_low() {
 }
 
 #[test]
+fn votes_of_networks_decide_where_the_box_fits_two_postures() {
+    let mut chance = Chance(5);
+    let camera = Camera::any(&mut chance);
+    let body = limbs(Pose::Standing, 1.7, &mut chance);
+    let angles = camera.see(&body, [2.5, 1.0, 0.0], [0.0; 4]);
+    let told = |votes| {
+        let mut belief = PostureBelief::new(true);
+        let signs = PostureSigns { angles, votes };
+        belief.add(&signs, camera.mount.height_m(), f64::INFINITY);
+        belief.probability(Posture::Lying)
+    };
+    let lying = FloorVotes {
+        lying: 0.7,
+        low: 0.1,
+    };
+    let [with, without, untold] = [Some(lying), Some(FloorVotes::default()), None].map(told);
+    assert!(
+        without < untold && untold < with,
+        "{without} {untold} {with}"
+    );
+}
+
+#[test]
 fn unknown_height_of_the_camera_is_learned() {
     let mut chance = Chance(3);
     let camera = Camera::any(&mut chance);
@@ -326,7 +357,7 @@ fn unknown_height_of_the_camera_is_learned() {
         let body = limbs(pose, 1.7, &mut chance);
         let seen = camera.see(&body, [2.5, 1.0, turn], [0.0; 4]).unwrap();
         for _ in 0..10 {
-            belief.add(&seen, None, 0.2);
+            belief.add(&of_box(seen), None, 0.2);
         }
         assert_eq!(belief.posture().0, pose.posture());
     }
@@ -365,7 +396,7 @@ fn sessions_down(pose: Pose, [sessions, minutes]: [usize; 2]) -> usize {
                 along: exact.along * (1.0 + 0.08 * errors[0]),
                 across: exact.across * (1.0 + 0.08 * errors[1]),
             };
-            belief.add(&shown, camera.mount.height_m(), 1.0);
+            belief.add(&of_box(shown), camera.mount.height_m(), 1.0);
             let lying = belief.probability(Posture::Lying);
             let up = belief.probability(Posture::Upright) + belief.probability(Posture::Seated);
             if lying >= 0.9 {
