@@ -135,7 +135,7 @@ class Frames:
         wanted = lambda a: not floor or is_near(a)
         return [a["bbox"] for a in seen if wanted(a)]
 
-    def sample(self, rng, size, crops=0.35, aimed=0.0, floor=False):
+    def sample(self, rng, size, crops, aimed=0.0, floor=False):
         """One random sample: image (size × size × 3), boxes, ignore flags, postures.
 
         A share of `crops` lies closely around a place, and the share `aimed` has it in a view as the profiles have them.

@@ -3,7 +3,6 @@
 use std::num::NonZeroUsize;
 
 use lookdown_imaging::{NetworkInput, ViewBatch};
-
 use lookdown_lens::geometry::Posture;
 
 use super::InferenceError;

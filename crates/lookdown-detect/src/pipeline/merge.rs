@@ -98,11 +98,13 @@ pub(super) fn persons(
                 .iter()
                 .map(|&member| &mapped[member])
                 .collect();
+            let score = calibration.reported(merged.score);
             person(
                 merged.bbox,
-                calibration.reported(merged.score),
+                score,
                 &members,
-                passes,
+                floor_votes(&members, passes),
+                rig,
             )
         })
         .collect()
@@ -134,7 +136,7 @@ pub(super) fn possible_persons(
     };
     let (mapped, mut merged) = merged(passes, rig, profile, tuning, &parameters);
     if !rig.geometry.areas.foot_filter.areas.is_empty() {
-        merged.retain(|merged| may_count(merged, &mapped, passes));
+        merged.retain(|merged| may_count(merged, &mapped, rig));
     }
     let geometry = &rig.geometry;
     let targets = merged.iter().filter_map(|merged| {
@@ -150,17 +152,14 @@ pub(super) fn possible_persons(
 }
 
 /// Returns true if a merged box may become a person in the margin of an area.
-fn may_count(merged: &MergedDetection, mapped: &[Mapped], passes: &[Pass]) -> bool {
+fn may_count(merged: &MergedDetection, mapped: &[Mapped], rig: &CameraRig) -> bool {
     let members: Vec<&Mapped> = merged
         .members
         .iter()
         .map(|&member| &mapped[member])
         .collect();
-    let Some(Pass { rig, .. }) = passes.first() else {
-        return false;
-    };
     let filter = &rig.geometry.areas.foot_filter;
-    let person = person(merged.bbox, merged.score, &members, passes);
+    let person = person(merged.bbox, merged.score, &members, None, rig);
     person.is_none_or(|person| {
         filter.is_near(person.oriented_box.foot(), person.floor, TARGET_MARGINS)
     })
@@ -222,9 +221,9 @@ fn person(
     bbox: BBox<FramePixels>,
     score: f64,
     members: &[&Mapped],
-    passes: &[Pass],
+    votes: Option<FloorVotes>,
+    rig: &CameraRig,
 ) -> Option<Person> {
-    let Pass { rig, .. } = passes.first()?;
     let geometry = &rig.geometry;
     let bounds = bbox.corners();
     let bbox = bbox.clipped_to(&rig.frame)?;
@@ -250,7 +249,6 @@ fn person(
     let mut views: Vec<usize> = members.iter().map(|member| member.candidate.view).collect();
     views.sort_unstable();
     views.dedup();
-    let votes = floor_votes(members, passes);
     Some(placed(bbox, score, oriented_box, views.len(), votes, rig))
 }
 

@@ -76,30 +76,24 @@ impl MotionCache {
         Arc::clone(&entry.views)
     }
 
-    /// Returns the cached detail views of a camera, filled where the last frame had the same view.
-    /// `None` if the camera is not in the cache.
-    pub(super) fn detail_views(
+    /// Returns the cached detail views of a camera, or those in which people on the floor are
+    /// looked for, filled where the last frame had the same view. `None` if the camera is not in
+    /// the cache.
+    pub(super) fn further_views(
         &self,
         camera: &str,
         rig: &Arc<CameraRig>,
         model: &Arc<Model>,
+        is_of_floor: bool,
     ) -> Option<Arc<CameraViews>> {
         let views = rig.virtual_views().cloned().collect();
         let known = self.0.get(camera)?;
-        Some(known.details.replace(views, rig, model))
-    }
-
-    /// Returns the cached views of a camera in which people on the floor are looked for. `None` if
-    /// the camera is not in the cache.
-    pub(super) fn floor_views(
-        &self,
-        camera: &str,
-        rig: &Arc<CameraRig>,
-        model: &Arc<Model>,
-    ) -> Option<Arc<CameraViews>> {
-        let views = rig.virtual_views().cloned().collect();
-        let known = self.0.get(camera)?;
-        Some(known.floor.replace(views, rig, model))
+        let last = if is_of_floor {
+            &known.floor
+        } else {
+            &known.details
+        };
+        Some(last.replace(views, rig, model))
     }
 
     /// Returns the cached crops of a camera, filled where the last frame had the same crop. `None`

@@ -71,8 +71,8 @@ const EXTENT_SD: f64 = 0.13;
 const OUTLIERS: f64 = 0.001;
 /// Most views whose votes count for one person.
 const MOST_VOTES: usize = 3;
-/// Means and standard deviations of the votes for lying and for low by posture: of 482 found people
-/// of rendered frames whose rooms and clothes training never had.
+/// Means and standard deviations of the votes for lying and for low by posture: of 484 found people
+/// of 40 rendered frames whose rooms and clothes training never had.
 const VOTES: [[(f64, f64); 2]; POSTURES] = [
     [(0.05, 0.11), (0.15, 0.17)],
     [(0.16, 0.15), (0.24, 0.14)],
@@ -224,7 +224,7 @@ impl BoxAngles {
 
 /// The votes of networks for a person on the floor, 0 to 1: the mean over the views that show the
 /// person.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FloorVotes {
     /// For a person who lies.
     pub lying: f64,

@@ -49,7 +49,8 @@ impl Engine {
         let model = self.models.get(name).ok_or_else(missing)?;
         let has_views = rig.virtual_views().next().is_some();
         let camera = job.parameters.motion_camera().filter(|_| has_views);
-        let cached = camera.and_then(|camera| self.motion_cache.floor_views(camera, &rig, &model));
+        let cached =
+            camera.and_then(|camera| self.motion_cache.further_views(camera, &rig, &model, true));
         let floor = self.queue_pass(job, observation, rig, model, cached);
         observation.wait_for(&floor)?;
         if let Some(pass) = observation.passes.last_mut() {
@@ -148,7 +149,8 @@ impl Engine {
         let rig = Arc::new(observation.camera.rig.with_details_of(targets)?);
         let model = Arc::clone(&observation.model);
         let camera = job.parameters.motion_camera();
-        let cached = camera.and_then(|camera| self.motion_cache.detail_views(camera, &rig, &model));
+        let cached =
+            camera.and_then(|camera| self.motion_cache.further_views(camera, &rig, &model, false));
         Some(self.queue_pass(job, observation, rig, model, cached))
     }
 }

@@ -71,8 +71,8 @@ fn a_report_names_its_camera_calibration_and_model() {
     assert_eq!(assumed.persons[0].floor, None);
 }
 
-/// Returns the best person of a frame with a blob, with or without the network for people on the
-/// floor, and the number of views.
+/// Returns the best person of a frame with a blob that few views show, with or without the network
+/// for people on the floor, and the number of views.
 fn best_person(floor: Option<BlobDetector>) -> (Person, usize) {
     let engine = engine_with_lobby();
     let has_floor = floor.is_some();
@@ -80,7 +80,7 @@ fn best_person(floor: Option<BlobDetector>) -> (Person, usize) {
         let model = Model::new(Box::new(detector));
         engine.models.put(Arc::new(model)).unwrap();
     }
-    let image = frame_with_disc(600, [420.0, 300.0], 20.0);
+    let image = frame_with_disc(600, [530.0, 300.0], 20.0);
     let mut named = vec![("calibration", "lobby"), ("profile", "fast")];
     if has_floor {
         named.push(("floor", "true"));
