@@ -65,16 +65,16 @@ def assign(logits, found, points, strides, truth, kind):
     return chosen.any(1), best
 
 
-def hold_loss(logits, sides, first_logits, first_sides, held):
-    """Divergence from the answers of the first network, of one class, at the cells `held` (b × n); 0 for equal answers.
+def hold_loss(logits, sides, first_logits, first_sides, held, held_sides):
+    """Divergence from the answers of the first network for the first class at the cells `held` (b × n); 0 for equal answers.
 
-    Of the scores, and of the distributions of box sides with the score of the first network as weight.
+    Of the scores, and at `held_sides` of the distributions of box sides, with the score of the first network as weight.
     """
-    target = first_logits[:, 0][held].sigmoid()
-    entropy = lambda x: F.binary_cross_entropy_with_logits(x[:, 0][held], target, reduction="sum")
-    log, first_log = sides[held].log_softmax(-1), first_sides[held].log_softmax(-1)
-    side = ((first_log.exp() * (first_log - log)).sum(-1).mean(1) * target).sum()
-    return entropy(logits) - entropy(first_logits) + 0.25 * side
+    target = first_logits[:, 0].sigmoid()
+    entropy = lambda x: F.binary_cross_entropy_with_logits(x[:, 0], target, reduction="none")
+    log, first_log = sides.log_softmax(-1), first_sides.log_softmax(-1)
+    side = (first_log.exp() * (first_log - log)).sum(-1).mean(2) * target
+    return ((entropy(logits) - entropy(first_logits)) * held + 0.25 * side * held_sides).sum()
 
 
 def batch_losses(logits, sides, found, points, strides, truth, kind, trust):

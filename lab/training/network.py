@@ -118,6 +118,14 @@ class Network(nn.Module):
             strides.append(torch.full((h * w,), float(stride), device=f.device))
         return torch.cat(logits, 2), torch.cat(sides, 1), torch.cat(points), torch.cat(strides)
 
+    def start_with(self, weights):
+        """Takes the `weights`, by their names, of the same network with one class: each class starts as that one."""
+        for key, name in self.onnx_names.items():
+            own, value = self.weights[key], torch.tensor(weights[name].astype(np.float32))
+            axis = int(value.dim() > 1 and value.shape[0] == own.shape[0])
+            copies = own.shape[axis] - value.shape[axis]
+            own.data = torch.cat([value.narrow(axis, 0, 1)] * copies + [value], axis) if copies else value
+
 
 def _fused(steps):
     """Joins padding, convolution and bias into one step."""

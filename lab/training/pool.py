@@ -35,7 +35,7 @@ def teacher_scores(boxes, found, scores):
 def source_of(o):
     """The samples of frames with people, mixed with those of frames without."""
     people = Frames(o.frames)
-    return Mixed(people, EmptyFrames(o.empty, o.false_alarms), o.empty_share) if o.empty else people
+    return Mixed(people, EmptyFrames(o.empty), o.empty_share) if o.empty else people
 
 
 def session_of(path):
@@ -76,7 +76,6 @@ def main():
     parser.add_argument("--floor", action="store_true", help="look at people on the floor most of the time")
     parser.add_argument("--empty", type=Path, help="a folder of frames without people: hard negatives")
     parser.add_argument("--empty-share", type=float, default=0.5, help="share of samples without people")
-    parser.add_argument("--false-alarms", type=Path, help="COCO results in the empty frames: places of crops")
     parser.add_argument("--teacher", type=Path, action="append", default=[], help="a model of Lookdown's contract")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--seed", type=int, default=1_000_000)

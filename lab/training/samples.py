@@ -168,19 +168,15 @@ class Frames:
 
 
 class EmptyFrames(Frames):
-    """Frames without people, all of whose cells are negatives. Views look at what is taken for a person.
+    """Frames without people, all of whose cells are negatives. Views look at what is taken for a person."""
 
-    `false_alarms`: COCO results of detections in these frames, for more places than the annotated distractors.
-    """
-
-    def __init__(self, folder, false_alarms=None):
+    def __init__(self, folder):
         super().__init__(folder)
         if any(self.annotations.values()):
             raise SystemExit(f"{folder} has people; --empty takes frames of `make.py empty`")
         data = json.loads((self.folder / "annotations.json").read_text())
-        found = json.loads(Path(false_alarms).read_text()) if false_alarms else []
         self.looked_at = {image["id"]: [] for image in self.images}
-        for place in data["distractors"] + found:
+        for place in data["distractors"]:
             self.looked_at[place["image_id"]].append(place["bbox"])
 
     def places(self, k, rng, floor):

@@ -2,8 +2,7 @@
 
     python lab/training/train.py --pool WORK/pools/views --model WORK/nanodet.onnx --out WORK/runs/first --minutes 60
 
-With `--hold`, the network keeps its first answers within persons and learns from all other cells that they are negatives.
-With `--floor`, a network of two classes learns people who lie and who are low.
+With `--floor`, the second and third class learn people who lie and who are low, and the first keeps its answers everywhere.
 
 Stopped runs go on from `OUT/last.pt`. Results: the tuned weights (`tuned.onnx`, an exponential moving average) and their
 average with the given model (`averaged.onnx`).
@@ -19,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from export import weights_of
 from losses import ABSENT, IGNORED, PERSON, batch_losses, hold_loss, within
 from network import Network, averaged, boxes_of, export
 
@@ -40,12 +40,11 @@ def options_of():
         "--full", type=float, default=0.0, help="a teachers' score below this one scales what a person's cells learn"
     )
     parser.add_argument(
-        "--hold",
-        type=float,
-        default=0.0,
-        help="weight of the first answers within persons, which replace the true boxes",
+        "--floor", type=float, default=0.0, help="learn people on the floor; weight of the first answers"
     )
-    parser.add_argument("--floor", action="store_true", help="learn people on the floor; all others are negatives")
+    parser.add_argument(
+        "--start", type=Path, help="a network of one class, such as a shipped one: all classes start as it"
+    )
     parser.add_argument("--share", type=float, default=0.5, help="share of the tuned weights in the average")
     parser.add_argument("--seed", type=int, default=1_000_000)
     parser.add_argument("--threads", type=int, default=1)
@@ -125,18 +124,33 @@ def answers(network, x):
     return logits.float(), sides.float(), points, strides
 
 
-def held_loss(network, first, batch, o):
-    """Loss of a batch that keeps the answers of the network `first` within persons, and its parts (score, hold, 0)."""
+def blended(x):
+    """A batch of random mixtures of two of its images: what the first answers are asked for beside the samples."""
+    share = torch.rand(len(x), 1, 1, 1, device=x.device)
+    return share * x + (1 - share) * x.flip(0).roll(1, 0)
+
+
+def floor_loss(network, first, batch, o):
+    """Loss of a batch in which people on the floor are learned beside the first class, and its parts (score, box, hold).
+
+    The last quarter of the images is mixed: there, only the first answers count (Beyer et al., Knowledge distillation:
+    A good teacher is patient and consistent, 2021).
+    """
     x, boxes, kind, trust = batch
+    learned = len(x) - len(x) // 4
+    x = torch.cat([x[:learned], blended(x[learned:])])
     logits, sides, points, strides = answers(network, x)
     with torch.no_grad():
         kept = answers(first, x)[:2]
-    negatives = torch.where(kind == ABSENT, kind, IGNORED)
     found = boxes_of(sides, points, strides)
-    score = batch_losses(logits, sides, found, points, strides, boxes, negatives, trust)[0][0] / len(x)
-    held = (within(points, boxes) & (kind != ABSENT)[..., None]).any(1)
-    hold = hold_loss(logits, sides, *kept, held) / len(x)
-    return score + o.hold * hold, torch.stack([score, hold, hold * 0]).detach()
+    cut = lambda *values: [value[:learned] for value in values]
+    parts, weight = batch_losses(logits[:learned, 1:], *cut(sides, found), points, strides, *cut(boxes, kind, trust))
+    parts = parts / weight.clamp(2.0)
+    free = within(points, boxes) & (kind >= PERSON)[..., None]
+    free[learned:] = False
+    hold = hold_loss(logits, sides, *kept, torch.ones_like(free[:, 0]), ~free.any(1))
+    hold = hold / kept[0][:, 0].sigmoid().sum().clamp(2.0)
+    return parts[0] + 2 * parts[1] + 0.25 * parts[2] + o.floor * hold, torch.stack([*parts[:2], hold]).detach()
 
 
 def step_loss(network, batch):
@@ -153,7 +167,10 @@ def train(o):
     o.out.mkdir(parents=True, exist_ok=True)
     torch.set_num_threads(o.threads)
     torch.manual_seed(o.seed)
-    network = Network(o.model).to(o.device, memory_format=torch.channels_last)
+    network = Network(o.model)
+    if o.start:
+        network.start_with(weights_of(o.start))
+    network = network.to(o.device, memory_format=torch.channels_last)
     first = copy.deepcopy(network)
     optimiser, trained = optimiser_of(network, o)
     mean, step, spent, last = copy.deepcopy(network), 0, 0.0, o.out / "last.pt"
@@ -181,7 +198,7 @@ def train(o):
         for group in optimiser.param_groups:
             group["lr"] = rate
         batch = varied(batches.get(), o.device)
-        loss, parts = held_loss(network, first, batch, o) if o.hold else step_loss(network, batch)
+        loss, parts = floor_loss(network, first, batch, o) if o.floor else step_loss(network, batch)
         optimiser.zero_grad()
         loss.backward()
         torch.nn.utils.clip_grad_norm_(trained, 10.0)

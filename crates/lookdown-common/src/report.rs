@@ -207,7 +207,7 @@ pub struct ReportPerson {
     /// Probability of the most likely posture; below 0.6 the posture is `unknown`.
     #[serde(default)]
     pub posture_probability: f64,
-    /// Votes for a person on the floor; absent without the parameter `floor`.
+    /// Votes for a person on the floor; absent if no network that tells postures looked.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub floor_votes: Option<ReportFloorVotes>,

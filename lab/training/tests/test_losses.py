@@ -62,8 +62,8 @@ class Losses(unittest.TestCase):
     def test_equal_answers_hold_without_loss(self):
         logits, sides = torch.randn(1, 1, 64), torch.randn(1, 64, 4, BINS)
         held = torch.ones(1, 64, dtype=torch.bool)
-        self.assertAlmostEqual(float(hold_loss(logits, sides, logits, sides, held)), 0, places=4)
-        self.assertGreater(float(hold_loss(logits + 1, sides, logits, sides, held)), 1)
+        self.assertAlmostEqual(float(hold_loss(logits, sides, logits, sides, held, held)), 0, places=4)
+        self.assertGreater(float(hold_loss(logits + 1, sides, logits, sides, held, held)), 1)
 
 
 if __name__ == "__main__":

@@ -24,6 +24,11 @@ pub trait Detector: Send {
         None
     }
 
+    /// Returns true if the network tells who lies and who is low, in addition to who is a person.
+    fn tells_postures(&self) -> bool {
+        false
+    }
+
     /// Detects persons in a batch rendered for [`Detector::input`]. Returns one list per view,
     /// unsorted, with overlaps and with scores of at least the detector's floor.
     ///
@@ -39,7 +44,7 @@ pub struct ViewDetection {
     pub bbox: BBox<ViewPixels>,
     /// Confidence, 0 to 1.
     pub score: f64,
-    /// The posture, where the network finds people in certain postures only.
+    /// The posture, where the score is that of a person in a certain posture.
     pub posture: Option<Posture>,
 }
 

@@ -98,6 +98,11 @@ impl Head {
         self.into()
     }
 
+    /// Returns true if there are scores of people in certain postures.
+    pub fn tells_postures(&self) -> bool {
+        matches!(self, Self::BoxesScores(head) if !head.postures.is_empty())
+    }
+
     /// Checks that a model with these outputs and an input of `(width, height)` pixels can be
     /// decoded. Dimensions that the model leaves open are -1.
     ///

@@ -28,6 +28,8 @@ pub struct Model {
     pub revision: String,
     /// Input format of the network.
     pub input: NetworkInput,
+    /// True if the network tells who lies and who is low.
+    pub tells_postures: bool,
     views_per_run: Option<NonZeroUsize>,
     /// Each session runs one batch at a time, in parallel with the others.
     sessions: Vec<Mutex<Box<dyn Detector>>>,
@@ -61,6 +63,7 @@ impl Model {
             name: first.name().to_owned(),
             revision: first.revision().to_owned(),
             input: first.input().clone(),
+            tells_postures: first.tells_postures(),
             views_per_run: first.views_per_run(),
             sessions: std::iter::once(first)
                 .chain(others)

@@ -172,6 +172,10 @@ impl Detector for OnnxDetector {
         self.description.views_per_run
     }
 
+    fn tells_postures(&self) -> bool {
+        self.description.manifest.output.tells_postures()
+    }
+
     fn detect(&mut self, batch: &ViewBatch) -> Result<HeadOutput, InferenceError> {
         let Self {
             session,

@@ -83,6 +83,10 @@ impl Detector for RemoteDetector {
         self.understood.signature.views_per_run
     }
 
+    fn tells_postures(&self) -> bool {
+        self.understood.manifest.output.tells_postures()
+    }
+
     fn detect(&mut self, batch: &ViewBatch) -> Result<HeadOutput, InferenceError> {
         let Self {
             server,

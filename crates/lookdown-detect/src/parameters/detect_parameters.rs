@@ -159,8 +159,9 @@ parameter_table! {
         name: "floor",
         kind: ParameterKind::Switch,
         default: ParameterDefault::Described("`false`; with `counts.floor_alert` `true`"),
-        help: "Looks for people on the floor with a network of its own in each search of the frame: \
-               people who lie, crouch, kneel, crawl or sit there. It costs a run for each wide view.",
+        help: "Looks for people on the floor as well: people who lie, crouch, kneel, crawl or sit \
+               there. The views have another network then, which finds upright people a little less \
+               well in photographs.",
         example: None,
         interfaces: DETECTION_WITH_DEFAULTS,
     };
@@ -220,7 +221,7 @@ pub struct DetectParameters {
     pub motion: bool,
     /// Follows the persons of the camera between searches of the whole frame.
     pub follow: bool,
-    /// Looks for people on the floor with a network of its own.
+    /// Looks for people on the floor as well, with another network for the views.
     pub floor: bool,
     /// Stores the report under the name of its camera.
     pub store: bool,

@@ -50,21 +50,28 @@ impl DefaultModels {
         }
     }
 
-    /// Returns the model for people on the floor.
+    /// Returns the model of the views that also finds people on the floor.
     pub fn floor_model(&self) -> &str {
         &self.floor_model
     }
 
+    /// Returns the model of the views of a request that names none.
+    pub fn model_of(&self, request: &DetectParameters) -> &str {
+        if request.floor {
+            &self.floor_model
+        } else {
+            &self.model
+        }
+    }
+
     /// Returns the models that a request needs.
     pub fn needed_by<'a>(&'a self, request: &'a DetectParameters) -> Vec<&'a str> {
-        let floor = request.floor.then_some(self.floor_model());
-        let persons = match &request.model {
-            Some(name) => vec![name.as_str()],
-            None => iter::once(self.model())
+        match &request.model {
+            Some(name) => vec![name],
+            None => iter::once(self.model_of(request))
                 .chain(self.crop_model(request.profile))
                 .collect(),
-        };
-        persons.into_iter().chain(floor).collect()
+        }
     }
 
     /// Returns all models, that of the views first.

@@ -217,7 +217,6 @@ impl Engine {
         let rigs: Vec<_> = observation
             .passes
             .into_iter()
-            .filter(|pass| !pass.is_of_floor)
             .map(|pass| pass.rig)
             .collect();
         let has_no_masks = observation.camera.rig.has_no_masks();
@@ -302,9 +301,6 @@ impl Engine {
         let first = self.queue_pass(job, &observation, rig, model, cached);
         observation.wait_for(&first)?;
         self.look_again(job, &mut observation)?;
-        if job.parameters.floor {
-            self.look_at_the_floor(job, &mut observation)?;
-        }
         Ok(observation)
     }
 
@@ -336,7 +332,16 @@ impl Engine {
     /// Returns the model that the request names, or the default model of its profile.
     fn model(&self, parameters: &DetectParameters) -> Result<Arc<Model>, PipelineError> {
         let Some(name) = &parameters.model else {
-            return self.default_model();
+            let name = self.options.default_models.model_of(parameters);
+            return self.models.get(name).ok_or_else(|| {
+                if parameters.floor {
+                    PipelineError::NoFloorModel {
+                        name: name.to_owned(),
+                    }
+                } else {
+                    PipelineError::ModelStarting
+                }
+            });
         };
         self.models.get(name).ok_or_else(|| {
             let loaded = self.models.all();

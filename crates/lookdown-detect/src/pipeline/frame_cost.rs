@@ -22,10 +22,8 @@ pub(super) fn for_frame(job: &DetectJob, max_pixels: u64) -> usize {
     }
     let profile = job.parameters.profile;
     let plan = profile.view_plan();
-    let first_pass = plan.as_ref().map_or(1, |plan| plan.directions.len());
-    let wide = plan.map_or(1, |plan| plan.constant_count);
-    let floor = if job.parameters.floor { wide } else { 0 };
-    let inputs = first_pass + profile.max_crop_inputs() + floor;
+    let first_pass = plan.map_or(1, |plan| plan.directions.len());
+    let inputs = first_pass + profile.max_crop_inputs();
     cost(size, job.ticket.drawn_width, inputs)
 }
 
@@ -64,17 +62,19 @@ mod tests {
 
     #[test]
     fn the_profile_counts_by_its_inputs_of_the_network() {
-        for (profile, floor, expected) in [
-            ("direct", "false", 1),
-            ("fast", "false", 1),
-            ("balanced", "false", 1),
-            ("quality", "false", 2),
-            ("paper", "false", 5),
-            ("paper", "true", 9),
+        for (profile, expected) in [
+            ("direct", 1),
+            ("fast", 1),
+            ("balanced", 1),
+            ("quality", 2),
+            ("paper", 5),
         ] {
             let image = frame_with_disc(100, [30.0, 50.0], 8.0);
-            let job = job(image, &[("profile", profile), ("floor", floor)]);
-            assert_eq!(for_frame(&job, u64::MAX), expected, "{profile} {floor}");
+            assert_eq!(
+                for_frame(&job(image, &[("profile", profile)]), u64::MAX),
+                expected,
+                "{profile}"
+            );
         }
     }
 }

@@ -26,8 +26,6 @@ struct CachedCamera {
     views: Arc<CameraViews>,
     /// The detail views of the last frame.
     details: ChangingViews<VirtualView>,
-    /// The views in which people on the floor are looked for.
-    floor: ChangingViews<VirtualView>,
     /// The crops of the last frame.
     crops: ChangingViews<Vec<FrameCrop>>,
 }
@@ -68,7 +66,6 @@ impl MotionCache {
         let no_views = || CachedCamera {
             views: CameraViews::new(rig, model, vec![None; rig.view_count()]),
             details: ChangingViews(Mutex::default()),
-            floor: ChangingViews(Mutex::default()),
             crops: ChangingViews(Mutex::default()),
         };
         let is_stale = |known: &CachedCamera| !known.views.are_of(rig, model);
@@ -76,24 +73,17 @@ impl MotionCache {
         Arc::clone(&entry.views)
     }
 
-    /// Returns the cached detail views of a camera, or those in which people on the floor are
-    /// looked for, filled where the last frame had the same view. `None` if the camera is not in
-    /// the cache.
-    pub(super) fn further_views(
+    /// Returns the cached detail views of a camera, filled where the last frame had the same view.
+    /// `None` if the camera is not in the cache.
+    pub(super) fn detail_views(
         &self,
         camera: &str,
         rig: &Arc<CameraRig>,
         model: &Arc<Model>,
-        is_of_floor: bool,
     ) -> Option<Arc<CameraViews>> {
         let views = rig.virtual_views().cloned().collect();
         let known = self.0.get(camera)?;
-        let last = if is_of_floor {
-            &known.floor
-        } else {
-            &known.details
-        };
-        Some(last.replace(views, rig, model))
+        Some(known.details.replace(views, rig, model))
     }
 
     /// Returns the cached crops of a camera, filled where the last frame had the same crop. `None`

@@ -1,11 +1,17 @@
 //! One pass over a frame: the views of a rig and the detections in each of them.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
-use lookdown_lens::geometry::Footprint;
+use lookdown_lens::geometry::{BackProjection, Footprint, Posture};
 
 use super::camera_rig::CameraRig;
-use crate::inference::{Model, ViewDetection};
+use crate::{
+    detection::{BBox, Candidate},
+    inference::{Model, ViewDetection},
+};
+
+/// The weight of the coordinates of a cut-off box when boxes are averaged.
+const BORDER_WEIGHT: f64 = 0.1;
 
 /// One pass over a frame. All passes over a frame share its camera.
 pub(super) struct Pass {
@@ -13,55 +19,96 @@ pub(super) struct Pass {
     pub(super) rig: Arc<CameraRig>,
     /// The model that processed the views.
     pub(super) model: Arc<Model>,
-    /// The detections in each view.
+    /// The detections in each view. Empty if the network was not run, as of views while persons are
+    /// followed.
     pub(super) per_view: Vec<Vec<ViewDetection>>,
-    /// True if the model finds people on the floor alone. Its views vote on no one else.
-    pub(super) is_of_floor: bool,
+    /// The number of views in the passes before.
+    first_vote: usize,
+    mapped: OnceLock<Vec<Mapped>>,
 }
 
 impl Pass {
+    /// Returns the pass after `before` with these detections in each view of `rig`.
+    pub(super) fn new(
+        before: &[Self],
+        rig: Arc<CameraRig>,
+        model: Arc<Model>,
+        per_view: Vec<Vec<ViewDetection>>,
+    ) -> Self {
+        Self {
+            first_vote: before.iter().map(|pass| pass.per_view.len()).sum(),
+            rig,
+            model,
+            per_view,
+            mapped: OnceLock::new(),
+        }
+    }
+
+    /// Returns the boxes of the views, mapped to the frame at the first call by the back projection
+    /// of the profile.
+    pub(super) fn mapped(&self, back_projection: BackProjection) -> &[Mapped] {
+        self.mapped.get_or_init(|| {
+            let views = self.per_view.iter().enumerate();
+            let found = views.flat_map(|(view, found)| found.iter().map(move |one| (view, one)));
+            found
+                .filter_map(|(view, found)| self.map(view, found, back_projection))
+                .collect()
+        })
+    }
+
+    fn map(
+        &self,
+        view: usize,
+        found: &ViewDetection,
+        back_projection: BackProjection,
+    ) -> Option<Mapped> {
+        let footprint = self.rig.footprint(view, &found.bbox, back_projection)?;
+        let cut_off = self.rig.cuts_off(view, &found.bbox, &self.model.input);
+        let candidate = Candidate {
+            bbox: BBox::new(footprint.bounds()).ok()?,
+            score: found.score,
+            view: self.first_vote + self.rig.voter(view),
+            coordinate_weight: if cut_off { BORDER_WEIGHT } else { 1.0 },
+            expected_views: 1.0,
+        };
+        Some(Mapped {
+            candidate,
+            footprint,
+            cut_off,
+            is_exact: self.rig.is_exact(),
+            posture: found.posture,
+        })
+    }
+
     /// Returns true if the views are upright crops of the frame.
     pub(super) fn is_of_crops(&self) -> bool {
         self.rig.crops().next().is_some()
     }
+
+    /// Returns true if the views vote on who is on the floor.
+    pub(super) fn tells_postures(&self) -> bool {
+        self.model.tells_postures && !self.per_view.is_empty()
+    }
 }
 
-/// A detection in one view of a pass.
-#[derive(Clone, Copy)]
-pub(super) struct PassDetection<'a> {
-    pub(super) pass: &'a Pass,
-    /// The index of the view in its rig.
-    pub(super) view: usize,
-    /// The number of the vote of the view, unique over all passes.
-    pub(super) vote: usize,
-    pub(super) detection: &'a ViewDetection,
-}
-
-/// Returns the detections of all passes.
-pub(super) fn detections(passes: &[Pass]) -> impl Iterator<Item = PassDetection<'_>> {
-    let numbered = passes.iter().scan(0, |before, pass| {
-        let first = *before;
-        *before += pass.per_view.len();
-        Some((first, pass))
-    });
-    numbered.flat_map(|(first, pass)| {
-        let views = pass.per_view.iter().enumerate();
-        views.flat_map(move |(view, found)| {
-            let vote = first + pass.rig.voter(view);
-            found.iter().map(move |detection| PassDetection {
-                pass,
-                view,
-                vote,
-                detection,
-            })
-        })
-    })
+/// A box of a view, with its footprint in the frame.
+pub(super) struct Mapped {
+    /// The bounds of the footprint, with the number of the view's vote, unique over all passes.
+    pub(super) candidate: Candidate,
+    pub(super) footprint: Footprint,
+    pub(super) cut_off: bool,
+    /// True for a box from a crop of the frame.
+    pub(super) is_exact: bool,
+    /// The posture of a person on the floor, if the score is that of such a person.
+    pub(super) posture: Option<Posture>,
 }
 
 /// Returns the number of votes of views in which a person with this footprint is wholly visible:
-/// over the passes for people on the floor, or over all others.
-pub(super) fn views_holding(passes: &[Pass], footprint: &Footprint, of_floor: bool) -> usize {
-    let voting = passes.iter().filter(|pass| pass.is_of_floor == of_floor);
+/// over all passes, or over those that tell postures.
+pub(super) fn views_holding(passes: &[Pass], footprint: &Footprint, of_postures: bool) -> usize {
+    let voting = passes
+        .iter()
+        .filter(|pass| !of_postures || pass.tells_postures());
     voting.map(|pass| pass.rig.views_holding(footprint)).sum()
 }
 
@@ -98,13 +145,10 @@ mod tests {
         };
         // The same person in both tiles of one input.
         let per_view = rig.per_view(vec![vec![found(20.0), found(58.0)]]);
-        let pass = Pass {
-            rig: Arc::new(rig),
-            model: Arc::new(Model::new(Box::new(BlobDetector::default()))),
-            per_view,
-            is_of_floor: false,
-        };
-        let votes: Vec<_> = detections(&[pass]).map(|found| found.vote).collect();
+        let model = Arc::new(Model::new(Box::new(BlobDetector::default())));
+        let pass = Pass::new(&[], Arc::new(rig), model, per_view);
+        let mapped = pass.mapped(BackProjection::TiltedEllipse);
+        let votes: Vec<_> = mapped.iter().map(|one| one.candidate.view).collect();
         assert_eq!(votes, [0, 1]);
     }
 }

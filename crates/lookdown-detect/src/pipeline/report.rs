@@ -172,7 +172,7 @@ pub struct Person {
     pub height: Option<PersonHeight>,
     /// The posture that the frame tells, and its probability.
     pub posture: (Posture, f64),
-    /// Votes for a person on the floor; `None` without a pass for such people.
+    /// Votes for a person on the floor; `None` if no network that tells postures looked.
     pub floor_votes: Option<FloorVotes>,
     /// The number of supporting views.
     pub views: usize,

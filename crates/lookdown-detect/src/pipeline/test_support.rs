@@ -27,7 +27,9 @@ pub(super) struct BlobDetector {
     pub(super) name: &'static str,
     /// Finds the bounding box of all pixels in a view that are brighter than this.
     pub(super) bright: f32,
-    /// The posture of everyone who is found.
+    /// True if it tells postures.
+    pub(super) tells_postures: bool,
+    /// A posture for everyone who is found, with a score of its own.
     pub(super) posture: Option<Posture>,
     pub(super) input: NetworkInput,
     /// Called before each batch.
@@ -39,6 +41,7 @@ impl Default for BlobDetector {
         Self {
             name: "blob",
             bright: 200.0,
+            tells_postures: false,
             posture: None,
             input: NetworkInput::plain(96, 96),
             before: Box::new(|| Ok(())),
@@ -57,6 +60,10 @@ impl Detector for BlobDetector {
 
     fn input(&self) -> &NetworkInput {
         &self.input
+    }
+
+    fn tells_postures(&self) -> bool {
+        self.tells_postures
     }
 
     fn detect(&mut self, batch: &ViewBatch) -> Result<HeadOutput, InferenceError> {
@@ -93,14 +100,16 @@ impl BlobDetector {
             let right = f64::from(self.input.width);
             sides.iter().all(|&side| side > 0.0 && side < right)
         };
-        found
-            .map(|bbox| ViewDetection {
+        let postures = [Some(None), self.posture.map(Some)];
+        let postures = postures.into_iter().flatten();
+        found.map_or_else(Vec::new, |bbox| {
+            let detection = |posture| ViewDetection {
                 score: if whole(&bbox) { 0.9 } else { 0.2 },
                 bbox,
-                posture: self.posture,
-            })
-            .into_iter()
-            .collect()
+                posture,
+            };
+            postures.map(detection).collect()
+        })
     }
 }
 

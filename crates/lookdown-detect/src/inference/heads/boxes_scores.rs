@@ -1,5 +1,7 @@
 //! Heads whose boxes and scores are outputs of their own.
 
+use std::iter;
+
 use lookdown_lens::geometry::Posture;
 use serde::Deserialize;
 
@@ -12,15 +14,16 @@ use super::{
 /// Graphs that decode boxes and scores.
 ///
 /// Boxes `[views, candidates, 4]` (`x_min, y_min, x_max, y_max`, view pixels) and scores
-/// `[views, candidates]` or `[views, candidates, 1]` of being a person, 0 to 1. A network for
-/// people in certain postures has scores `[views, candidates, postures]`.
+/// `[views, candidates]` or `[views, candidates, 1]` of being a person, 0 to 1. A network that
+/// tells postures has scores `[views, candidates, 1 + postures]`: of a person, and of one in each
+/// posture.
 ///
 /// ```toml
 /// [output]              # optional
 /// head = "boxes_scores"
 /// boxes = "boxes"       # default
 /// scores = "scores"     # default
-/// postures = ["lying", "low"]   # default: none, a score for all persons
+/// postures = ["lying", "low"]   # default: none
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -29,7 +32,7 @@ pub struct BoxesScoresHead {
     pub boxes: String,
     /// The output with the scores.
     pub scores: String,
-    /// The postures of the scores.
+    /// The postures of the scores after the first.
     pub postures: Vec<Posture>,
 }
 
@@ -48,7 +51,7 @@ impl Decoder for BoxesScoresHead {
         let boxes = named(outputs, &self.boxes)?;
         let scores = named(outputs, &self.scores)?;
         let candidates = Axis::AtLeast(0, "candidates");
-        let classes = self.postures.len().max(1);
+        let classes = 1 + self.postures.len();
         let by_class = [Axis::Views, candidates, Axis::Exactly(classes)];
         let has_classes = classes > 1 || scores.dimensions.len() == by_class.len();
         let scores_axes = if has_classes {
@@ -65,13 +68,13 @@ impl Decoder for BoxesScoresHead {
 
     fn decode(&self, tensors: &[&TensorView<'_>], collector: &mut CandidateCollector) {
         let (boxes, scores) = (tensors[0], tensors[1]);
-        let classes = self.postures.len().max(1);
+        let classes = 1 + self.postures.len();
+        let postures = iter::once(None).chain(self.postures.iter().copied().map(Some));
         for (view, (boxes, scores)) in boxes.views().zip(scores.views()).enumerate() {
             for (corners, scores) in boxes.chunks_exact(4).zip(scores.chunks_exact(classes)) {
-                for (class, &raw) in scores.iter().enumerate() {
+                for (posture, &raw) in postures.clone().zip(scores) {
                     let score = Activation::None.score(raw, collector.floor);
                     if let Some(score) = collector.judge(score) {
-                        let posture = self.postures.get(class).copied();
                         collector.add(view, score, posture, four(corners));
                     }
                 }

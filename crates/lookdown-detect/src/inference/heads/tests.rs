@@ -104,18 +104,18 @@ fn only_the_person_class_counts() {
 }
 
 #[test]
-fn each_score_of_a_box_belongs_to_its_posture() {
-    let floor = head("head = 'boxes_scores'\npostures = ['lying', 'low']");
+fn the_scores_after_the_first_belong_to_postures() {
+    let head = head("head = 'boxes_scores'\npostures = ['lying', 'low']");
     let outputs: [(&str, &[usize], &[f32]); 2] = [
         ("boxes", &[1, 1, 4], &INSIDE),
-        ("scores", &[1, 1, 2], &[0.7, 0.6]),
+        ("scores", &[1, 1, 3], &[0.8, 0.7, 0.6]),
     ];
-    let found = decode(&floor, &outputs, 0.5).unwrap();
+    let found = decode(&head, &outputs, 0.5).unwrap();
     let found: Vec<_> = found.per_view[0]
         .iter()
         .map(|found| found.posture)
         .collect();
-    assert_eq!(found, [Some(Posture::Lying), Some(Posture::Low)]);
+    assert_eq!(found, [None, Some(Posture::Lying), Some(Posture::Low)]);
 }
 
 #[test]

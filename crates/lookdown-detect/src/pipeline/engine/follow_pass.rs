@@ -33,12 +33,9 @@ impl Engine {
             return FirstPass::Search;
         };
         observation.is_searched = false;
-        observation.passes.push(Pass {
-            per_view: vec![Vec::new(); rig.view_count()],
-            rig: Arc::clone(&rig),
-            model: Arc::clone(&observation.model),
-            is_of_floor: false,
-        });
+        let model = Arc::clone(&observation.model);
+        let views = Pass::new(&[], Arc::clone(&rig), model, Vec::new());
+        observation.passes.push(views);
         if targets.is_empty() {
             return FirstPass::Nothing;
         }

@@ -24,37 +24,14 @@ impl Engine {
         if !observation.profile.has_crops() {
             return Ok(());
         }
-        let mut targets = observation.possible_persons();
+        let targets = observation.possible_persons(true);
         if let Some(details) = self.detail_pass(job, observation, &targets) {
             observation.wait_for(&details)?;
-            targets = observation.possible_persons();
         }
+        // The network of crops does not know people on the floor.
+        let targets = observation.possible_persons(false);
         if let Some(crops) = self.crop_pass(job, observation, &targets) {
             observation.wait_for(&crops)?;
-        }
-        Ok(())
-    }
-
-    /// Looks for people on the floor in the views of the plan.
-    pub(super) fn look_at_the_floor(
-        &self,
-        job: &DetectJob,
-        observation: &mut Observation,
-    ) -> Result<(), PipelineError> {
-        let rig = Arc::clone(&observation.camera.rig);
-        let name = self.options.default_models.floor_model();
-        let missing = || PipelineError::NoFloorModel {
-            name: name.to_owned(),
-        };
-        let model = self.models.get(name).ok_or_else(missing)?;
-        let has_views = rig.virtual_views().next().is_some();
-        let camera = job.parameters.motion_camera().filter(|_| has_views);
-        let cached =
-            camera.and_then(|camera| self.motion_cache.further_views(camera, &rig, &model, true));
-        let floor = self.queue_pass(job, observation, rig, model, cached);
-        observation.wait_for(&floor)?;
-        if let Some(pass) = observation.passes.last_mut() {
-            pass.is_of_floor = true;
         }
         Ok(())
     }
@@ -149,17 +126,17 @@ impl Engine {
         let rig = Arc::new(observation.camera.rig.with_details_of(targets)?);
         let model = Arc::clone(&observation.model);
         let camera = job.parameters.motion_camera();
-        let cached =
-            camera.and_then(|camera| self.motion_cache.further_views(camera, &rig, &model, false));
+        let cached = camera.and_then(|camera| self.motion_cache.detail_views(camera, &rig, &model));
         Some(self.queue_pass(job, observation, rig, model, cached))
     }
 }
 
 impl Observation {
-    /// Returns the possible persons in the passes so far, highest score first.
-    fn possible_persons(&self) -> Vec<CropTarget> {
+    /// Returns the possible persons in the passes so far, highest score first; `with_postures` with
+    /// those on the floor.
+    fn possible_persons(&self, with_postures: bool) -> Vec<CropTarget> {
         self.timeline.enter(Stage::Refine, Instant::now());
         let (passes, rig) = (&self.passes, &self.camera.rig);
-        merge::possible_persons(passes, rig, self.profile, &self.tuning)
+        merge::possible_persons(passes, rig, self.profile, &self.tuning, with_postures)
     }
 }

@@ -66,7 +66,7 @@ impl Observation {
         if !self.is_searched {
             return 0;
         }
-        let later = self.passes.iter().skip(1).filter(|pass| !pass.is_of_floor);
+        let later = self.passes.iter().skip(1);
         let details = later.map(|pass| pass.rig.virtual_views().count());
         self.camera.rig.detail_count() - details.sum::<usize>()
     }
@@ -99,12 +99,10 @@ impl Observation {
     pub(super) fn wait_for(&mut self, task: &PassTask) -> Result<(), PipelineError> {
         let output = task.wait()?;
         let cost = output.cost;
-        self.passes.push(Pass {
-            rig: Arc::clone(&task.rig),
-            model: Arc::clone(&task.model),
-            per_view: task.rig.per_view(output.per_view),
-            is_of_floor: false,
-        });
+        let (rig, model) = (Arc::clone(&task.rig), Arc::clone(&task.model));
+        let per_view = task.rig.per_view(output.per_view);
+        self.passes
+            .push(Pass::new(&self.passes, rig, model, per_view));
         self.batch_count += cost.runs;
         self.unchanged_views += cost.still_views;
         self.non_finite += cost.non_finite;

@@ -101,12 +101,7 @@ fn pass(rig: &Arc<CameraRig>, detections: &[(usize, ViewDetection)]) -> Pass {
     for (view, detection) in detections {
         per_view[view % rig.view_count()].push(*detection);
     }
-    Pass {
-        rig: Arc::clone(rig),
-        model: Arc::clone(&MODEL),
-        per_view,
-        is_of_floor: false,
-    }
+    Pass::new(&[], Arc::clone(rig), Arc::clone(&MODEL), per_view)
 }
 
 proptest! {
