@@ -371,10 +371,9 @@ fn open(
         }
         None => None,
     };
-    let defaults = DefaultModels::for_device(settings.inference.device);
     let defaults = match &elsewhere {
-        Some((name, _)) => defaults.with_one(name.clone()),
-        None => defaults,
+        Some((name, _)) => DefaultModels::one(name.clone()),
+        None => DefaultModels::for_device(settings.inference.device),
     };
     let called = defaults.model().to_owned();
     let options = RepositoryOptions {

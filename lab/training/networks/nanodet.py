@@ -1,6 +1,6 @@
 """NanoDet-g trained on COCO, from its TensorFlow.js form: `MODEL_JSON ONNX [CLASSES]`.
 
-With two classes, both scores are those of a person: a start for networks that find people who lie and who are low.
+With three classes, all scores are those of a person: a start for networks that find people who lie and who are low.
 
 NanoDet predicts, per cell, the distances from the cell's center to the four sides of the box, each as a
 distribution over whole strides (Li et al., Generalized Focal Loss, 2020).

@@ -27,13 +27,12 @@ impl DefaultModels {
         }
     }
 
-    /// Uses one model for the views and the crops of all profiles.
-    #[must_use]
-    pub fn with_one(self, model: String) -> Self {
+    /// Uses one model for the views and the crops of all profiles, also for people on the floor.
+    pub fn one(model: String) -> Self {
         Self {
+            floor_model: model.clone(),
             model,
             crop_model: None,
-            ..self
         }
     }
 
@@ -117,8 +116,10 @@ mod tests {
 
     #[test]
     fn one_model_can_serve_all_profiles() {
-        let one = DefaultModels::for_device(Device::Cpu).with_one("mine".to_owned());
+        let one = DefaultModels::one("mine".to_owned());
         assert_eq!(one.names().collect::<Vec<_>>(), ["mine"]);
         assert_eq!(one.crop_model(Profile::Balanced), None);
+        let floor = DetectParameters::parse([(DetectParameters::FLOOR, "true")]).unwrap();
+        assert_eq!(one.needed_by(&floor), ["mine"]);
     }
 }

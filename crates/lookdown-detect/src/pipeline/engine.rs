@@ -39,7 +39,7 @@ use super::{
 };
 use crate::{
     detection::RefinementParameters,
-    inference::{Device, Model, ModelRegistry},
+    inference::{Model, ModelRegistry},
     metrics::{DetectMetrics, start_at_zero},
     parameters::DetectParameters,
 };
@@ -89,8 +89,7 @@ impl EngineOptions {
 
     /// Returns options for tests: `model` for all profiles, one session, large batches.
     pub fn for_testing(model: &str) -> Self {
-        let models = DefaultModels::for_device(Device::Cpu).with_one(model.to_owned());
-        let mut options = Self::new(models, NonZeroUsize::MIN);
+        let mut options = Self::new(DefaultModels::one(model.to_owned()), NonZeroUsize::MIN);
         options.batches.max_views = NonZeroUsize::MIN.saturating_add(127);
         options
     }

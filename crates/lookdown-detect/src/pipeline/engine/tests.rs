@@ -1,7 +1,7 @@
 use super::*;
 use lookdown_lens::geometry::{FloorVotes, Posture};
 
-use crate::inference::InferenceError;
+use crate::inference::{Device, InferenceError};
 use crate::pipeline::test_support::{BlobDetector, calibration, engine, frame_with_disc, job};
 
 fn engine_with_lobby() -> Engine {
@@ -71,10 +71,17 @@ fn a_report_names_its_camera_calibration_and_model() {
     assert_eq!(assumed.persons[0].floor, None);
 }
 
+/// An engine whose network for people on the floor is another one than that of the views.
+fn engine_with_floor() -> Engine {
+    let mut engine = engine_with_lobby();
+    engine.options.default_models = DefaultModels::for_device(Device::Cpu);
+    engine
+}
+
 /// Returns the best person of a frame with a blob that few views show, by a network for people on
 /// the floor that gives the blob this posture, if any.
 fn best_person(posture: Option<Posture>) -> Person {
-    let engine = engine_with_lobby();
+    let engine = engine_with_floor();
     let detector = BlobDetector {
         name: "nanodet_g_floor_416",
         tells_postures: true,
@@ -106,7 +113,7 @@ fn the_network_for_the_floor_tells_who_lies() {
 
 #[test]
 fn a_missing_network_for_the_floor_is_named() {
-    let engine = engine_with_lobby();
+    let engine = engine_with_floor();
     let image = frame_with_disc(600, [420.0, 300.0], 20.0);
     let error = engine
         .detect(&job(image, &[("floor", "true")]))
