@@ -10,10 +10,12 @@ use crate::{definition::CameraDefinition, now::milliseconds};
 
 /// Most people of a camera.
 const MAX_PERSONS: usize = 64;
-/// A person is down from this probability of lying, and up from this one of standing or sitting.
-/// Between them nothing changes. People who are low do not begin an alert: their boxes are those of
-/// people who sit. docs/count.md has the misses and the false alerts.
+/// A person is down from this probability of lying or being low, if lying is likelier than not, and
+/// up from this one of standing or sitting. Between them nothing changes. People who are low alone
+/// do not begin an alert: they clean and play there. docs/count.md has the misses and the false
+/// alerts.
 const DOWN: f64 = 0.9;
+const LEAST_LYING: f64 = 0.5;
 const UP: f64 = 0.9;
 /// A person who is up for this long is up again, milliseconds.
 const UP_MS: i64 = 5_000;
@@ -78,7 +80,9 @@ impl Floor {
         for track in tracks {
             let is_expected = zone_of(track, definition, true).is_some();
             let probability = |posture| track.posture_probability(posture);
-            let is_down = probability(Posture::Lying) >= DOWN && !is_expected;
+            let lying = probability(Posture::Lying);
+            let is_low = lying + probability(Posture::Low) >= DOWN;
+            let is_down = is_low && lying >= LEAST_LYING && !is_expected;
             let known = self.index_of(track, tracks);
             if let Some(index) = known {
                 let up = probability(Posture::Upright) + probability(Posture::Seated);

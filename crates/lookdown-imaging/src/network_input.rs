@@ -39,6 +39,11 @@ impl NetworkInput {
         }
     }
 
+    /// Returns the shorter side, pixels.
+    pub fn shorter_side(&self) -> u32 {
+        self.width.min(self.height)
+    }
+
     /// Number of values in one plane of one view.
     pub fn plane_len(&self) -> usize {
         self.width as usize * self.height as usize

@@ -25,11 +25,15 @@ const START_S: i64 = 1_795_262_400;
 /// and lying across the line of sight.
 const STANDING: [f64; 3] = [751.0, 62.0, 129.0];
 const LYING: [f64; 3] = [708.0, 158.0, 42.0];
+/// The same box of someone on the floor, who lies or kneels.
+const LOW: [f64; 3] = [710.0, 80.0, 70.0];
 
 /// A camera with a zone at the person and a report each second.
 struct Hall {
     counter: Counter,
     zone: &'static str,
+    /// The votes of networks for people on the floor, as in reports.
+    votes: &'static str,
     started: Instant,
     second: i64,
 }
@@ -45,6 +49,7 @@ impl Hall {
         Self {
             counter: Counter::new(options, 0, Totals::default()),
             zone,
+            votes: "null",
             started: Instant::now(),
             second: 0,
         }
@@ -52,10 +57,11 @@ impl Hall {
 
     /// Sends reports with this person for some seconds.
     fn watch(&mut self, seconds: i64, person: Option<[f64; 3]>) -> &mut Self {
+        let votes = self.votes;
         for _ in 0..seconds {
             let person = person.map(|[cx, width, height]| {
                 format!(
-                    r#"{{{OF_PERSON}, "score": 0.9, "floor": {{"x_m": 2, "y_m": 0}},
+                    r#"{{{OF_PERSON}, "score": 0.9, "floor": {{"x_m": 2, "y_m": 0}}, "floor_votes": {votes},
                         "bearing": {{"azimuth_deg": 0, "off_axis_deg": 40}},
                         "oriented_box": {{"cx": {cx}, "cy": 500, "width": {width}, "height": {height},
                                           "angle_deg": 90}}}}"#
@@ -150,6 +156,18 @@ fn acknowledged_alert_stays_listed() {
     assert!(hall.metric().ends_with(" 0"));
     assert_eq!(hall.watch(300, None).alerts().len(), 1);
     assert_eq!(hall.watch(400, None).alerts(), []);
+}
+
+#[test]
+fn person_who_may_lie_or_be_low_is_an_alert() {
+    for (votes, count) in [
+        (r#"{"lying": 0.55, "low": 0.5}"#, 1),
+        (r#"{"lying": 0.05, "low": 0.5}"#, 0),
+    ] {
+        let mut hall = Hall::new("");
+        hall.votes = votes;
+        assert_eq!(hall.watch(60, Some(LOW)).alerts().len(), count, "{votes}");
+    }
 }
 
 #[test]

@@ -26,7 +26,8 @@ struct CachedCamera {
     views: Arc<CameraViews>,
     /// The detail views of the last frame.
     details: ChangingViews<VirtualView>,
-    /// The crops of the last frame.
+    /// The crops of the last frame for the network of the views, and for another one.
+    floor_crops: ChangingViews<Vec<FrameCrop>>,
     crops: ChangingViews<Vec<FrameCrop>>,
 }
 
@@ -66,6 +67,7 @@ impl MotionCache {
         let no_views = || CachedCamera {
             views: CameraViews::new(rig, model, vec![None; rig.view_count()]),
             details: ChangingViews(Mutex::default()),
+            floor_crops: ChangingViews(Mutex::default()),
             crops: ChangingViews(Mutex::default()),
         };
         let is_stale = |known: &CachedCamera| !known.views.are_of(rig, model);
@@ -95,7 +97,12 @@ impl MotionCache {
         model: &Arc<Model>,
     ) -> Option<Arc<CameraViews>> {
         let known = self.0.get(camera)?;
-        Some(known.crops.replace(rig.crops_of_inputs(), rig, model))
+        let crops = if known.views.are_of_model(model) {
+            &known.floor_crops
+        } else {
+            &known.crops
+        };
+        Some(crops.replace(rig.crops_of_inputs(), rig, model))
     }
 }
 

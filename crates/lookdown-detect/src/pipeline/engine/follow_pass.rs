@@ -40,7 +40,7 @@ impl Engine {
             return FirstPass::Nothing;
         }
         let model = self.crop_model(parameters, &observation.model);
-        let side = model.input.width.min(model.input.height);
+        let side = model.input.shorter_side();
         let frame = &observation.network_frame;
         let (width, height) = (frame.width(), frame.height());
         let fill = observation.tuning.crop_fill;

@@ -2,7 +2,10 @@
 
 use std::{sync::Arc, time::Instant};
 
-use lookdown_lens::geometry::crop_placement::{CropTarget, nadir_crop, place_crops};
+use lookdown_lens::geometry::{
+    FrameCrop,
+    crop_placement::{CropTarget, nadir_crop, place_crops},
+};
 
 use super::{Engine, Observation};
 use crate::{
@@ -14,6 +17,10 @@ use crate::{
     },
 };
 
+/// Most crops around people on the floor. With 2 or 3 instead of 5, `fast` finds .76 or .77 instead
+/// of .81 of those who lie in 120 rendered frames of 18 people.
+const MAX_FLOOR_CROPS: usize = 5;
+
 impl Engine {
     /// Looks again where the first pass shows a possible person, if the profile does so.
     pub(super) fn look_again(
@@ -24,13 +31,24 @@ impl Engine {
         if !observation.profile.has_crops() {
             return Ok(());
         }
-        let targets = observation.possible_persons(true);
+        let targets = observation.possible_persons(false);
         if let Some(details) = self.detail_pass(job, observation, &targets) {
             observation.wait_for(&details)?;
         }
-        // The network of crops does not know people on the floor.
+        // The network of the other crops does not know people on the floor.
+        let model = Arc::clone(&observation.model);
+        if model.tells_postures {
+            let targets = observation.possible_persons(true);
+            let fill = observation.tuning.crop_fill;
+            let crops = place_crops(&targets, MAX_FLOOR_CROPS, fill, model.input.shorter_side());
+            if let Some(crops) = self.crop_pass(job, observation, model, &crops) {
+                observation.wait_for(&crops)?;
+            }
+        }
         let targets = observation.possible_persons(false);
-        if let Some(crops) = self.crop_pass(job, observation, &targets) {
+        let model = self.crop_model(&job.parameters, &observation.model);
+        let crops = observation.crops(&targets, model.input.shorter_side());
+        if let Some(crops) = self.crop_pass(job, observation, model, &crops) {
             observation.wait_for(&crops)?;
         }
         Ok(())
@@ -53,53 +71,29 @@ impl Engine {
             .queue_pass(rig, model, frame, ticket, cached_views)
     }
 
-    /// Queues upright crops of the frame around the targets and at the nadir.
+    /// Queues crops of the frame.
     fn crop_pass(
         &self,
         job: &DetectJob,
         observation: &Observation,
-        targets: &[CropTarget],
+        model: Arc<Model>,
+        crops: &[FrameCrop],
     ) -> Option<Arc<PassTask>> {
         let timeline = &job.ticket.timeline;
         timeline.enter(Stage::Remap, Instant::now());
-        let Some((rig, model)) = self.crops(job, observation, targets) else {
+        let (width, height) = (observation.frame.width(), observation.frame.height());
+        let (rig, side) = (&observation.camera.rig, model.input.shorter_side());
+        let rig = self
+            .remappers
+            .install(|| rig.with_crops(side, crops, width, height));
+        if rig.view_count() == 0 {
             timeline.leave(Instant::now());
             return None;
-        };
+        }
         let rig = Arc::new(rig);
         let camera = job.parameters.motion_camera();
         let cached = camera.and_then(|camera| self.motion_cache.crop_views(camera, &rig, &model));
         Some(self.queue_pass(job, observation, rig, model, cached))
-    }
-
-    /// Plans upright crops for the profile's model of crops, or for the model that the request
-    /// names.
-    fn crops(
-        &self,
-        job: &DetectJob,
-        observation: &Observation,
-        targets: &[CropTarget],
-    ) -> Option<(CameraRig, Arc<Model>)> {
-        let model = self.crop_model(&job.parameters, &observation.model);
-        let side = model.input.width.min(model.input.height);
-        let max_crops = observation.profile.max_crops();
-        let mut crops = place_crops(targets, max_crops, observation.tuning.crop_fill, side);
-        if observation.profile.has_nadir_crop() {
-            let geometry = &observation.camera.rig.geometry;
-            crops.extend(nadir_crop(&geometry.lens, &geometry.mount, side));
-        }
-        if observation.profile.mirrors_crops() {
-            crops = crops
-                .iter()
-                .flat_map(|crop| [*crop, crop.mirrored()])
-                .collect();
-        }
-        let (width, height) = (observation.frame.width(), observation.frame.height());
-        let rig = &observation.camera.rig;
-        let rig = self
-            .remappers
-            .install(|| rig.with_crops(side, &crops, width, height));
-        (rig.view_count() > 0).then_some((rig, model))
     }
 
     /// Returns the model of the upright crops of a request whose views `model` processes: the
@@ -132,11 +126,28 @@ impl Engine {
 }
 
 impl Observation {
-    /// Returns the possible persons in the passes so far, highest score first; `with_postures` with
-    /// those on the floor.
-    fn possible_persons(&self, with_postures: bool) -> Vec<CropTarget> {
+    /// Returns the possible persons in the passes so far, highest score first: those that any
+    /// network knows, or those `on_the_floor`.
+    fn possible_persons(&self, on_the_floor: bool) -> Vec<CropTarget> {
         self.timeline.enter(Stage::Refine, Instant::now());
         let (passes, rig) = (&self.passes, &self.camera.rig);
-        merge::possible_persons(passes, rig, self.profile, &self.tuning, with_postures)
+        merge::possible_persons(passes, rig, self.profile, &self.tuning, on_the_floor)
+    }
+
+    /// Places upright crops around the targets and at the nadir, as the profile has them.
+    fn crops(&self, targets: &[CropTarget], side: u32) -> Vec<FrameCrop> {
+        let max_crops = self.profile.max_crops();
+        let mut crops = place_crops(targets, max_crops, self.tuning.crop_fill, side);
+        if self.profile.has_nadir_crop() {
+            let geometry = &self.camera.rig.geometry;
+            crops.extend(nadir_crop(&geometry.lens, &geometry.mount, side));
+        }
+        if self.profile.mirrors_crops() {
+            crops = crops
+                .iter()
+                .flat_map(|crop| [*crop, crop.mirrored()])
+                .collect();
+        }
+        crops
     }
 }

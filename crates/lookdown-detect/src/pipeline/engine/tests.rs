@@ -78,9 +78,9 @@ fn engine_with_floor() -> Engine {
     engine
 }
 
-/// Returns the best person of a frame with a blob that few views show, by a network for people on
-/// the floor that gives the blob this posture, if any.
-fn best_person(posture: Option<Posture>) -> Person {
+/// Returns the report of a frame with a blob that few views show, by a network for people on the
+/// floor that gives the blob this posture, if any.
+fn report_with_floor(posture: Option<Posture>) -> DetectionReport {
     let engine = engine_with_floor();
     let detector = BlobDetector {
         name: "nanodet_g_floor_416",
@@ -98,13 +98,16 @@ fn best_person(posture: Option<Posture>) -> Person {
     ];
     let report = engine.detect(&job(image, &named)).unwrap().report;
     assert_eq!(report.model.name, "nanodet_g_floor_416");
-    report.persons[0].clone()
+    report
 }
 
 #[test]
 fn the_network_for_the_floor_tells_who_lies() {
-    let upright = best_person(None);
-    let lying = best_person(Some(Posture::Lying));
+    let reports = [None, Some(Posture::Lying)].map(report_with_floor);
+    let [upright, lying] = reports.each_ref().map(|report| &report.persons[0]);
+    // A crop for the network that knows people on the floor.
+    let [without, with] = reports.each_ref().map(|report| report.views.inferred);
+    assert_eq!(with, without + 1);
     assert_eq!(upright.floor_votes, Some(FloorVotes::default()));
     assert!(lying.floor_votes.unwrap().lying > 0.3, "{lying:?}");
     assert_ne!(lying.posture, upright.posture);
