@@ -171,6 +171,19 @@ fn person_who_may_lie_or_be_low_is_an_alert() {
 }
 
 #[test]
+fn person_who_sat_a_minute_has_not_come_down_in_the_same_box() {
+    for (seated_s, count) in [(120, 0), (20, 1)] {
+        let mut hall = Hall::new("");
+        hall.votes = r#"{"lying": 0.05, "low": 0.25}"#;
+        hall.watch(seated_s, Some(LOW));
+        hall.votes = r#"{"lying": 0.55, "low": 0.5}"#;
+        let [left, across, along] = LOW;
+        hall.watch(60, Some([left + 5.0, across, along]));
+        assert_eq!(hall.alerts().len(), count, "{seated_s} s");
+    }
+}
+
+#[test]
 fn person_who_lies_where_expected_is_no_alert() {
     let mut hall = Hall::new(r#", "lying": "expected""#);
     hall.watch(10, Some(STANDING)).watch(60, Some(LYING));

@@ -161,7 +161,7 @@ parameter_table! {
         default: ParameterDefault::Described("`false`; with `counts.floor_alert` `true`"),
         help: "Looks for people on the floor as well: people who lie, crouch, kneel, crawl or sit \
                there. The views have another network then, which finds upright people a little less \
-               well in photographs.",
+               well in photographs, and up to 5 crops show it who may be there.",
         example: None,
         interfaces: DETECTION_WITH_DEFAULTS,
     };
