@@ -12,13 +12,6 @@ use crate::{definition::CameraDefinition, now::milliseconds};
 
 /// Most people of a camera.
 const MAX_PERSONS: usize = 64;
-/// A person is down from this probability of lying or being low, if lying is likelier than not, and
-/// up from this one of standing or sitting. Between them nothing changes. People who are low alone
-/// do not begin an alert: they clean and play there. docs/count.md has the misses and the false
-/// alerts.
-const DOWN: f64 = 0.9;
-const UP: f64 = 0.9;
-const LIKELIER: f64 = 0.5;
 /// Someone who sat for this long in the same box has not come down in it, milliseconds: 10 instead
 /// of 32 of 400 people who are simulated to sit for half an hour become an alert. Standing does not
 /// count: someone who falls away from the camera can have the same box.
@@ -100,21 +93,16 @@ impl Floor {
         after_ms: i64,
         definition: &CameraDefinition,
     ) {
-        let is_shown = |id: &TrackId| tracks.iter().any(|track| track.id == *id);
         self.seats
-            .retain(|id, seat| is_shown(id) || at_ms - seat.seen_ms <= UNSEEN_MS);
+            .retain(|_, seat| at_ms - seat.seen_ms <= UNSEEN_MS);
         for track in tracks {
             let is_expected = zone_of(track, definition, true).is_some();
-            let probability = |posture| track.posture_probability(posture);
-            let lying = probability(Posture::Lying);
-            let is_low = lying + probability(Posture::Low) >= DOWN;
-            let is_up = probability(Posture::Upright) + probability(Posture::Seated) >= UP;
-            let sits = is_up && probability(Posture::Seated) >= LIKELIER;
-            let is_settled = self.has_settled(track, sits, at_ms);
-            let is_down = is_low && lying >= LIKELIER && !is_expected && !is_settled;
+            let belief = track.posture_belief();
+            let is_settled = self.has_settled(track, belief.sits(), at_ms);
+            let is_down = belief.is_down() && !is_expected && !is_settled;
             let known = self.index_of(track, tracks);
             if let Some(index) = known {
-                let is_up = is_up || is_expected;
+                let is_up = belief.is_up() || is_expected;
                 self.persons[index].see(track, at_ms, is_down, is_up, definition);
             } else if is_down && self.persons.len() < MAX_PERSONS {
                 self.last_id += 1;

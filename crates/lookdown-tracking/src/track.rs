@@ -209,9 +209,9 @@ impl Track {
         self.posture.posture()
     }
 
-    /// Returns the probability of a posture at the last observation.
-    pub fn posture_probability(&self, posture: Posture) -> f64 {
-        self.posture.probability(posture)
+    /// Returns the evidence about the posture up to the last observation.
+    pub fn posture_belief(&self) -> &PostureBelief {
+        &self.posture
     }
 
     /// Returns the velocity on the floor, meters per second; `None` without the camera's height.

@@ -25,7 +25,7 @@ const START_S: i64 = 1_795_262_400;
 /// and lying across the line of sight.
 const STANDING: [f64; 3] = [751.0, 62.0, 129.0];
 const LYING: [f64; 3] = [708.0, 158.0, 42.0];
-/// The same box of someone on the floor, who lies or kneels.
+/// The box of someone there who lies, kneels or sits.
 const LOW: [f64; 3] = [710.0, 80.0, 70.0];
 
 /// A camera with a zone at the person and a report each second.
@@ -177,8 +177,8 @@ fn person_who_sat_a_minute_has_not_come_down_in_the_same_box() {
         hall.votes = r#"{"lying": 0.05, "low": 0.25}"#;
         hall.watch(seated_s, Some(LOW));
         hall.votes = r#"{"lying": 0.55, "low": 0.5}"#;
-        let [left, across, along] = LOW;
-        hall.watch(60, Some([left + 5.0, across, along]));
+        let [cx, width, height] = LOW;
+        hall.watch(60, Some([cx + 5.0, width, height]));
         assert_eq!(hall.alerts().len(), count, "{seated_s} s");
     }
 }

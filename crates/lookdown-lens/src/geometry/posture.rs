@@ -42,6 +42,10 @@ impl Posture {
 const POSTURES: usize = 4;
 /// A posture with a lower probability is [`Posture::Unknown`].
 const LEAST_PROBABILITY: f64 = 0.6;
+/// A person is down from this probability of lying or being low, if lying has at least the second
+/// one, and up from this one of standing or sitting. People who are low alone clean and play there.
+const SURE: f64 = 0.9;
+const LEAST_LYING: f64 = 0.5;
 
 /// Sizes of people and their steps, relative to the bodies below, who are 1.7 m tall.
 const SIZES: usize = 13;
@@ -390,6 +394,22 @@ impl PostureBelief {
         self.weights
             .get(posture as usize)
             .map_or(0.0, |weights| weights.iter().sum())
+    }
+
+    /// Returns true if the person is down, as for a floor alert.
+    pub fn is_down(&self) -> bool {
+        let lying = self.probability(Posture::Lying);
+        lying >= LEAST_LYING && lying + self.probability(Posture::Low) >= SURE
+    }
+
+    /// Returns true if the person stands or sits. Someone may be neither down nor up.
+    pub fn is_up(&self) -> bool {
+        self.probability(Posture::Upright) + self.probability(Posture::Seated) >= SURE
+    }
+
+    /// Returns true if the person sits.
+    pub fn sits(&self) -> bool {
+        self.is_up() && self.posture().0 == Posture::Seated
     }
 
     /// Returns the most likely posture with its probability, [`Posture::Unknown`] below .6.

@@ -31,7 +31,8 @@ impl Engine {
         if !observation.profile.has_crops() {
             return Ok(());
         }
-        let targets = observation.possible_persons(false);
+        let mut targets = observation.possible_persons(false);
+        let seen = observation.passes.len();
         if let Some(details) = self.detail_pass(job, observation, &targets) {
             observation.wait_for(&details)?;
         }
@@ -45,7 +46,9 @@ impl Engine {
                 observation.wait_for(&crops)?;
             }
         }
-        let targets = observation.possible_persons(false);
+        if observation.passes.len() > seen {
+            targets = observation.possible_persons(false);
+        }
         let model = self.crop_model(&job.parameters, &observation.model);
         let crops = observation.crops(&targets, model.input.shorter_side());
         if let Some(crops) = self.crop_pass(job, observation, model, &crops) {

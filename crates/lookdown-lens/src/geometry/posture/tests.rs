@@ -364,10 +364,9 @@ fn unknown_height_of_the_camera_is_learned() {
 }
 
 /// Returns in how many of `sessions` someone in a pose is down for 20 s, by the rule of floor
-/// alerts: lying or low from .9, lying from .5, up from .9 for 5 s, and not after a minute of
-/// sitting in a box of the same length. The person stands first, then changes the limbs every two
-/// minutes. Boxes have errors, and votes their distribution for the posture; both change within a
-/// minute.
+/// alerts: not after being up for 5 s, nor after a minute of sitting in a box of the same length.
+/// The person stands first, then changes the limbs every two minutes. Boxes have errors, and votes
+/// their distribution for the posture; both change within a minute.
 fn sessions_down(pose: Pose, [sessions, minutes]: [usize; 2]) -> usize {
     let mut chance = Chance(11);
     let is_down = |chance: &mut Chance| {
@@ -411,18 +410,14 @@ fn sessions_down(pose: Pose, [sessions, minutes]: [usize; 2]) -> usize {
                 votes: Some(votes),
             };
             belief.add(&signs, camera.mount.height_m(), 1.0);
-            let lying = belief.probability(Posture::Lying);
-            let up = belief.probability(Posture::Upright) + belief.probability(Posture::Seated);
-            let low = belief.probability(Posture::Low);
             let now = shown.along.max(shown.across);
             if !(0.71..=1.4).contains(&(length / now)) {
                 (length, seated_seconds) = (now, 0);
             }
-            let seated = belief.probability(Posture::Seated);
-            seated_seconds += usize::from(up >= 0.9 && seated >= 0.5);
-            if lying + low >= 0.9 && lying >= 0.5 && seated_seconds < 60 {
+            seated_seconds += usize::from(belief.sits());
+            if belief.is_down() && seated_seconds < 60 {
                 (since, up_since) = (since.or(Some(second)), None);
-            } else if up >= 0.9 {
+            } else if belief.is_up() {
                 up_since = up_since.or(Some(second));
             }
             if up_since.is_some_and(|up| second - up >= 5) {
