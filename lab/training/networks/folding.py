@@ -1,4 +1,4 @@
-"""Folds scaling, shifting and padding into convolutions, so that fewer tensors need quantization."""
+"""Folds padding, shifts and the factors of pixels into convolutions, and moves pooling before activations."""
 
 import numpy
 from onnx import NodeProto
@@ -14,27 +14,11 @@ def fold(graph: OnnxGraph) -> None:
     for node in list(graph.nodes):
         if node.op_type == "MaxPool":
             _take_pads(graph, node, LOWEST)
+            _pool_before_activation(graph, node)
         elif node.op_type == "Conv":
             _take_pads(graph, node, 0)
-            _state_bias(graph, node)
-            while _take_follower(graph, node):
-                pass
-    for name, value in graph.constants.items():
-        if value.dtype == numpy.float64:
-            graph.constants[name] = value.astype(numpy.float32)
-
-
-def _state_bias(graph: OnnxGraph, convolution: NodeProto) -> None:
-    weights = graph.constants[convolution.input[1]]
-    bias = graph.constants[convolution.input[2]] if len(convolution.input) > 2 else numpy.zeros(len(weights))
-    _set_parameters(graph, convolution, weights.astype(numpy.float64), bias.astype(numpy.float64))
-
-
-def _set_parameters(graph: OnnxGraph, convolution: NodeProto, weights: numpy.ndarray, bias: numpy.ndarray) -> None:
-    """Gives convolutions that share a constant copies of their own."""
-    names = [f"{convolution.name}/{kind}" for kind in ("folded_weights", "folded_bias")]
-    graph.constants |= dict(zip(names, (weights, bias), strict=True))
-    convolution.input[:] = [convolution.input[0], *names]
+            _take_shift(graph, node)
+    _take_factor(graph)
 
 
 def _take_pads(graph: OnnxGraph, node: NodeProto, value: float) -> None:
@@ -54,38 +38,41 @@ def _take_pads(graph: OnnxGraph, node: NodeProto, value: float) -> None:
     graph.nodes.remove(pad)
 
 
-def _take_follower(graph: OnnxGraph, convolution: NodeProto) -> bool:
-    """Folds the only node that reads the result, if it scales and shifts channels; returns True if it did."""
+def _pool_before_activation(graph: OnnxGraph, pool: NodeProto) -> None:
+    """Swaps a LeakyRelu, which keeps the order of values, and the pool behind it, which leaves fewer values."""
+    activation = graph.producer(pool.input[0])
+    if activation is None or activation.op_type != "LeakyRelu" or len(graph.users(pool.input[0])) > 1:
+        return
+    before, between, after = activation.input[0], activation.output[0], pool.output[0]
+    pool.input[0], pool.output[0], activation.input[0], activation.output[0] = before, between, between, after
+    first, second = graph.nodes.index(activation), graph.nodes.index(pool)
+    graph.nodes[first], graph.nodes[second] = pool, activation
+
+
+def _take_shift(graph: OnnxGraph, convolution: NodeProto) -> None:
+    """Gives a convolution the shift of its channels behind it, or zeros, as its bias."""
+    weights = graph.constants[convolution.input[1]]
+    bias = numpy.zeros(len(weights), numpy.float32)
     users = graph.users(convolution.output[0])
-    if len(users) != 1:
-        return False
-    follower, absorbed = users[0], users[0]
-    if follower.op_type == "Add" and len(graph.feature_maps(follower)) == 2:
-        # result + other + shift, a residual block: the shift may as well come before the sum.
-        users = graph.users(follower.output[0])
-        if len(users) != 1 or users[0].op_type != "Add":
-            return False
-        absorbed = users[0]
-    scale_and_shift = _scale_and_shift(graph, absorbed, len(graph.constants[convolution.input[1]]))
-    if scale_and_shift is None:
-        return False
-    scale, shift = scale_and_shift
-    weights, bias = (graph.constants[name] for name in convolution.input[1:])
-    _set_parameters(graph, convolution, weights * scale[:, None, None, None], bias * scale + shift)
-    last = convolution if absorbed is follower else follower
-    last.output[0] = absorbed.output[0]
-    graph.nodes.remove(absorbed)
-    return True
+    if len(users) == 1 and users[0].op_type == "Add":
+        shifts = [graph.constants[name] for name in users[0].input if name in graph.constants]
+        if [shift.shape for shift in shifts] == [(1, len(weights), 1, 1)]:
+            bias = shifts[0].reshape(-1)
+            convolution.output[0] = users[0].output[0]
+            graph.nodes.remove(users[0])
+    # Convolutions that share a constant get copies of their own.
+    names = [f"{convolution.name}/{kind}" for kind in ("folded_weights", "folded_bias")]
+    graph.constants |= dict(zip(names, (weights, bias), strict=True))
+    convolution.input[1:] = names
 
 
-def _scale_and_shift(graph: OnnxGraph, node: NodeProto, channels: int) -> tuple[numpy.ndarray, numpy.ndarray] | None:
-    """The factor and the offset per channel of a node, if it does nothing else."""
-    constants = [graph.constants[name].astype(numpy.float64) for name in node.input if name in graph.constants]
-    if node.op_type == "BatchNormalization":
-        factor, offset, mean, variance = constants
-        scale = factor / numpy.sqrt(variance + attribute(node, "epsilon", 1e-5))
-        return scale, offset - mean * scale
-    if node.op_type not in ("Add", "Mul") or len(constants) != 1 or constants[0].shape != (1, channels, 1, 1):
-        return None
-    values = constants[0].reshape(channels)
-    return (numpy.ones(channels), values) if node.op_type == "Add" else (values, numpy.zeros(channels))
+def _take_factor(graph: OnnxGraph) -> None:
+    """Folds the factor of the pixels' normalization into the first convolution. The mean stays: it is what is padded with."""
+    first = next(node for node in graph.nodes if node.op_type == "Conv")
+    factor = graph.producer(first.input[0])
+    if factor is None or factor.op_type != "Mul":
+        return
+    factors = graph.constants[factor.input[1]].reshape(-1, 1, 1)
+    graph.constants[first.input[1]] = graph.constants[first.input[1]] * factors
+    first.input[0] = factor.input[0]
+    graph.nodes.remove(factor)

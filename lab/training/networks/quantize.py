@@ -12,6 +12,7 @@ import numpy
 from convert import ConversionError
 from onnx import NodeProto, helper
 
+from .equalize import equalize
 from .folding import fold
 from .graph import OnnxGraph
 from .regions import int8_nodes, int8_tensors
@@ -22,10 +23,11 @@ LARGEST = 255
 
 
 @dataclass(frozen=True)
-class ActivationRanges:
-    """The ranges of the quantized tensors."""
+class Activations:
+    """The ranges of the quantized tensors, and the mean of each of their channels."""
 
     ranges: dict[str, tuple[float, float]]
+    means: dict[str, numpy.ndarray]
 
     def scale_and_zero_point(self, tensor: str) -> tuple[numpy.float32, numpy.uint8]:
         """The quantization of a tensor to 0..255; 0, the value of padding, stays exact."""
@@ -45,27 +47,28 @@ def sha256_of(file: Path) -> str:
 
 
 def quantize(fp32_file: Path, onnx_file: Path, samples: Path) -> None:
-    """Reads the model, measures its activation ranges and writes the INT8 model."""
+    """Reads the model, measures its activations and writes the INT8 model."""
     # Needs packages that the tests of the rest have not.
-    from .calibrate import measure
+    from .calibrate import channel_peaks, measure
 
-    write_int8(fp32_file, onnx_file, measure(fp32_file, samples))
-
-
-def write_int8(fp32_file: Path, onnx_file: Path, ranges: ActivationRanges) -> None:
-    """Reads the model and writes the INT8 model with these ranges."""
     graph = OnnxGraph(fp32_file)
     fold(graph)
-    Quantizer(graph, ranges).quantize()
+    equalize(graph, channel_peaks(graph, samples))
+    write_int8(graph, onnx_file, measure(graph, samples))
+
+
+def write_int8(graph: OnnxGraph, onnx_file: Path, activations: Activations) -> None:
+    """Quantizes a folded graph and writes the INT8 model."""
+    Quantizer(graph, activations).quantize()
     graph.save(onnx_file, note=NOTE)
 
 
 class Quantizer:
     """Rewrites the nodes of a folded graph."""
 
-    def __init__(self, graph: OnnxGraph, ranges: ActivationRanges):
+    def __init__(self, graph: OnnxGraph, activations: Activations):
         self.graph = graph
-        self._ranges = ranges
+        self._activations = activations
         self._int8_nodes = [node.name for node in int8_nodes(graph)]
         self._int8_tensors = set(int8_tensors(graph))
         self._written: list[NodeProto] = []
@@ -82,17 +85,18 @@ class Quantizer:
         self.graph.nodes = self._written
 
     def _round(self, tensor: str) -> None:
-        scale, zero_point = self._ranges.scale_and_zero_point(tensor)
+        scale, zero_point = self._activations.scale_and_zero_point(tensor)
         self._constants(tensor, scale=scale, zero_point=zero_point)
         parameters = [f"{tensor}/scale", f"{tensor}/zero_point"]
         self._add("QuantizeLinear", [tensor, *parameters], f"{tensor}/quantised")
         self._add("DequantizeLinear", [f"{tensor}/quantised", *parameters], _dequantised(tensor))
 
     def _use_integer_weights(self, convolution: NodeProto) -> None:
-        activations, *parameters = convolution.input
+        tensor, *parameters = convolution.input
         weights, bias = (self.graph.constants[name] for name in parameters)
-        input_scale, _ = self._ranges.scale_and_zero_point(activations)
-        weights, bias, scales = quantize_weights(weights, bias, float(input_scale))
+        input_scale, _ = self._activations.scale_and_zero_point(tensor)
+        means = self._activations.means[tensor]
+        weights, bias, scales = quantize_weights(weights, bias, float(input_scale), means)
         self._dequantise(parameters[0], weights, scales)
         self._dequantise(parameters[1], bias, scales * input_scale)
         convolution.input[1:] = [_dequantised(name) for name in parameters]

@@ -13,11 +13,13 @@ SMALLEST_SCALE = 1e-12
 
 
 def quantize_weights(
-    weights: numpy.ndarray, bias: numpy.ndarray, input_scale: float
+    weights: numpy.ndarray, bias: numpy.ndarray, input_scale: float, input_means: numpy.ndarray
 ) -> tuple[numpy.ndarray, numpy.ndarray, numpy.ndarray]:
     """Weights `[outputs, inputs, height, width]` as int8, the bias as int32, and the weights' scales.
 
-    The bias has the scale `input_scale` times that of the weights, as the sums that it is added to.
+    The bias has the scale `input_scale` times that of the weights, as the sums that it is added to. What rounding takes
+    from the weights is added to it for inputs of `input_means`, their mean in each channel (Nagel et al., Data-Free
+    Quantization, 2019).
     """
     outputs = len(weights)
     scales = numpy.maximum.reduce(
@@ -28,22 +30,19 @@ def quantize_weights(
             numpy.full(outputs, SMALLEST_SCALE),
         ]
     ).astype(numpy.float32)
-    integers = numpy.rint(weights / scales.astype(numpy.float64)[:, None, None, None])
-    bias_integers = numpy.rint(bias / (scales.astype(numpy.float64) * input_scale))
-    return integers.clip(-LARGEST, LARGEST).astype(numpy.int8), bias_integers.astype(numpy.int32), scales
+    steps = scales.astype(numpy.float64)
+    integers = numpy.rint(weights / steps[:, None, None, None]).clip(-LARGEST, LARGEST)
+    lost = (weights - integers * steps[:, None, None, None]).sum(axis=(2, 3)) @ input_means
+    bias_integers = numpy.rint((bias + lost) / (steps * input_scale))
+    return integers.astype(numpy.int8), bias_integers.astype(numpy.int32), scales
 
 
 def _largest_pair(weights: numpy.ndarray) -> numpy.ndarray:
     """Per output channel, the largest sum of magnitudes of two neighboring weights of the same sign.
 
-    x86 CPUs without VNNI multiply and add such pairs in 16 bits and cut off what does not fit. Depthwise convolutions
-    have no neighboring inputs.
+    x86 CPUs without VNNI multiply and add such pairs in 16 bits and cut off what does not fit.
     """
-    outputs, inputs = weights.shape[:2]
-    if inputs == 1:
-        return numpy.zeros(outputs)
-    even = numpy.concatenate([weights, numpy.zeros_like(weights[:, : inputs % 2])], axis=1)
-    first, second = even[:, 0::2], even[:, 1::2]
+    first, second = weights[:, 0::2], weights[:, 1::2]
     positive = numpy.maximum(first, 0) + numpy.maximum(second, 0)
     negative = numpy.maximum(-first, 0) + numpy.maximum(-second, 0)
-    return numpy.maximum(positive, negative).reshape(outputs, -1).max(axis=1)
+    return numpy.maximum(positive, negative).reshape(len(weights), -1).max(axis=1)

@@ -12,65 +12,60 @@ from convert.onnx_builder import OnnxBuilder
 from convert.tests.support import MaxPool
 from onnx.reference import ReferenceEvaluator
 
+from ..equalize import equalize
 from ..folding import fold
 from ..graph import OnnxGraph
 from ..half import store_halves
-from ..quantize import ActivationRanges, write_int8
-from ..regions import FLOAT_CONVOLUTIONS, int8_tensors, moved_tensors
+from ..quantize import Activations, write_int8
+from ..regions import int8_tensors, moved_tensors
 from ..weights import quantize_weights
 
 ROOT = Path(__file__).resolve().parents[4]
 SIZE, CHANNELS = 12, 4
 RANDOM_SEED = 3
+NO_MEANS = numpy.zeros(16)
 
 
 class MadeUpNetwork:
-    """A network with the nodes that converters write around convolutions: six of them, the last one decoded."""
+    """A network with NanoDet-g's operations: six convolutions, the last one decoded."""
 
     def __init__(self):
         self.builder = OnnxBuilder()
         self._random = numpy.random.default_rng(RANDOM_SEED)
-        scaled = self.builder.node("Mul", ["images", self.builder.constant(2 / 255)])
-        first = self.relu6(self.shifted(self.multiplied(self.convolution(scaled, inputs=3))))
-        second = self.convolution(self.padded(self.leaky(self.normalised(first)), 0.0), pads=None)
+        centered = self.builder.node("Sub", ["images", self.per_channel([120, 110, 100])])
+        scaled = self.builder.node("Mul", [centered, self.per_channel([1 / 60, 1 / 55, 1 / 50])])
+        first = self.leaky(self.convolution(scaled, inputs=3, pads=None))
         windows = {"kernel_shape": [3, 3], "pads": [0, 0, 0, 0], "strides": [2, 2]}
-        pooled = self.builder.node("MaxPool", [self.padded(second, -numpy.inf)], **windows)
-        third = self.relu6(self.shifted(self.convolution(pooled)))
-        summed = self.builder.node("Add", [self.convolution(third), third])
-        last = self.convolution(self.leaky(self.shifted(summed)), outputs=1)
+        pooled = self.builder.node("MaxPool", [self.padded(first, -numpy.inf)], **windows)
+        second = self.leaky(self.convolution(self.padded(pooled, 0.0), pads=None))
+        together = self.builder.node("Concat", [self.leaky(self.convolution(second)), second], axis=1)
+        sides = [self.convolution(together, inputs=2 * CHANNELS), self.convolution(second)]
+        summed = self.builder.node("Add", sides)
+        last = self.convolution(summed, outputs=1)
         self.scores = self.builder.reshape(self.builder.node("Sigmoid", [last]), [0, -1])
 
     def save(self, file: Path) -> None:
-        cells = (SIZE // 2) ** 2
+        cells = (SIZE // 2 - 1) ** 2
         outputs = {"scores": (self.scores, [cells])}
         self.builder.save(file, outputs=outputs, height=SIZE, width=SIZE, description="Made up.")
 
-    def numbers(self, *shape: int, middle: float = 0.0) -> str:
-        return self.builder.constant(self._random.normal(middle, 0.3, shape).astype(numpy.float32))
+    def per_channel(self, values) -> str:
+        return self.builder.constant(numpy.array(values, numpy.float32).reshape(1, -1, 1, 1))
+
+    def numbers(self, *shape: int, middle: float = 0.0) -> numpy.ndarray:
+        return self._random.normal(middle, 0.3, shape).astype(numpy.float32)
 
     def convolution(self, tensor: str, inputs=CHANNELS, outputs=CHANNELS, pads=(1, 1, 1, 1)) -> str:
-        weights = self.numbers(outputs, inputs, 3, 3)
+        # Channels of different sizes, which the next convolutions even out.
+        sizes = numpy.geomspace(0.1, 1, outputs).astype(numpy.float32)[:, None, None, None]
+        weights = self.builder.constant(self.numbers(outputs, inputs, 3, 3) * sizes)
         stated = {"pads": list(pads)} if pads else {}
-        return self.builder.node("Conv", [tensor, weights], kernel_shape=[3, 3], **stated)
-
-    def multiplied(self, tensor: str) -> str:
-        return self.builder.node("Mul", [tensor, self.numbers(1, CHANNELS, 1, 1, middle=1)])
-
-    def shifted(self, tensor: str) -> str:
-        return self.builder.node("Add", [self.numbers(1, CHANNELS, 1, 1, middle=0.5), tensor])
-
-    def normalised(self, tensor: str) -> str:
-        convolved = self.convolution(tensor)
-        parameters = [self.numbers(CHANNELS, middle=middle) for middle in (1, 0, 0)]
-        variance = self.builder.constant(self._random.uniform(0.5, 2, CHANNELS).astype(numpy.float32))
-        return self.builder.node("BatchNormalization", [convolved, *parameters, variance], epsilon=0.01)
+        convolved = self.builder.node("Conv", [tensor, weights], kernel_shape=[3, 3], **stated)
+        return self.builder.node("Add", [convolved, self.per_channel(self.numbers(outputs, middle=0.5))])
 
     def padded(self, tensor: str, value: float) -> str:
         pads = self.builder.constant(numpy.array([0, 0, 1, 1, 0, 0, 1, 1]))
         return self.builder.node("Pad", [tensor, pads, self.builder.constant(value)])
-
-    def relu6(self, tensor: str) -> str:
-        return self.builder.node("Clip", [tensor, self.builder.constant(0.0), self.builder.constant(6.0)])
 
     def leaky(self, tensor: str) -> str:
         return self.builder.node("LeakyRelu", [tensor], alpha=0.1)
@@ -79,12 +74,11 @@ class MadeUpNetwork:
 class WithNetwork(unittest.TestCase):
     def setUp(self):
         self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
-        self.fp32, self.folded, self.int8 = (self.folder / f"{name}.onnx" for name in ("fp32", "folded", "int8"))
+        self.fp32, self.changed, self.int8 = (self.folder / f"{name}.onnx" for name in ("fp32", "changed", "int8"))
         MadeUpNetwork().save(self.fp32)
-        graph = OnnxGraph(self.fp32)
-        fold(graph)
-        self.tensors = int8_tensors(graph)
-        graph.save(self.folded)
+        self.graph = OnnxGraph(self.fp32)
+        fold(self.graph)
+        self.tensors = int8_tensors(self.graph)
         shape = (2, 3, SIZE, SIZE)
         self.images = numpy.random.default_rng(RANDOM_SEED).uniform(0, 255, shape).astype(numpy.float32)
 
@@ -95,39 +89,55 @@ class WithNetwork(unittest.TestCase):
         model.graph.output.extend(onnx.ValueInfoProto(name=tensor) for tensor in tensors or [])
         return ReferenceEvaluator(model, new_ops=[MaxPool]).run(tensors, {"images": self.images})
 
-    def measured(self) -> ActivationRanges:
-        values = self.answer(self.folded, self.tensors)
-        ends = {name: (float(v.min()), float(v.max())) for name, v in zip(self.tensors, values, strict=True)}
-        return ActivationRanges(ends)
+    def values(self, tensors: list[str]) -> dict[str, numpy.ndarray]:
+        """The values of the tensors of the graph."""
+        self.graph.save(self.changed)
+        return dict(zip(tensors, self.answer(self.changed, tensors), strict=True))
 
+    def peaks(self) -> dict[str, numpy.ndarray]:
+        activations = [node.output[0] for node in self.graph.nodes if node.op_type == "LeakyRelu"]
+        return {name: numpy.abs(v).max(axis=(0, 2, 3)) for name, v in self.values(activations).items()}
 
-class Folding(WithNetwork):
-    def test_folding_keeps_the_outputs(self):
-        left = [node.op_type for node in onnx.load(self.folded).graph.node]
-        self.assertEqual(left.count("Conv"), 6)
-        self.assertEqual(left.count("Add"), 1)
-        self.assertTrue({"Pad", "BatchNormalization"}.isdisjoint(left))
-        self.assertEqual(left.count("Mul"), 1)
-        [expected], [found] = self.answer(self.fp32), self.answer(self.folded)
+    def equalize(self) -> dict[str, numpy.ndarray]:
+        """Equalizes the graph and returns the peaks before."""
+        peaks = self.peaks()
+        equalize(self.graph, peaks)
+        return peaks
+
+    def measured(self) -> Activations:
+        values = self.values(self.tensors)
+        ends = {name: (float(v.min()), float(v.max())) for name, v in values.items()}
+        return Activations(ends, {name: v.mean(axis=(0, 2, 3)) for name, v in values.items()})
+
+    def assert_unchanged(self) -> None:
+        self.graph.save(self.changed)
+        [expected], [found] = self.answer(self.fp32), self.answer(self.changed)
         self.assertGreater(expected.std(), 0.01)
         numpy.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-5)
 
 
+class Folding(WithNetwork):
+    def test_folding_keeps_the_outputs(self):
+        left = [node.op_type for node in self.graph.nodes]
+        self.assertEqual(left[:4], ["Sub", "Conv", "MaxPool", "LeakyRelu"])
+        self.assertEqual((left.count("Conv"), left.count("Add")), (6, 1))
+        self.assertTrue({"Pad", "Mul"}.isdisjoint(left))
+        self.assert_unchanged()
+
+
+class Equalizing(WithNetwork):
+    def test_channels_come_nearer_to_each_other_and_outputs_stay(self):
+        before = self.equalize()
+        self.assert_unchanged()
+        for name, peaks in self.peaks().items():
+            self.assertLess(peaks.max() / peaks.min(), before[name].max() / before[name].min())
+
+
 class Moving(WithNetwork):
     def test_tensors_between_which_values_only_move_are_one_group(self):
-        network = MadeUpNetwork()
-        builder, tensor = network.builder, network.convolution("images", inputs=3)
-        for _ in range(FLOAT_CONVOLUTIONS):
-            tensor = network.convolution(tensor)
-        pooled = builder.node("MaxPool", [tensor], kernel_shape=[3, 3], pads=[1] * 4, strides=[1, 1])
-        beside = network.relu6(network.convolution(pooled))
-        together = builder.node("Concat", [pooled, beside], axis=1)
-        scores = builder.reshape(network.convolution(network.convolution(together, inputs=2 * CHANNELS)), [0, -1])
-        outputs = {"scores": (scores, [SIZE * SIZE * CHANNELS])}
-        builder.save(self.fp32, outputs=outputs, height=SIZE, width=SIZE, description="Moves values.")
-        graph = OnnxGraph(self.fp32)
-        fold(graph)
-        self.assertEqual(moved_tensors(graph), [{tensor, pooled, beside, together}])
+        [group] = moved_tensors(self.graph)
+        [together] = [node for node in self.graph.nodes if node.op_type == "Concat"]
+        self.assertEqual(group, {*together.input, *together.output})
 
 
 class Weights(unittest.TestCase):
@@ -137,7 +147,7 @@ class Weights(unittest.TestCase):
         self.bias = random.normal(0, 1, 64).astype(numpy.float32)
 
     def test_they_are_rounded_to_the_nearest_step_of_their_channel(self):
-        integers, bias, scales = quantize_weights(self.weights, self.bias, 0.02)
+        integers, bias, scales = quantize_weights(self.weights, self.bias, 0.02, NO_MEANS)
         steps = scales[:, None, None, None]
         self.assertLessEqual(numpy.abs((integers * steps - self.weights) / steps).max(), 0.5001)
         numpy.testing.assert_allclose(bias * scales * 0.02, self.bias, atol=1e-3)
@@ -150,7 +160,7 @@ class Weights(unittest.TestCase):
     def test_weight_pairs_do_not_saturate_16_bits(self):
         self.weights[0, :2] = 1.0
         self.weights[1, 4:6] = -1.0
-        integers, _, _ = quantize_weights(self.weights, self.bias, 0.02)
+        integers, _, _ = quantize_weights(self.weights, self.bias, 0.02, NO_MEANS)
         self.assert_pairs_fit_in_16_bits(integers)
 
     def test_pairs_of_the_committed_networks_do_not_saturate(self):
@@ -159,41 +169,46 @@ class Weights(unittest.TestCase):
             weights = [value for value in constants if value.dtype == numpy.int8 and value.ndim == 4]
             self.assertGreater(len(weights), 20)
             for value in weights:
-                # Depthwise convolutions have no neighboring inputs.
-                if value.shape[1] > 1:
-                    self.assert_pairs_fit_in_16_bits(value)
+                self.assert_pairs_fit_in_16_bits(value)
 
-    def test_depthwise_weights_use_all_of_the_8_bits(self):
-        integers, _, _ = quantize_weights(self.weights[:, :1], self.bias, 0.02)
-        self.assertEqual(numpy.abs(integers).reshape(64, -1).max(axis=1).tolist(), [127] * 64)
+    def test_the_bias_has_what_rounding_takes_from_the_weights(self):
+        means = numpy.linspace(0.5, 2, 16)
+        integers, bias, scales = quantize_weights(self.weights, self.bias, 0.02, means)
+        rounded = (integers * scales[:, None, None, None]).sum(axis=(2, 3)) @ means + bias * scales * 0.02
+        exact = self.weights.sum(axis=(2, 3)) @ means + self.bias
+        numpy.testing.assert_allclose(rounded, exact, atol=1e-3)
 
     def test_a_channel_without_weights_keeps_its_bias(self):
         self.weights[5], self.bias[5] = 1e-25, 2.0
-        _, bias, scales = quantize_weights(self.weights, self.bias, 0.02)
+        _, bias, scales = quantize_weights(self.weights, self.bias, 0.02, NO_MEANS)
         self.assertAlmostEqual(bias[5] * float(scales[5]) * 0.02, 2.0, places=5)
 
 
 class Quantizing(WithNetwork):
     def test_quantization_is_accurate_and_reproducible(self):
-        write_int8(self.fp32, self.int8, self.measured())
-        written = self.int8.read_bytes()
+        self.equalize()
+        activations = self.measured()
+        write_int8(self.graph, self.int8, activations)
         [expected], [found] = self.answer(self.fp32), self.answer(self.int8)
         numpy.testing.assert_allclose(found, expected, atol=0.03)
         self.assertFalse(numpy.array_equal(found, expected))
-        write_int8(self.fp32, self.int8, self.measured())
+        written = self.int8.read_bytes()
+        self.setUp()
+        self.equalize()
+        write_int8(self.graph, self.int8, self.measured())
         self.assertEqual(self.int8.read_bytes(), written)
 
-    def test_first_three_and_last_convolutions_stay_float(self):
-        write_int8(self.fp32, self.int8, self.measured())
+    def test_first_and_last_convolutions_stay_float(self):
+        write_int8(self.graph, self.int8, self.measured())
         graph = OnnxGraph(self.int8)
         convolutions = [node for node in graph.nodes if node.op_type == "Conv"]
         in_int8 = [graph.producer(node.input[1]) is not None for node in convolutions]
-        self.assertEqual(in_int8, [False, False, False, True, True, False])
+        self.assertEqual(in_int8, [False, True, True, True, True, False])
 
     def test_a_tensor_whose_range_is_missing_or_useless_is_named(self):
         for ends, reason in ({}, "was not measured"), ({self.tensors[0]: (0.0, 0.0)}, "cannot be divided"):
             with self.assertRaisesRegex(ConversionError, f"'{self.tensors[0]}'.*{reason}"):
-                write_int8(self.fp32, self.int8, ActivationRanges(ends))
+                write_int8(self.graph, self.int8, Activations(ends, {}))
 
 
 class Halves(WithNetwork):
