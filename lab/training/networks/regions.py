@@ -14,7 +14,7 @@ def int8_nodes(graph: OnnxGraph) -> list[NodeProto]:
     """The nodes behind the first convolution and its activation whose results lead to a further convolution.
 
     The last convolutions, whose results are decoded, and the decoding stay in floating point by that. The first one
-    stays because integers do not pool faster: ONNX Runtime's pool of bytes takes 20 times as long as that of floats.
+    stays for the pool behind it: ONNX Runtime's takes 9.4 ms for these bytes, and .9 ms for floats.
     """
     leading = _tensors_that_lead_to_convolutions(graph)
     second = [index for index, node in enumerate(graph.nodes) if node.op_type == "Conv"][1]
