@@ -135,9 +135,18 @@ class Equalizing(WithNetwork):
 
 class Moving(WithNetwork):
     def test_tensors_between_which_values_only_move_are_one_group(self):
-        [group] = moved_tensors(self.graph)
-        [together] = [node for node in self.graph.nodes if node.op_type == "Concat"]
-        self.assertEqual(group, {*together.input, *together.output})
+        network = MadeUpNetwork()
+        first = network.convolution(network.convolution("images", inputs=3))
+        second = network.convolution(first)
+        both = network.builder.node("Concat", [first, second], axis=1)
+        all_three = network.builder.node("Concat", [both, first], axis=1)
+        network.scores = network.convolution(network.convolution(all_three, inputs=3 * CHANNELS), outputs=1)
+        outputs = {"scores": (network.scores, [1, SIZE, SIZE])}
+        network.builder.save(self.fp32, outputs=outputs, height=SIZE, width=SIZE, description="Moves values.")
+        graph = OnnxGraph(self.fp32)
+        fold(graph)
+        # The first group is that of the network's own Concat.
+        self.assertEqual(moved_tensors(graph)[1:], [{first, second, both, all_three}])
 
 
 class Weights(unittest.TestCase):
