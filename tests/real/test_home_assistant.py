@@ -225,10 +225,11 @@ class RunEntities(unittest.TestCase):
                 wait_until(lambda: self.home.shown()["notifications"], "the notification of the recipe")
                 self.home.press("switch.gate_detection", "turn_off")
                 self.home.until({"lookdown_gate_detection": "off"})
+            self.home.until({"lookdown_gate_detection": "unavailable"})
             # It stays off after a restart, and the page shows it.
             with self.start(camera) as server:
                 self.home.until({"lookdown_gate_detection": "off"})
-                (shown,) = json.loads(server.get("/cameras"))
+                (shown,) = wait_until(lambda: json.loads(server.get("/cameras")), "the camera is listed")
                 self.assertEqual((shown["name"], shown["paused"]), ("gate", True))
                 self.assertEqual(json.loads(server.get("/results")), [])
                 self.home.press("switch.gate_detection", "turn_on")

@@ -165,6 +165,8 @@ pageTest(
       for (const step of counts.steps) step.known_seconds = 3600;
       await route.fulfill({ json: counts });
     });
+    // The page may have asked already.
+    await page.reload();
     const section = page.getByRole("region", { name: "Crossings of hall" });
     await section.getByRole("button", { name: "Count the crossings of an hour" }).click();
     for (const field of await section.getByRole("spinbutton").all()) await field.fill("3");
