@@ -20,9 +20,9 @@ pub use self::{
 
 /// Time from a search to the next one, seconds: a little less than a second, because frames jitter.
 pub const SEARCH_EVERY_S: f64 = 0.9;
-/// A person of this score or more who is lost is a reason to search: the default least score of a
-/// report. Boxes of lower scores come and go with the noise of a camera.
-const PERSON_SCORE: f64 = 0.3;
+/// A score is settled if its logit differs from that of the last search by at most this, as .6 and
+/// .8 do.
+const SETTLED_LOGIT: f64 = 1.0;
 /// Cells with motion belong to the same motion if at most this many cells less one lie between
 /// them.
 pub const JOINED_CELLS: f64 = 2.0;
@@ -31,6 +31,8 @@ pub const JOINED_CELLS: f64 = 2.0;
 #[derive(Debug, Clone)]
 pub struct FollowedPeople<P> {
     targets: Vec<Target<P>>,
+    /// True if the search has not found someone who was reported before it.
+    has_missed: bool,
 }
 
 impl<P: FoundPerson> FollowedPeople<P> {
@@ -38,9 +40,18 @@ impl<P: FoundPerson> FollowedPeople<P> {
     /// person in motion whom the search has missed is expected for a second.
     pub fn from_search(persons: &[P], at_s: f64, before: Option<&Self>) -> Self {
         let before = before.map(|before| before.targets.as_slice());
+        let (targets, missed) = targets_of(persons, at_s, before);
         Self {
-            targets: targets_of(persons, at_s, before),
+            targets,
+            has_missed: missed.iter().any(|target| target.is_reported()),
         }
+    }
+
+    /// Returns true if another search of a frame without motion would tell nothing more: it has
+    /// found everyone who was reported before, and nobody with a score that was another one then.
+    pub fn are_settled(&self) -> bool {
+        let differs = |target: &Target<P>| target.unsettled_logit().abs() > SETTLED_LOGIT;
+        !self.has_missed && !self.targets.iter().any(differs)
     }
 
     /// Returns true if a crop or the search has confirmed everyone.
@@ -60,8 +71,7 @@ impl<P: FoundPerson> FollowedPeople<P> {
     pub fn are_lost_in(&self, after: &Self, least_score: f64) -> bool {
         let mut both = self.targets.iter().zip(&after.targets);
         both.any(|(before, after)| {
-            let was_reported = before.is_seen && before.person.score() >= PERSON_SCORE;
-            was_reported && !(after.is_seen && after.person.score() >= least_score)
+            before.is_reported() && !(after.is_seen && after.person.score() >= least_score)
         })
     }
 

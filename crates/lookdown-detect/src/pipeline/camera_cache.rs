@@ -23,6 +23,11 @@ impl<V: Send + Sync + 'static> CameraCache<V> {
         self.0.get(camera)
     }
 
+    /// Removes the entry of a camera.
+    pub(super) fn remove(&self, camera: &str) {
+        self.0.invalidate(camera);
+    }
+
     /// Returns the entry of a camera; a new one if there is none or if the known one `is_stale`.
     pub(super) fn get_or_renew(
         &self,

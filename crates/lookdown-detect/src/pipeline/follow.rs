@@ -58,7 +58,9 @@ impl FollowCache {
         let signature = FrameSignature::new(frame);
         let moving = before.as_ref();
         let moving = moving.and_then(|before| before.moving(&signature, at));
+        let is_unsure = |before: &Followed| moving.is_none() && before.is_unsure(&signature);
         FollowedFrame {
+            repeats_search: before.as_ref().is_some_and(is_unsure),
             kept,
             origin,
             signature,
@@ -131,7 +133,7 @@ impl Followed {
         }
         let moved = signature.moved_since(&self.searched, &self.visible)?;
         let moved = if is_noise(&moved) { Vec::new() } else { moved };
-        let is_still = moved.is_empty() && self.people.are_all_seen();
+        let is_still = moved.is_empty() && self.people.are_all_seen() && self.people.are_settled();
         if age >= self.search_every && !(is_still && self.origin.skips_still_frames) {
             return None;
         }
@@ -143,6 +145,13 @@ impl Followed {
         let count = moving.iter().filter(|is_moving| **is_moving).count();
         let can_follow = count <= MAX_MOVING && self.people.are_in_reach(&moving, seconds(at));
         can_follow.then_some(moving)
+    }
+
+    /// Returns true if nothing has moved since a search that has left someone unsure: another search
+    /// must not find its views in the motion cache.
+    fn is_unsure(&self, signature: &FrameSignature) -> bool {
+        let moved = signature.moved_since(&self.searched, &self.visible);
+        !self.people.are_settled() && moved.is_some_and(|moved| is_noise(&moved))
     }
 
     /// Returns true if all strong motion is joined to a person, as a shadow is.
@@ -188,6 +197,8 @@ pub(super) struct FollowedFrame {
     before: Option<Followed>,
     /// The persons of `before` with motion; `None` if the whole frame is searched.
     moving: Option<Vec<bool>>,
+    /// True if the frame is searched because the search before it has left someone unsure.
+    pub(super) repeats_search: bool,
     /// True once the crops of the frame have confirmed the persons of `before`.
     is_confirmed: bool,
 }

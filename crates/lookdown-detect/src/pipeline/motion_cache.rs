@@ -75,6 +75,11 @@ impl MotionCache {
         Arc::clone(&entry.views)
     }
 
+    /// Forgets all views of a camera.
+    pub(super) fn forget(&self, camera: &str) {
+        self.0.remove(camera);
+    }
+
     /// Returns the cached detail views of a camera, filled where the last frame had the same view.
     /// `None` if the camera is not in the cache.
     pub(super) fn detail_views(

@@ -26,6 +26,9 @@ const KNOWN_SPEED: f64 = 0.3;
 const SPEED_CHANGE: f64 = 0.3;
 /// Longest time for which a person in motion whom a search has missed is still expected, seconds.
 const MISSED_S: f64 = 1.0;
+/// A person of this score or more who is lost is a reason to search: the default least score of a
+/// report. Boxes of lower scores come and go with the noise of a camera.
+const PERSON_SCORE: f64 = 0.3;
 /// The score of a search that does not find a person who is there or was there.
 const MISSED_SCORE: f64 = 0.05;
 /// Least IoU of an expected box and a found one of the same person.
@@ -68,6 +71,17 @@ impl<P: FoundPerson> Target<P> {
             target.velocity = before.velocity_to(&target.person.bounds(), at_s);
         }
         target
+    }
+
+    /// Returns true if the person is in the report.
+    pub(super) fn is_reported(&self) -> bool {
+        self.is_seen && self.person.score() >= PERSON_SCORE
+    }
+
+    /// Returns the logit of the person's score, less that of the last search.
+    pub(super) fn unsettled_logit(&self) -> f64 {
+        let (_, searched) = self.searched;
+        logit(self.person.score()) - logit(searched)
     }
 
     /// Returns the person, in motion and lost by a search, for crops at its expected place.
@@ -155,15 +169,15 @@ impl<P: FoundPerson> Target<P> {
 }
 
 /// Returns the persons of a search as targets, with the motion of those that were there before, and
-/// persons in motion that the search has missed.
+/// persons in motion that the search has missed; and all that it has missed.
 ///
 /// Until the next search, a person without motion has the mean of its score and of that before. If
 /// all frames were searched, a single lucky score would not be repeated.
-pub(super) fn targets_of<P: FoundPerson>(
+pub(super) fn targets_of<'a, P: FoundPerson>(
     persons: &[P],
     at_s: f64,
-    before: Option<&[Target<P>]>,
-) -> Vec<Target<P>> {
+    before: Option<&'a [Target<P>]>,
+) -> (Vec<Target<P>>, Vec<&'a Target<P>>) {
     let is_first = before.is_none();
     let before = before.unwrap_or_default();
     let mut is_found = vec![false; before.len()];
@@ -189,8 +203,9 @@ pub(super) fn targets_of<P: FoundPerson>(
     }
     let missed = before.iter().zip(is_found);
     let missed = missed.filter(|(_, is_found)| !is_found);
-    targets.extend(missed.filter_map(|(target, _)| target.missed(at_s)));
-    targets
+    let missed: Vec<_> = missed.map(|(target, _)| target).collect();
+    targets.extend(missed.iter().filter_map(|target| target.missed(at_s)));
+    (targets, missed)
 }
 
 /// A person that was found in a frame.

@@ -27,6 +27,9 @@ impl Engine {
         let follow = self
             .follow_cache
             .compare(camera, origin, &observation.frame, at);
+        if follow.repeats_search {
+            self.motion_cache.forget(camera);
+        }
         let targets = follow.targets(&rig);
         observation.follow = Some(follow);
         let Some(targets) = targets else {
