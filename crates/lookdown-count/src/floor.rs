@@ -1,5 +1,6 @@
 //! People on the floor: who has been lying for a while, outside of zones where that is
-//! expected. Someone who is no longer detected there still lies there.
+//! expected. Someone who is no longer detected there still lies there. What was there from the
+//! start, and neither moved nor stood nor sat, may be a table or a plant, and begins no alert.
 
 use std::collections::HashMap;
 
@@ -20,10 +21,14 @@ const SETTLED_MS: i64 = 60_000;
 /// which the longer side changes.
 const SAME_PLACE: f64 = 0.25;
 const SAME_LENGTH: f64 = 1.4;
+/// A track continues a person who was lost within this distance, in longer sides of the boxes: who
+/// falls is as far from the place before.
+const LOST_LENGTHS: f64 = 1.5;
 /// A person who is up for this long is up again, milliseconds.
 const UP_MS: i64 = 5_000;
-/// Someone without an alert is forgotten after this time without a detection, milliseconds.
-const UNSEEN_MS: i64 = 10_000;
+/// Someone without an alert is forgotten after this time without a detection, milliseconds: boxes
+/// of people who lie come and go, and who gets up is seen.
+const UNSEEN_MS: i64 = 30_000;
 /// The same with an alert that was acknowledged, and with one that was not.
 const UNSEEN_ACKNOWLEDGED_MS: i64 = 10 * 60_000;
 const UNSEEN_ALERT_MS: i64 = 24 * 3_600_000;
@@ -57,12 +62,12 @@ pub(crate) struct Floor {
     /// Everyone who is down, longest first.
     pub(crate) persons: Vec<PersonDown>,
     last_id: u64,
-    /// The boxes in which those who are tracked sat. A restart forgets them.
+    /// The last boxes of those who are or were tracked. A restart forgets them.
     #[serde(skip)]
     seats: HashMap<TrackId, Seat>,
 }
 
-/// A box in which a person sat.
+/// The box of a track.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Seat {
     center_px: [f64; 2],
@@ -70,6 +75,8 @@ struct Seat {
     /// The time for which the person sat in it, and the last time, milliseconds.
     seated_ms: i64,
     seen_ms: i64,
+    /// True once the track has moved, stood or sat, as things do not.
+    is_person: bool,
 }
 
 impl Floor {
@@ -98,8 +105,11 @@ impl Floor {
         for track in tracks {
             let is_expected = zone_of(track, definition, true).is_some();
             let belief = track.posture_belief();
-            let is_settled = self.has_settled(track, belief.sits(), at_ms);
-            let is_down = belief.is_down() && !is_expected && !is_settled;
+            let is_person = track.has_moved() || belief.is_up() || self.continues(track, at_ms);
+            let seat = self.seat(track, belief.sits(), at_ms);
+            seat.is_person |= is_person;
+            let can_be_down = seat.is_person && seat.seated_ms < SETTLED_MS;
+            let is_down = belief.is_down() && !is_expected && can_be_down;
             let known = self.index_of(track, tracks);
             if let Some(index) = known {
                 let is_up = belief.is_up() || is_expected;
@@ -130,23 +140,36 @@ impl Floor {
         self.persons.retain(|person| !person.is_over(at_ms));
     }
 
-    /// Returns true if the person sat for a while in the same box.
-    fn has_settled(&mut self, track: &Track, sits: bool, at_ms: i64) -> bool {
+    /// Returns the box of a track, with the time for which the person sat in the same one.
+    fn seat(&mut self, track: &Track, sits: bool, at_ms: i64) -> &mut Seat {
         let now = Seat {
             center_px: track.center_px,
             length_px: track.length_px,
             seated_ms: 0,
             seen_ms: at_ms,
+            is_person: false,
         };
         let seat = self.seats.entry(track.id).or_insert(now);
         if !seat.is_same(&now) {
-            *seat = now;
+            let is_person = seat.is_person;
+            *seat = Seat { is_person, ..now };
         }
         if sits {
             seat.seated_ms += at_ms - seat.seen_ms;
         }
         seat.seen_ms = at_ms;
-        seat.seated_ms >= SETTLED_MS
+        seat
+    }
+
+    /// Returns true if a track began where a person was lost.
+    fn continues(&self, track: &Track, at_ms: i64) -> bool {
+        let began_ms = milliseconds(track.first_seen_s);
+        self.seats.values().any(|seat| {
+            let [x, y] = seat.center_px;
+            let away = (x - track.center_px[0]).hypot(y - track.center_px[1]);
+            let is_lost = seat.seen_ms < at_ms && seat.seen_ms <= began_ms;
+            is_lost && seat.is_person && away <= LOST_LENGTHS * seat.length_px.max(track.length_px)
+        })
     }
 
     /// Returns the known person of a track: the same track, or one that began where someone was

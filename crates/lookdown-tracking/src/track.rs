@@ -182,6 +182,11 @@ impl Track {
         self.confirmed
     }
 
+    /// Returns true once the track has left its first place.
+    pub fn has_moved(&self) -> bool {
+        self.has_moved
+    }
+
     /// Returns true if a confirmed track has been at its first place since it began, for a while.
     pub(super) fn stands(&self) -> bool {
         let seen_s = self.seen_s - self.first_seen_s;

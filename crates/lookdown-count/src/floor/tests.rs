@@ -165,9 +165,24 @@ fn person_who_may_lie_or_be_low_is_an_alert() {
         (r#"{"lying": 0.05, "low": 0.5}"#, 0),
     ] {
         let mut hall = Hall::new("");
-        hall.votes = votes;
+        hall.watch(5, Some(STANDING)).votes = votes;
         assert_eq!(hall.watch(60, Some(LOW)).alerts().len(), count, "{votes}");
     }
+}
+
+#[test]
+fn what_lies_there_from_the_start_is_no_alert() {
+    let mut hall = Hall::new("");
+    assert_eq!(hall.watch(60, Some(LYING)).alerts(), []);
+}
+
+#[test]
+fn track_that_begins_where_a_person_was_lost_is_an_alert() {
+    let mut hall = Hall::new("");
+    let [cx, width, height] = LYING;
+    let fallen = [cx + 150.0, width, height];
+    hall.watch(10, Some(STANDING)).watch(5, None);
+    assert_eq!(hall.watch(60, Some(fallen)).alerts().len(), 1);
 }
 
 #[test]

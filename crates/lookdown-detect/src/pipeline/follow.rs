@@ -147,7 +147,7 @@ impl Followed {
         can_follow.then_some(moving)
     }
 
-    /// Returns true if nothing has moved since a search that has left someone unsure: another search
+    /// Returns true if nothing has moved since a search that has left someone unsure: the next one
     /// must not find its views in the motion cache.
     fn is_unsure(&self, signature: &FrameSignature) -> bool {
         let moved = signature.moved_since(&self.searched, &self.visible);
