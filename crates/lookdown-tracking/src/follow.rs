@@ -20,9 +20,6 @@ pub use self::{
 
 /// Time from a search to the next one, seconds: a little less than a second, because frames jitter.
 pub const SEARCH_EVERY_S: f64 = 0.9;
-/// A score is settled if its logit differs from that of the last search by at most this, as .3 and
-/// .4 do.
-const SETTLED_LOGIT: f64 = 0.5;
 /// Cells with motion belong to the same motion if at most this many cells less one lie between
 /// them.
 pub const JOINED_CELLS: f64 = 2.0;
@@ -50,8 +47,7 @@ impl<P: FoundPerson> FollowedPeople<P> {
     /// Returns true if another search of a frame without motion would tell nothing more: the last
     /// one has found everyone who was reported before, and all with the scores that they had.
     pub fn are_settled(&self) -> bool {
-        let differs = |target: &Target<P>| target.unsettled_logit().abs() > SETTLED_LOGIT;
-        !self.has_missed && !self.targets.iter().any(differs)
+        !self.has_missed && self.targets.iter().all(Target::is_settled)
     }
 
     /// Returns true if a crop or the search has confirmed everyone.

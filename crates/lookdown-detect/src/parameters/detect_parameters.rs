@@ -149,9 +149,9 @@ parameter_table! {
                and when a crop loses a person. In the frames between, the detector sees only crops at \
                the places where the persons of this camera are expected, and those without motion stay \
                as they were. A frame is also searched if so much time has passed that people may have \
-               walked out of the crops: after 0.4 s, or 0.6 s where their motion is known. With `motion`, a frame in which nothing has \
-               moved since the search is not searched for 10 s. Needs `camera` or `calibration`; up to \
-               256 cameras are followed.",
+               walked out of the crops: after 0.4 s, or 0.6 s where their motion is known. With `motion`, a \
+               still frame is not searched for 10 s once all scores are settled. Needs `camera` or \
+               `calibration`; up to 256 cameras are followed.",
         example: None,
         interfaces: REQUESTS_WITH_DEFAULTS,
     };

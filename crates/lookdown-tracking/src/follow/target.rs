@@ -29,6 +29,9 @@ const MISSED_S: f64 = 1.0;
 /// A person of this score or more who is lost is a reason to search: the default least score of a
 /// report. Boxes of lower scores come and go with the noise of a camera.
 const PERSON_SCORE: f64 = 0.3;
+/// A score is settled if its logit differs from that of the last search by at most this, as .3 and
+/// .4 do.
+const SETTLED_LOGIT: f64 = 0.5;
 /// The score of a search that does not find a person who is there or was there.
 const MISSED_SCORE: f64 = 0.05;
 /// Least IoU of an expected box and a found one of the same person.
@@ -78,10 +81,12 @@ impl<P: FoundPerson> Target<P> {
         self.is_seen && self.person.score() >= PERSON_SCORE
     }
 
-    /// Returns the logit of the person's score, less that of the last search.
-    pub(super) fn unsettled_logit(&self) -> f64 {
-        let (_, searched) = self.searched;
-        logit(self.person.score()) - logit(searched)
+    /// Returns true if the person has about the score of the last search, or is not reported with
+    /// either of them.
+    pub(super) fn is_settled(&self) -> bool {
+        let [now, searched] = [self.person.score(), self.searched.1];
+        let is_person = now.max(searched) >= PERSON_SCORE;
+        !is_person || (logit(now) - logit(searched)).abs() <= SETTLED_LOGIT
     }
 
     /// Returns the person, in motion and lost by a search, for crops at its expected place.

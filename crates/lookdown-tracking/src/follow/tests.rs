@@ -89,6 +89,28 @@ fn a_walker_whom_a_search_misses_is_expected_for_a_second() {
 }
 
 #[test]
+fn someone_new_or_lost_is_settled_by_further_searches() {
+    let searched = |people: &FollowedPeople<Found>, score| {
+        let found: Vec<_> = score
+            .map(|score| Found { x: 0.0, score })
+            .into_iter()
+            .collect();
+        FollowedPeople::from_search(&found, 1.0, Some(people))
+    };
+    let empty = FollowedPeople::from_search(&[], 0.0, None);
+    assert!(searched(&empty, Some(0.2)).are_settled());
+    let mut people = searched(&empty, Some(0.7));
+    for _ in 0..2 {
+        assert!(!people.are_settled());
+        people = searched(&people, Some(0.7));
+    }
+    assert!(people.are_settled());
+    let lost = searched(&people, None);
+    assert!(!lost.are_settled());
+    assert!(searched(&lost, None).are_settled());
+}
+
+#[test]
 fn motion_needs_a_search_unless_it_is_joined_to_a_person() {
     let walker = walker();
     let near = [85.0, 40.0, 95.0, 50.0];
