@@ -90,7 +90,7 @@ fn a_walker_whom_a_search_misses_is_expected_for_a_second() {
 
 #[test]
 fn someone_new_or_lost_is_settled_by_further_searches() {
-    let searched = |people: &FollowedPeople<Found>, score| {
+    let searched = |people: &FollowedPeople<Found>, score: Option<f64>| {
         let found: Vec<_> = score
             .map(|score| Found { x: 0.0, score })
             .into_iter()
