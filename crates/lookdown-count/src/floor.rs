@@ -21,9 +21,6 @@ const SETTLED_MS: i64 = 60_000;
 /// which the longer side changes.
 const SAME_PLACE: f64 = 0.25;
 const SAME_LENGTH: f64 = 1.4;
-/// A track continues a person who was lost within this distance, in longer sides of the boxes: who
-/// falls is as far from the place before.
-const LOST_LENGTHS: f64 = 1.5;
 /// A person who is up for this long is up again, milliseconds.
 const UP_MS: i64 = 5_000;
 /// Someone without an alert is forgotten after this time without a detection, milliseconds: boxes
@@ -105,9 +102,8 @@ impl Floor {
         for track in tracks {
             let is_expected = zone_of(track, definition, true).is_some();
             let belief = track.posture_belief();
-            let is_person = track.has_moved() || belief.is_up() || self.continues(track, at_ms);
             let seat = self.seat(track, belief.sits(), at_ms);
-            seat.is_person |= is_person;
+            seat.is_person |= track.has_moved() || belief.is_up();
             let can_be_down = seat.is_person && seat.seated_ms < SETTLED_MS;
             let is_down = belief.is_down() && !is_expected && can_be_down;
             let known = self.index_of(track, tracks);
@@ -159,17 +155,6 @@ impl Floor {
         }
         seat.seen_ms = at_ms;
         seat
-    }
-
-    /// Returns true if a track began where a person was lost.
-    fn continues(&self, track: &Track, at_ms: i64) -> bool {
-        let began_ms = milliseconds(track.first_seen_s);
-        self.seats.values().any(|seat| {
-            let [x, y] = seat.center_px;
-            let away = (x - track.center_px[0]).hypot(y - track.center_px[1]);
-            let is_lost = seat.seen_ms < at_ms && seat.seen_ms <= began_ms;
-            is_lost && seat.is_person && away <= LOST_LENGTHS * seat.length_px.max(track.length_px)
-        })
     }
 
     /// Returns the known person of a track: the same track, or one that began where someone was

@@ -177,7 +177,7 @@ fn what_lies_there_from_the_start_is_no_alert() {
 }
 
 #[test]
-fn track_that_begins_where_a_person_was_lost_is_an_alert() {
+fn person_lost_before_lying_down_is_an_alert() {
     let mut hall = Hall::new("");
     let [cx, width, height] = LYING;
     let fallen = [cx + 150.0, width, height];

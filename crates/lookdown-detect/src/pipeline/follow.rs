@@ -150,8 +150,8 @@ impl Followed {
     /// Returns true if nothing has moved since a search that has left someone unsure: the next one
     /// must not find its views in the motion cache.
     fn is_unsure(&self, signature: &FrameSignature) -> bool {
-        let moved = signature.moved_since(&self.searched, &self.visible);
-        !self.people.are_settled() && moved.is_some_and(|moved| is_noise(&moved))
+        let moved = || signature.moved_since(&self.searched, &self.visible);
+        !self.people.are_settled() && moved().is_some_and(|moved| is_noise(&moved))
     }
 
     /// Returns true if all strong motion is joined to a person, as a shadow is.
