@@ -1,5 +1,6 @@
 //! Tests of the tracker as a whole.
 
+use lookdown_lens::geometry::{FloorVotes, Posture};
 use proptest::prelude::*;
 
 use super::*;
@@ -300,6 +301,29 @@ fn a_person_under_two_cameras_is_one_track() {
     assert_eq!(ids(&tracker), [1]);
     let [x, y] = floor_of(tracker.tracks().next().unwrap());
     assert!((x - 1.9).abs() < 0.2 && (y - 0.5).abs() < 0.2, "{x} {y}");
+}
+
+#[test]
+fn a_second_camera_tells_more_about_the_posture_than_the_same() {
+    let (_, poses) = site();
+    let votes = FloorVotes {
+        lying: 0.45,
+        low: 0.3,
+    };
+    let [alone, together] = [0, 1].map(|other| {
+        let (mut tracker, _) = site();
+        for (frame, camera) in [0, other, 0, other].into_iter().enumerate() {
+            let mut seen = seen_by(&poses[camera], [0.0, 0.5]);
+            seen.signs.votes = Some(votes);
+            let at_s = f64::from(u32::try_from(frame).unwrap()) / 20.0;
+            tracker
+                .update(f64::INFINITY, camera, at_s, &[seen])
+                .unwrap();
+        }
+        let track = tracker.tracks().next().unwrap();
+        track.posture_belief().probability(Posture::Lying)
+    });
+    assert!(together > alone + 0.05, "{alone} {together}");
 }
 
 #[test]

@@ -152,13 +152,12 @@ impl Track {
         self.missed = 0;
         let signs = &seen.person.signs;
         if *signs != PostureSigns::default() {
-            let is_first = self.seen_by.is_empty();
-            let elapsed_s = if is_first {
-                f64::INFINITY
-            } else {
-                seen.at_s - self.seen_s
-            };
-            self.posture.add(signs, seen.camera_m, elapsed_s);
+            if !self.seen_by.is_empty() {
+                self.posture.pass(seen.at_s - self.seen_s);
+            }
+            let before = self.seen_by.get(&seen.source.camera);
+            let since_s = before.map_or(f64::INFINITY, |before| seen.at_s - before);
+            self.posture.add(signs, seen.camera_m, since_s);
         }
         self.seen_s = self.seen_s.max(seen.at_s);
         self.last_person = seen.source;

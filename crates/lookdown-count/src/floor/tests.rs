@@ -171,6 +171,20 @@ fn person_who_may_lie_or_be_low_is_an_alert() {
 }
 
 #[test]
+fn person_who_is_seldom_down_is_no_alert() {
+    for (other_s, count) in [(12, 0), (0, 1)] {
+        let mut hall = Hall::new("");
+        hall.watch(5, Some(STANDING));
+        for _ in 0..6 {
+            hall.votes = r#"{"lying": 0.6, "low": 0.4}"#;
+            hall.watch(5, Some(LOW)).votes = r#"{"lying": 0.2, "low": 0.4}"#;
+            hall.watch(other_s, Some(LOW));
+        }
+        assert_eq!(hall.alerts().len(), count, "{other_s} s in between");
+    }
+}
+
+#[test]
 fn what_lies_there_from_the_start_is_no_alert() {
     let mut hall = Hall::new("");
     assert_eq!(hall.watch(60, Some(LYING)).alerts(), []);

@@ -349,12 +349,12 @@ impl PostureBelief {
         }
     }
 
-    /// Adds a frame that was seen `elapsed_s` after the last one; the first one counts fully with
-    /// infinity. `camera_m` is the height of the camera above the floor, meters.
-    pub fn add(&mut self, signs: &PostureSigns, camera_m: Option<f64>, elapsed_s: f64) {
-        self.pass(elapsed_s);
-        // A box that resembles the last one adds little, and all boxes together no more than a few.
-        let news = -(-elapsed_s.max(0.0) / CORRELATION_S).exp_m1();
+    /// Adds a frame `since_s` after the last one of the same camera, infinity for its first one.
+    /// `camera_m` is the height of the camera above the floor, meters.
+    pub fn add(&mut self, signs: &PostureSigns, camera_m: Option<f64>, since_s: f64) {
+        // A box that resembles the camera's last one adds little, and all boxes together no more
+        // than a few.
+        let news = -(-since_s.max(0.0) / CORRELATION_S).exp_m1();
         let kept = 1.0 - news / MOST_BOXES;
         let unknown = [[1.0; SIZES]; POSTURES];
         let by_box = signs
@@ -376,10 +376,7 @@ impl PostureBelief {
     }
 
     /// Lets time pass: people change their posture and keep their size.
-    fn pass(&mut self, elapsed_s: f64) {
-        if !elapsed_s.is_finite() {
-            return;
-        }
+    pub fn pass(&mut self, elapsed_s: f64) {
         let share = -(-elapsed_s.max(0.0) * CHANGE_RATE).exp_m1();
         for size in 0..SIZES {
             let sum: f64 = self.weights.iter().map(|weights| weights[size]).sum();
@@ -398,8 +395,12 @@ impl PostureBelief {
 
     /// Returns true if the person is down, as for a floor alert.
     pub fn is_down(&self) -> bool {
-        let lying = self.probability(Posture::Lying);
-        lying >= LEAST_LYING && lying + self.probability(Posture::Low) >= SURE
+        self.probability(Posture::Lying) >= LEAST_LYING && self.down_probability() >= SURE
+    }
+
+    /// Returns the probability that the person lies or is low.
+    pub fn down_probability(&self) -> f64 {
+        self.probability(Posture::Lying) + self.probability(Posture::Low)
     }
 
     /// Returns true if the person stands or sits. Someone may be neither down nor up.

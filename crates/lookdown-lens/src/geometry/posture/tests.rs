@@ -253,6 +253,7 @@ fn watch(
         let fresh = noise(chance);
         let errors = std::array::from_fn(|index| (lasting[index] + fresh[index]) / f64::sqrt(2.0));
         if let Some(seen) = camera.see(limbs, place, errors) {
+            belief.pass(0.2);
             belief.add(&of_box(seen), camera.mount.height_m(), 0.2);
         }
         left -= 0.2;
@@ -357,6 +358,7 @@ fn unknown_height_of_the_camera_is_learned() {
         let body = limbs(pose, 1.7, &mut chance);
         let seen = camera.see(&body, [2.5, 1.0, turn], [0.0; 4]).unwrap();
         for _ in 0..10 {
+            belief.pass(0.2);
             belief.add(&of_box(seen), None, 0.2);
         }
         assert_eq!(belief.posture().0, pose.posture());
@@ -380,7 +382,7 @@ fn sessions_down(pose: Pose, [sessions, minutes]: [usize; 2]) -> usize {
         let mut belief = PostureBelief::new(true);
         let standing = limbs(Pose::Standing, stature, chance);
         watch(&mut belief, &camera, (&standing, place), 3.0, chance);
-        let (mut since, mut up_since) = (None, None);
+        let (mut since, mut up_since, mut down_seconds) = (None, None, 0.0);
         let mut errors = noise(chance);
         let mut exact = None;
         let (mut length, mut seated_seconds) = (0.0, 0);
@@ -409,6 +411,7 @@ fn sessions_down(pose: Pose, [sessions, minutes]: [usize; 2]) -> usize {
                 angles: Some(shown),
                 votes: Some(votes),
             };
+            belief.pass(1.0);
             belief.add(&signs, camera.mount.height_m(), 1.0);
             let now = shown.along.max(shown.across);
             if !(0.71..=1.4).contains(&(length / now)) {
@@ -420,10 +423,15 @@ fn sessions_down(pose: Pose, [sessions, minutes]: [usize; 2]) -> usize {
             } else if belief.is_up() {
                 up_since = up_since.or(Some(second));
             }
-            if up_since.is_some_and(|up| second - up >= 5) {
-                (since, up_since) = (None, None);
+            if up_since.is_some_and(|up| second - up >= 5) || since.is_none() {
+                (since, up_since, down_seconds) = (None, None, 0.0);
             }
-            if since.is_some_and(|since| second - since >= 20) && up_since.is_none() {
+            down_seconds += belief.down_probability();
+            let is_alert = |since| {
+                let seconds = second - since;
+                seconds >= 20 && down_seconds >= 0.8 * float(seconds)
+            };
+            if since.is_some_and(is_alert) && up_since.is_none() {
                 return true;
             }
         }
