@@ -62,7 +62,10 @@ proptest! {
         let pose = CameraPose { position_m: [x, y], yaw_deg, height_m: Some(3.0) };
         let first = seen(&walks, &CameraPose::alone(Some(3.0)), 0.2, chance);
         let second = seen(&walks, &pose, 0.2, chance);
-        let found = relative_pose(&first, &second).unwrap();
+        let found = relative_pose(&first, &second);
+        // One of 500 sets of walks fits two places alike, and is refused.
+        prop_assume!(found != Err(NoPose::Ambiguous));
+        let found = found.unwrap();
         let error = (found.position_m[0] - x).hypot(found.position_m[1] - y);
         prop_assert!(error < 0.02 + 4.0 * found.position_sd_m, "{error} {found:?}");
         let turn = (found.yaw_deg - yaw_deg).to_radians().sin().asin().to_degrees();
