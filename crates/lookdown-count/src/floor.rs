@@ -68,12 +68,12 @@ pub(crate) struct Floor {
     last_id: u64,
     /// The last boxes of those who are or were tracked. A restart forgets them.
     #[serde(skip)]
-    seats: HashMap<TrackId, Seat>,
+    boxes: HashMap<TrackId, LastBox>,
 }
 
 /// The box of a track.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Seat {
+struct LastBox {
     center_px: [f64; 2],
     length_px: f64,
     /// The time for which the person sat in it, and the last time, milliseconds.
@@ -104,14 +104,14 @@ impl Floor {
         after_ms: i64,
         definition: &CameraDefinition,
     ) {
-        self.seats
-            .retain(|_, seat| at_ms - seat.seen_ms <= UNSEEN_MS);
+        self.boxes
+            .retain(|_, last| at_ms - last.seen_ms <= UNSEEN_MS);
         for track in tracks {
             let is_expected = zone_of(track, definition, true).is_some();
             let belief = track.posture_belief();
-            let seat = self.seat(track, belief.sits(), at_ms);
-            seat.is_person |= track.has_moved() || belief.is_up();
-            let can_be_down = seat.is_person && seat.seated_ms < SETTLED_MS;
+            let last = self.last_box(track, belief.sits(), at_ms);
+            last.is_person |= track.has_moved() || belief.is_up();
+            let can_be_down = last.is_person && last.seated_ms < SETTLED_MS;
             let is_down = belief.is_down() && !is_expected && can_be_down;
             let known = self.index_of(track, tracks);
             if let Some(index) = known {
@@ -147,24 +147,24 @@ impl Floor {
     }
 
     /// Returns the box of a track, with the time for which the person sat in the same one.
-    fn seat(&mut self, track: &Track, sits: bool, at_ms: i64) -> &mut Seat {
-        let now = Seat {
+    fn last_box(&mut self, track: &Track, sits: bool, at_ms: i64) -> &mut LastBox {
+        let now = LastBox {
             center_px: track.center_px,
             length_px: track.length_px,
             seated_ms: 0,
             seen_ms: at_ms,
             is_person: false,
         };
-        let seat = self.seats.entry(track.id).or_insert(now);
-        if !seat.is_same(&now) {
-            let is_person = seat.is_person;
-            *seat = Seat { is_person, ..now };
+        let last = self.boxes.entry(track.id).or_insert(now);
+        if !last.is_same(&now) {
+            let is_person = last.is_person;
+            *last = LastBox { is_person, ..now };
         }
         if sits {
-            seat.seated_ms += at_ms - seat.seen_ms;
+            last.seated_ms += at_ms - last.seen_ms;
         }
-        seat.seen_ms = at_ms;
-        seat
+        last.seen_ms = at_ms;
+        last
     }
 
     /// Returns the known person of a track: the same track, or one that began where someone was
@@ -185,7 +185,7 @@ impl Floor {
     }
 }
 
-impl Seat {
+impl LastBox {
     fn is_same(&self, now: &Self) -> bool {
         let [x, y] = self.center_px;
         let moved = (x - now.center_px[0]).hypot(y - now.center_px[1]);
