@@ -440,7 +440,7 @@ fn sessions_down(pose: Pose, [sessions, minutes]: [usize; 2]) -> usize {
     (0..sessions).filter(|_| is_down(&mut chance)).count()
 }
 
-/// The figures of docs/count.md, from 400 people of each pose: N=400 repeats them.
+/// The figures of docs/count.md, from 1,000 people of each pose: N=1000 repeats them.
 #[test]
 fn few_people_who_sit_become_a_floor_alert() {
     let sessions = std::env::var("N").map_or(8, |sessions| sessions.parse().unwrap());
