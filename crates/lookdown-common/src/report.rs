@@ -204,7 +204,7 @@ pub struct ReportPerson {
     /// `upright`, `seated`, `low`, `lying` or `unknown`, as far as one frame tells.
     #[serde(default = "unknown")]
     pub posture: Cow<'static, str>,
-    /// Probability of the most likely posture; below 0.6 the posture is `unknown`.
+    /// Probability of the most likely posture; below 0.5 the posture is `unknown`.
     #[serde(default)]
     pub posture_probability: f64,
     /// Votes for a person on the floor; absent if no network that tells postures looked.

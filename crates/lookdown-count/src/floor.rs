@@ -4,7 +4,11 @@
 
 use std::collections::HashMap;
 
-use lookdown_lens::geometry::{Pixel, Posture, ZoneArea, floor::floor_position};
+use lookdown_lens::geometry::{
+    Pixel, Posture, ZoneArea,
+    floor::floor_position,
+    posture::{MOSTLY_DOWN, SAME_LENGTH, SETTLED_MS, UP_MS},
+};
 use lookdown_tracking::{Track, TrackId};
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
@@ -13,19 +17,8 @@ use crate::{definition::CameraDefinition, now::milliseconds};
 
 /// Most people of a camera.
 const MAX_PERSONS: usize = 64;
-/// Someone who sat for this long in the same box has not come down in it, milliseconds: 10 instead
-/// of 32 of 400 people who are simulated to sit for half an hour become an alert. Standing does not
-/// count: someone who falls away from the camera can have the same box.
-const SETTLED_MS: i64 = 60_000;
-/// Limits of the same box: the way of its middle as a share of its longer side, and the factor by
-/// which the longer side changes.
+/// Limit of the same box: the way of its middle as a share of its longer side.
 const SAME_PLACE: f64 = 0.25;
-const SAME_LENGTH: f64 = 1.4;
-/// The least mean probability of being down since then, for an alert: 4 instead of 10 of 400 people
-/// who are simulated to sit for half an hour become one, and as many of those who lie.
-const MOSTLY_DOWN: f64 = 0.8;
-/// A person who is up for this long is up again, milliseconds.
-const UP_MS: i64 = 5_000;
 /// Someone without an alert is forgotten after this time without a detection, milliseconds: boxes
 /// of people who lie come and go, and who gets up is seen.
 const UNSEEN_MS: i64 = 30_000;
@@ -113,8 +106,7 @@ impl Floor {
             last.is_person |= track.has_moved() || belief.is_up();
             let can_be_down = last.is_person && last.seated_ms < SETTLED_MS;
             let is_down = belief.is_down() && !is_expected && can_be_down;
-            let known = self.index_of(track, tracks);
-            if let Some(index) = known {
+            if let Some(index) = self.index_of(track, tracks) {
                 let is_up = belief.is_up() || is_expected;
                 self.persons[index].see(track, at_ms, is_down, is_up, definition);
             } else if is_down && self.persons.len() < MAX_PERSONS {

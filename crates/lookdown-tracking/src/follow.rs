@@ -9,20 +9,18 @@ mod target;
 
 use lookdown_lens::geometry::OrientedBox;
 
-use self::{
-    target::iou,
-    target::{SAME_IOU, Target, targets_of},
-};
-pub use self::{
-    target::{FoundPerson, from_logit, logit},
-    target::{overlap, widened},
-};
+pub use self::target::{FoundPerson, from_logit, logit, overlap, widened};
+use self::target::{Target, same_persons, targets_of};
 
 /// Time from a search to the next one, seconds: a little less than a second, because frames jitter.
 pub const SEARCH_EVERY_S: f64 = 0.9;
 /// Cells with motion belong to the same motion if at most this many cells less one lie between
 /// them.
 pub const JOINED_CELLS: f64 = 2.0;
+
+/// Least share of a crop's side that followed people may fill. A frame with someone who may be
+/// beyond such a crop needs a search.
+pub const LEAST_FILL: f64 = 0.3;
 
 /// The people of a camera since the last search of its frame.
 #[derive(Debug, Clone)]
@@ -45,21 +43,19 @@ impl<P: FoundPerson> FollowedPeople<P> {
     }
 
     /// Returns true if another search of a frame without motion would tell nothing more: the last
-    /// one has found everyone who was reported before, and all with the scores that they had.
+    /// one has found everyone who was reported before, all with the scores that they had, and
+    /// everyone is seen since.
     pub fn are_settled(&self) -> bool {
         !self.has_missed && self.targets.iter().all(Target::is_settled)
     }
 
-    /// Returns true if a crop or the search has confirmed everyone.
-    pub fn are_all_seen(&self) -> bool {
-        self.targets.iter().all(|target| target.is_seen)
-    }
-
-    /// Returns true if crops at `at_s` (seconds) show everyone in motion who is seen. Someone who
-    /// may be further away needs a search.
-    pub fn are_in_reach(&self, moving: &[bool], at_s: f64) -> bool {
-        let mut seen = self.targets.iter().zip(moving);
-        seen.all(|(target, is_moving)| !is_moving || !target.is_seen || target.is_in_reach(at_s))
+    /// Returns the share of a crop's side that people may fill at most if crops at their expected
+    /// places are to show everyone in motion who is seen at `at_s` (seconds), 0 to 1.
+    pub fn most_fill(&self, moving: &[bool], at_s: f64) -> f64 {
+        let seen = self.targets.iter().zip(moving);
+        let seen = seen.filter(|(target, is_moving)| **is_moving && target.is_seen);
+        let drifts = seen.map(|(target, _)| target.drift(at_s));
+        1.0 / (1.0 + 2.0 * drifts.fold(0.0, f64::max))
     }
 
     /// Returns true if `after` lacks someone who is seen here, or has a score below `least_score`
@@ -112,10 +108,9 @@ impl<P: FoundPerson> FollowedPeople<P> {
         targets.map(move |(target, _)| (&target.person, target.expected(at_s)))
     }
 
-    /// Confirms people in motion by those found in crops at `at_s` (seconds): first by boxes from
-    /// `least_score` on, because a weak box between two people may overlap the expected place
-    /// most. Others from `least_score` on become people of their own. `place` returns a found
-    /// person with another score and another oriented box.
+    /// Confirms people in motion by those found in crops at `at_s` (seconds). Others from
+    /// `least_score` on become people of their own. `place` returns a found person with another
+    /// score and another oriented box.
     pub fn confirm(
         &mut self,
         moving: &[bool],
@@ -124,38 +119,20 @@ impl<P: FoundPerson> FollowedPeople<P> {
         least_score: f64,
         place: impl Fn(&P, f64, OrientedBox) -> P,
     ) {
-        let expected: Vec<_> = self.targets.iter().map(|one| one.expected(at_s)).collect();
-        let mut pairs = Vec::new();
-        for (number, person) in found.iter().enumerate() {
-            for (index, expected) in expected.iter().enumerate() {
-                let iou = iou(expected, &person.bounds());
-                if iou >= SAME_IOU {
-                    let is_weak = person.score() < least_score;
-                    pairs.push((is_weak, iou, index, number));
-                }
+        let same = same_persons(&self.targets, &found, at_s, least_score);
+        let targets = self.targets.iter_mut().zip(moving);
+        for ((target, is_moving), same) in targets.zip(&same) {
+            target.is_seen = same.is_some() || !is_moving;
+            // Persons without motion stay as they were.
+            if let (Some(number), true) = (*same, *is_moving) {
+                target.confirm(&found[number], at_s, &place);
             }
         }
-        pairs.sort_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)));
-        let mut is_used = vec![false; found.len()];
-        let mut is_paired = vec![false; expected.len()];
-        for (_, _, index, number) in pairs {
-            if !is_paired[index] && !is_used[number] {
-                is_paired[index] = true;
-                is_used[number] = true;
-                // Persons without motion stay as they were.
-                if moving[index] {
-                    self.targets[index].confirm(&found[number], at_s, &place);
-                }
+        for (number, other) in found.into_iter().enumerate() {
+            if other.score() >= least_score && !same.contains(&Some(number)) {
+                self.targets.push(Target::new(other, at_s, None));
             }
         }
-        let states = moving.iter().zip(is_paired);
-        for (target, (is_moving, is_paired)) in self.targets.iter_mut().zip(states) {
-            target.is_seen = is_paired || !is_moving;
-        }
-        let others = found.into_iter().zip(is_used);
-        let others = others.filter(|(other, is_used)| !is_used && other.score() >= least_score);
-        self.targets
-            .extend(others.map(|(other, _)| Target::new(other, at_s, None)));
     }
 
     /// Returns the people that are seen.

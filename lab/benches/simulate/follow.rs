@@ -3,7 +3,8 @@
 
 use lookdown_lens::geometry::OrientedBox;
 use lookdown_tracking::follow::{
-    FollowedPeople, FoundPerson, JOINED_CELLS, SEARCH_EVERY_S, from_logit, logit, overlap, widened,
+    FollowedPeople, FoundPerson, JOINED_CELLS, LEAST_FILL, SEARCH_EVERY_S, from_logit, logit,
+    overlap, widened,
 };
 
 use crate::detector::{Camera, FRAME_PX, Found, Shown, bounds};
@@ -12,7 +13,7 @@ use crate::detector::{Camera, FRAME_PX, Found, Shown, bounds};
 const CELL_PX: f64 = FRAME_PX / 64.0;
 /// Least shift of a person that changes a cell, pixels.
 const MOVED_PX: f64 = CELL_PX / 8.0;
-/// The margin of a crop around the expected box of its person, as a share of the larger side.
+/// The least margin of a crop around the expected box of its person, as a share of the larger side.
 const CROP_MARGIN: f64 = 0.5;
 /// The least score of a box that makes a new person.
 const NEW_SCORE: f64 = 0.06;
@@ -69,7 +70,8 @@ impl Follow {
             }
         };
         let expected = state.people.expected(&moving, at_s);
-        let crops: Vec<Bounds> = expected.map(|(_, expected)| crop(expected)).collect();
+        let fill = state.people.most_fill(&moving, at_s);
+        let crops: Vec<Bounds> = expected.map(|(_, expected)| crop(expected, fill)).collect();
         let found = camera.search_crops(at_s, shown, |oriented| {
             let [x, y] = [oriented.center.x, oriented.center.y];
             crops.iter().any(|crop| overlap(crop, &[x, y, x, y]))
@@ -122,7 +124,7 @@ impl State {
             .people
             .unexplained(&moved, JOINED_CELLS * CELL_PX, at_s);
         let moving = self.people.moving(&moved, at_s);
-        let can_follow = others.is_empty() && self.people.are_in_reach(&moving, at_s);
+        let can_follow = others.is_empty() && self.people.most_fill(&moving, at_s) >= LEAST_FILL;
         can_follow.then_some(moving)
     }
 
@@ -146,8 +148,10 @@ impl State {
     }
 }
 
-/// The part of the frame that a crop around an expected box shows.
-fn crop(expected: Bounds) -> Bounds {
+/// The part of the frame that a crop around an expected box shows, of which people fill at most the
+/// share `most_fill`.
+fn crop(expected: Bounds, most_fill: f64) -> Bounds {
     let [x_min, y_min, x_max, y_max] = expected;
-    widened(expected, CROP_MARGIN * (x_max - x_min).max(y_max - y_min))
+    let margin = CROP_MARGIN.max((1.0 / most_fill - 1.0) / 2.0);
+    widened(expected, margin * (x_max - x_min).max(y_max - y_min))
 }

@@ -85,7 +85,7 @@ struct TrackRow {
     last_seen: Timestamp,
     /// `upright`, `seated`, `low`, `lying` or `unknown`, from all boxes so far.
     posture: &'static str,
-    /// Probability of the most likely posture; below 0.6 the posture is `unknown`.
+    /// Probability of the most likely posture; below 0.5 the posture is `unknown`.
     posture_probability: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]

@@ -148,8 +148,8 @@ parameter_table! {
         help: "Searches the whole frame about once a second, when something moves where no person was, \
                and when a crop loses a person. In the frames between, the detector sees only crops at \
                the places where the persons of this camera are expected, and those without motion stay \
-               as they were. A frame is also searched if so much time has passed that people may have \
-               walked out of the crops: after 0.4 s, or 0.6 s where their motion is known. With `motion`, a \
+               as they were. Crops are wider the more time has passed. After 0.9 s, or 1.6 s where motion \
+               is known, people may have left even these, and the frame is searched. With `motion`, a \
                still frame is not searched for 10 s once all scores are settled. Needs `camera` or \
                `calibration`; up to 256 cameras are followed.",
         example: None,

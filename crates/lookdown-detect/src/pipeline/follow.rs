@@ -14,7 +14,7 @@ use lookdown_lens::geometry::{
     OrientedBox, crop_placement::CropTarget, hull::middle, oriented_box::vertical_in_frame,
 };
 use lookdown_tracking::{
-    follow::{FollowedPeople, FoundPerson, JOINED_CELLS, SEARCH_EVERY_S},
+    follow::{FollowedPeople, FoundPerson, JOINED_CELLS, LEAST_FILL, SEARCH_EVERY_S},
     taught,
 };
 use parking_lot::Mutex;
@@ -34,8 +34,7 @@ const LEAST_SCORE: f64 = 1e-4;
 /// The next search of a camera is not due before so many times the time that the last one took.
 /// Searches of frames that wait for others would otherwise leave no time to follow anyone.
 const SEARCH_TIMES: u32 = 3;
-/// … but it is due after this time. A search that takes longer than .7 s leaves no one in reach, so
-/// that only recordings, whose frames wait, need the limit.
+/// … but it is due after this time, in which most walkers leave the widest crops.
 const MAX_SEARCH_EVERY: Duration = Duration::from_secs(2);
 
 /// The followed persons of each camera.
@@ -133,7 +132,7 @@ impl Followed {
         }
         let moved = signature.moved_since(&self.searched, &self.visible)?;
         let moved = if is_noise(&moved) { Vec::new() } else { moved };
-        let is_still = moved.is_empty() && self.people.are_all_seen() && self.people.are_settled();
+        let is_still = moved.is_empty() && self.people.are_settled();
         if age >= self.search_every && !(is_still && self.origin.skips_still_frames) {
             return None;
         }
@@ -143,8 +142,8 @@ impl Followed {
         let moved: Vec<_> = moved.iter().map(|cell| cell.bounds).collect();
         let moving = self.people.moving(&moved, seconds(at));
         let count = moving.iter().filter(|is_moving| **is_moving).count();
-        let can_follow = count <= MAX_MOVING && self.people.are_in_reach(&moving, seconds(at));
-        can_follow.then_some(moving)
+        let fill = self.people.most_fill(&moving, seconds(at));
+        (count <= MAX_MOVING && fill >= LEAST_FILL).then_some(moving)
     }
 
     /// Returns true if nothing has moved since a search that has left someone unsure: the next one
@@ -204,8 +203,9 @@ pub(super) struct FollowedFrame {
 }
 
 impl FollowedFrame {
-    /// Returns the places of the crops, best persons first; `None` if the whole frame is searched.
-    pub(super) fn targets(&self, rig: &CameraRig) -> Option<Vec<CropTarget>> {
+    /// Returns the places of the crops, best persons first, and the share of their sides that
+    /// people may fill at most; `None` if the whole frame is searched.
+    pub(super) fn targets(&self, rig: &CameraRig) -> Option<(Vec<CropTarget>, f64)> {
         let (before, moving) = (self.before.as_ref()?, self.moving.as_ref()?);
         let geometry = &rig.geometry;
         let expected = before.people.expected(moving, seconds(self.at));
@@ -217,7 +217,7 @@ impl FollowedFrame {
             })
             .collect();
         targets.sort_by(|a, b| b.score.total_cmp(&a.score));
-        Some(targets)
+        Some((targets, before.people.most_fill(moving, seconds(self.at))))
     }
 
     /// Confirms the persons in motion by those in the crops of the frame, which `found_by` returns.

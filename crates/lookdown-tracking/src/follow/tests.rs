@@ -80,6 +80,29 @@ fn a_weak_box_at_the_expected_place_hides_no_person() {
 }
 
 #[test]
+fn someone_a_box_further_is_the_same_person_later() {
+    let found = |x| [Found { x, score: 0.8 }];
+    let first = FollowedPeople::from_search(&found(0.0), 0.0, None);
+    for (x, is_same) in [(80.0, true), (140.0, false)] {
+        let mut crops = first.clone();
+        crops.confirm(&[true], found(x).to_vec(), 0.5, 0.3, placed);
+        assert_eq!(!first.are_lost_in(&crops, 0.3), is_same, "{x}");
+        let search = FollowedPeople::from_search(&found(x), 0.5, Some(&first));
+        assert_eq!(search.has_missed, !is_same, "{x}");
+    }
+}
+
+#[test]
+fn crops_are_wider_the_longer_the_way_may_be() {
+    let walker = walker();
+    let fill = |at_s| walker.most_fill(&[true], at_s);
+    // .5 and .3 of 25 pixels per second, in boxes of 100 pixels: .575 of them in a second.
+    assert_close(fill(1.2), 1.0 / (1.0 + 2.0 * 0.575));
+    assert_close(fill(0.2), 1.0);
+    assert_close(walker.most_fill(&[false], 1.2), 1.0);
+}
+
+#[test]
 fn a_walker_whom_a_search_misses_is_expected_for_a_second() {
     let walker = walker();
     let after = |at_s| FollowedPeople::from_search(&[], at_s, Some(&walker));

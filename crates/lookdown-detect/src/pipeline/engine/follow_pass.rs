@@ -32,7 +32,7 @@ impl Engine {
         }
         let targets = follow.targets(&rig);
         observation.follow = Some(follow);
-        let Some(targets) = targets else {
+        let Some((targets, most_fill)) = targets else {
             return FirstPass::Search;
         };
         observation.is_searched = false;
@@ -49,7 +49,7 @@ impl Engine {
         let fill = observation.tuning.crop_fill;
         let tiles = |per_side: u32| {
             // Persons in tiles fill the same share, so that they are smaller with more tiles.
-            let fill = fill * f64::from(per_side.min(2));
+            let fill = (fill * f64::from(per_side.min(2))).min(most_fill);
             place_crops(&targets, targets.len(), fill, side / per_side)
         };
         let crops = self.remappers.install(|| {

@@ -169,14 +169,14 @@ fn a_person_whom_no_crop_confirms_starts_a_search() {
 }
 
 #[test]
-fn a_walker_out_of_reach_of_crops_starts_a_search() {
+fn wider_crops_follow_a_walker_half_a_second_later() {
     let camera = FollowedCamera::new();
     camera.report(0, [420.0, 300.0], 20.0);
-    // After .5 s a walker whose motion is not known may be anywhere near.
-    let next = camera.report(500, [400.0, 300.0], 20.0);
-    assert_eq!((next.search, next.persons.len()), (Search::Full, 1));
-    let known = camera.report(900, [384.0, 300.0], 20.0);
-    assert_eq!((known.search, known.persons.len()), (Search::Followed, 1));
+    let next = camera.report(500, [390.0, 300.0], 20.0);
+    assert_eq!((next.search, next.persons.len()), (Search::Followed, 1));
+    // After another .5 s a search is due.
+    let known = camera.report(1000, [360.0, 300.0], 20.0);
+    assert_eq!((known.search, known.persons.len()), (Search::Full, 1));
 }
 
 #[test]

@@ -227,6 +227,17 @@ impl Camera {
     }
 }
 
+/// Returns the votes for a pose with standard normal errors.
+fn votes(pose: Pose, errors: [f64; 2]) -> FloorVotes {
+    let ([lying, low], correlation) = VOTES[pose.posture() as usize];
+    let unique: f64 = 1.0 - correlation * correlation;
+    let of_low = correlation * errors[0] + unique.sqrt() * errors[1];
+    FloorVotes {
+        lying: (lying.0 + lying.1 * errors[0]).clamp(0.0, 1.0),
+        low: (low.0 + low.1 * of_low).clamp(0.0, 1.0),
+    }
+}
+
 /// Returns the signs of a box without votes.
 fn of_box(angles: BoxAngles) -> PostureSigns {
     PostureSigns {
@@ -235,26 +246,31 @@ fn of_box(angles: BoxAngles) -> PostureSigns {
     }
 }
 
-fn noise(chance: &mut Chance) -> [f64; 4] {
+fn noise<const ERRORS: usize>(chance: &mut Chance) -> [f64; ERRORS] {
     std::array::from_fn(|_| chance.normal())
 }
 
-/// Adds the boxes of a pose for some seconds at 5 frames a second: half of the errors stay.
+/// Adds the boxes of limbs for some seconds at 5 frames a second, with the votes for a pose: half
+/// of the errors stay.
 fn watch(
     belief: &mut PostureBelief,
     camera: &Camera,
-    (limbs, place): (&[Limb], [f64; 3]),
+    (limbs, place, pose): (&[Limb], [f64; 3], Option<Pose>),
     seconds: f64,
     chance: &mut Chance,
 ) {
-    let lasting = noise(chance);
+    let lasting: [f64; 6] = noise(chance);
     let mut left = seconds;
     while left > 0.0 {
-        let fresh = noise(chance);
-        let errors = std::array::from_fn(|index| (lasting[index] + fresh[index]) / f64::sqrt(2.0));
-        if let Some(seen) = camera.see(limbs, place, errors) {
+        let fresh: [f64; 6] = noise(chance);
+        let [x, y, width, height, of_lying, of_low] =
+            std::array::from_fn(|index| (lasting[index] + fresh[index]) / f64::sqrt(2.0));
+        let angles = camera.see(limbs, place, [x, y, width, height]);
+        if angles.is_some() {
+            let votes = pose.map(|pose| votes(pose, [of_lying, of_low]));
             belief.pass(0.2);
-            belief.add(&of_box(seen), camera.mount.height_m(), 0.2);
+            let signs = PostureSigns { angles, votes };
+            belief.add(&signs, camera.mount.height_m(), 0.2);
         }
         left -= 0.2;
     }
@@ -262,7 +278,7 @@ fn watch(
 
 /// Returns how many of 80 people in a pose have each posture, after three seconds of standing and
 /// some of the pose. Who lies has fallen with the feet in place.
-fn postures(pose: Pose, seconds: f64, directions: [f64; 2]) -> [u32; 5] {
+fn postures(pose: Pose, seconds: f64, directions: [f64; 2], has_votes: bool) -> [u32; 5] {
     let mut chance = Chance(7);
     let mut found = [0; 5];
     for case in 0..80 {
@@ -275,7 +291,11 @@ fn postures(pose: Pose, seconds: f64, directions: [f64; 2]) -> [u32; 5] {
         watch(
             &mut belief,
             &camera,
-            (&standing, [out, azimuth, turn]),
+            (
+                &standing,
+                [out, azimuth, turn],
+                has_votes.then_some(Pose::Standing),
+            ),
             3.0,
             &mut chance,
         );
@@ -286,7 +306,13 @@ fn postures(pose: Pose, seconds: f64, directions: [f64; 2]) -> [u32; 5] {
             turn -= y.atan2(x);
             place = [x.hypot(y), azimuth + y.atan2(x), turn];
         }
-        watch(&mut belief, &camera, (&body, place), seconds, &mut chance);
+        watch(
+            &mut belief,
+            &camera,
+            (&body, place, has_votes.then_some(pose)),
+            seconds,
+            &mut chance,
+        );
         found[belief.posture().0 as usize] += 1;
     }
     found
@@ -304,7 +330,7 @@ fn people_who_stand_or_sit_are_not_lying() {
         (Pose::Sitting, ACROSS, 65),
         (Pose::Sitting, ALONG, 25),
     ] {
-        let found = postures(pose, 3.0, directions);
+        let found = postures(pose, 3.0, directions, false);
         assert!(found[Posture::Lying as usize] <= 1, "{pose:?}: {found:?}");
         let right = found[pose.posture() as usize];
         assert!(right >= least, "{pose:?}: {found:?}");
@@ -320,9 +346,20 @@ fn people_who_fell_lie_or_are_low() {
         (Pose::Crawling, ACROSS, 60),
         (Pose::OnFloor, ACROSS, 30),
     ] {
-        let found = postures(pose, 1.0, directions);
+        let found = postures(pose, 1.0, directions, false);
         let down = found[Posture::Lying as usize] + found[Posture::Low as usize];
         assert!(down >= least, "{pose:?}: {found:?}");
+    }
+}
+
+#[test]
+fn votes_tell_who_lies_along_the_line_of_sight() {
+    for (pose, least) in [(Pose::OnBack, 72), (Pose::OnSide, 56)] {
+        let found = postures(pose, 1.0, ALONG, true);
+        assert!(
+            found[Posture::Lying as usize] >= least,
+            "{pose:?}: {found:?}"
+        );
     }
 }
 
@@ -369,7 +406,7 @@ fn unknown_height_of_the_camera_is_learned() {
 /// alerts: not after being up for 5 s, nor after a minute of sitting in a box of the same length.
 /// The person stands first, then changes the limbs every two minutes. Boxes have errors, and votes
 /// their distribution for the posture; both change within a minute.
-fn sessions_down(pose: Pose, [sessions, minutes]: [usize; 2]) -> usize {
+fn sessions_down(pose: Pose, sessions: usize, minutes: i64) -> usize {
     let mut chance = Chance(11);
     let is_down = |chance: &mut Chance| {
         let camera = Camera::any(chance);
@@ -381,16 +418,16 @@ fn sessions_down(pose: Pose, [sessions, minutes]: [usize; 2]) -> usize {
         ];
         let mut belief = PostureBelief::new(true);
         let standing = limbs(Pose::Standing, stature, chance);
-        watch(&mut belief, &camera, (&standing, place), 3.0, chance);
+        watch(&mut belief, &camera, (&standing, place, None), 3.0, chance);
         let (mut since, mut up_since, mut down_seconds) = (None, None, 0.0);
-        let mut errors = noise(chance);
+        let mut errors: [f64; 4] = noise(chance);
         let mut exact = None;
         let (mut length, mut seated_seconds) = (0.0, 0);
-        for second in 0..minutes * 60 {
+        for second in 0..60 * minutes {
             if second % 120 == 0 {
                 exact = camera.see(&limbs(pose, stature, chance), place, [0.0; 4]);
             }
-            let fresh = noise(chance);
+            let fresh: [f64; 4] = noise(chance);
             for (error, fresh) in errors.iter_mut().zip(fresh) {
                 *error = 0.983 * *error + 0.18 * fresh;
             }
@@ -400,36 +437,29 @@ fn sessions_down(pose: Pose, [sessions, minutes]: [usize; 2]) -> usize {
                 along: exact.along * (1.0 + 0.08 * errors[0]),
                 across: exact.across * (1.0 + 0.08 * errors[1]),
             };
-            let ([lying, low], correlation) = VOTES[pose.posture() as usize];
-            let unique: f64 = 1.0 - correlation * correlation;
-            let of_low = correlation * errors[2] + unique.sqrt() * errors[3];
-            let votes = FloorVotes {
-                lying: (lying.0 + lying.1 * errors[2]).clamp(0.0, 1.0),
-                low: (low.0 + low.1 * of_low).clamp(0.0, 1.0),
-            };
             let signs = PostureSigns {
                 angles: Some(shown),
-                votes: Some(votes),
+                votes: Some(votes(pose, [errors[2], errors[3]])),
             };
             belief.pass(1.0);
             belief.add(&signs, camera.mount.height_m(), 1.0);
             let now = shown.along.max(shown.across);
-            if !(0.71..=1.4).contains(&(length / now)) {
+            if !(1.0 / SAME_LENGTH..=SAME_LENGTH).contains(&(length / now)) {
                 (length, seated_seconds) = (now, 0);
             }
-            seated_seconds += usize::from(belief.sits());
-            if belief.is_down() && seated_seconds < 60 {
+            seated_seconds += i64::from(belief.sits());
+            if belief.is_down() && 1000 * seated_seconds < SETTLED_MS {
                 (since, up_since) = (since.or(Some(second)), None);
             } else if belief.is_up() {
                 up_since = up_since.or(Some(second));
             }
-            if up_since.is_some_and(|up| second - up >= 5) || since.is_none() {
+            if up_since.is_some_and(|up| 1000 * (second - up) >= UP_MS) || since.is_none() {
                 (since, up_since, down_seconds) = (None, None, 0.0);
             }
             down_seconds += belief.down_probability();
             let is_alert = |since| {
                 let seconds = second - since;
-                seconds >= 20 && down_seconds >= 0.8 * float(seconds)
+                seconds >= 20 && down_seconds >= MOSTLY_DOWN * seconds as f64
             };
             if since.is_some_and(is_alert) && up_since.is_none() {
                 return true;
@@ -440,7 +470,7 @@ fn sessions_down(pose: Pose, [sessions, minutes]: [usize; 2]) -> usize {
     (0..sessions).filter(|_| is_down(&mut chance)).count()
 }
 
-/// The figures of docs/count.md, from 1,000 people of each pose: N=1000 repeats them.
+/// The figures of docs/count.md, from 4,000 people of each pose: N=4000 repeats them.
 #[test]
 fn few_people_who_sit_become_a_floor_alert() {
     let sessions = std::env::var("N").map_or(8, |sessions| sessions.parse().unwrap());
@@ -451,7 +481,7 @@ fn few_people_who_sit_become_a_floor_alert() {
         (Pose::OnBack, 1, 0.8..=1.0),
         (Pose::OnSide, 1, 0.8..=1.0),
     ] {
-        let down = sessions_down(pose, [sessions, minutes]);
+        let down = sessions_down(pose, sessions, minutes);
         println!("{pose:?}, {minutes} min: {down} of {sessions}");
         let share = float(down) / float(sessions);
         assert!(shares.contains(&share), "{pose:?}: {down} of {sessions}");
