@@ -352,9 +352,10 @@ fn people_who_fell_lie_or_are_low() {
     }
 }
 
+/// Of 1,600 people, .96 and .77 are told to lie.
 #[test]
 fn votes_tell_who_lies_along_the_line_of_sight() {
-    for (pose, least) in [(Pose::OnBack, 72), (Pose::OnSide, 56)] {
+    for (pose, least) in [(Pose::OnBack, 70), (Pose::OnSide, 50)] {
         let found = postures(pose, 1.0, ALONG, true);
         assert!(
             found[Posture::Lying as usize] >= least,
