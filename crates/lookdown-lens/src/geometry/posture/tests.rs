@@ -352,7 +352,7 @@ fn people_who_fell_lie_or_are_low() {
     }
 }
 
-/// Of 1,600 people, .96 and .77 are told to lie.
+/// The shares of 1,600 people are .96 and .77.
 #[test]
 fn votes_tell_who_lies_along_the_line_of_sight() {
     for (pose, least) in [(Pose::OnBack, 70), (Pose::OnSide, 50)] {
