@@ -6,7 +6,7 @@ import { ask } from "./server.js";
 
 /** Creates the alerts of a camera: `{node, show}`. `show` takes the alerts of an answer of the counts, and the node of the card. */
 export function floorAlerts(camera) {
-  const node = element("ul", { class: "floor-alerts", role: "alert", hidden: true });
+  const node = element("div", { class: "floor-alerts", role: "alert", hidden: true });
   return { node, show: (alerts = [], card = null) => show({ camera, node }, alerts, card) };
 }
 
@@ -19,7 +19,7 @@ async function show({ camera, node }, alerts, card) {
   node.dataset.content = content;
   node.hidden = !rows.length;
   const { can_change: may } = await options();
-  node.replaceChildren(...rows.map((row) => element("li", {}, element("span", {}, row.text), ...(may && row.isOpen ? [button(camera, row)] : []))));
+  node.replaceChildren(...rows.map((row) => element("p", {}, element("span", {}, row.text), ...(may && row.isOpen ? [button(camera, row)] : []))));
 }
 
 /** The sentence of an alert, such as "Someone is lying near window since 14:02". */

@@ -13,12 +13,13 @@ import signal
 import subprocess
 import tempfile
 import threading
+import time
 import unittest
 from collections.abc import Iterator
 from pathlib import Path
 
 from cameras import Handler, serving
-from harness.processes import free_ports
+from harness.processes import Server, free_ports
 from rendered_room import rendered_room
 from support.exchange import ask
 from support.lookdown import lookdown
@@ -32,6 +33,8 @@ CAMERAS_WITH_IMAGES = "gate,office,canteen,lounge"
 OFFICE = (SAMPLES / "office.jpg").read_bytes()
 ROOM = rendered_room()
 WALKS = HERE.parent / "walks"
+FALL = HERE.parent / "fall"
+"""Composed by the generator of lab/training, of a room and clothes that training never had."""
 STILL_SECONDS = 2.0
 """Interval of the frames in which everyone stands still."""
 ZONE = {"name": "middle", "floor_m": [[-2, -1], [2, -1], [2, 3], [-2, 3]]}
@@ -48,6 +51,18 @@ class Camera(Handler):
         status = 200 if is_allowed and is_found else 404 if is_allowed else 401
         challenge = ("WWW-Authenticate", 'Basic realm="camera"')
         self.answer(status, images[self.path] if status == 200 else b"", challenge, ("Content-Type", "image/jpeg"))
+
+
+class Fall(Handler):
+    """A camera below which someone walks for 8 s, and then lies on the floor."""
+
+    frames: list[bytes]
+    began = 0.0
+
+    def do_GET(self) -> None:
+        Fall.began = Fall.began or time.monotonic()
+        shown = min(int(time.monotonic() - self.began), len(self.frames) - 1)
+        self.answer(200, self.frames[shown], ("Content-Type", "image/jpeg"))
 
 
 class Page(unittest.TestCase):
@@ -83,6 +98,7 @@ class Page(unittest.TestCase):
                     lookdown({"ACCESS__KEYS_FILE": str(keys)}) as keyed,
                     self.counted(Path(folder)) as counted,
                     self.with_a_camera(Path(folder)) as camera,
+                    self.with_a_fall(Path(folder)) as fall,
                 ):
                     self.run_node(
                         "all.test.js",
@@ -94,6 +110,7 @@ class Page(unittest.TestCase):
                             "LOOKDOWN_FIXTURES": str(FIXTURES / "calibrations"),
                             **counted,
                             **camera,
+                            "LOOKDOWN_FALL_URL": f"http://{fall.address}",
                         },
                     )
 
@@ -169,6 +186,30 @@ class Page(unittest.TestCase):
                     "LOOKDOWN_CAMERA_URL": f"http://127.0.0.1:{camera}",
                     "LOOKDOWN_CAMERA_PASSWORD": KEY,
                 }
+
+    @contextlib.contextmanager
+    def with_a_fall(self, folder: Path) -> Iterator[Server]:
+        """A `lookdown run` whose camera shows a fall, with an alert after 5 s."""
+        calibrations, frames = folder / "fall", folder / "fall_frames"
+        frames.mkdir()
+        calibrations.mkdir()
+        shutil.copy(FALL / "calibration.json", calibrations / "room.json")
+        clip = ["-i", FALL / "fall.mp4", "-q:v", "2", frames / "%02d.jpg"]
+        subprocess.run(["ffmpeg", "-v", "error", *clip], check=True)
+        Fall.frames = [frame.read_bytes() for frame in sorted(frames.iterdir())]
+        settings = {
+            "STATE__PATH": folder / "fall_state",
+            "COUNTS__PATH": folder / "fall.sqlite",
+            "RESULTS__IMAGES": "room",
+            "COUNTS__FLOOR_ALERT": "true",
+            "COUNTS__FLOOR_ALERT_AFTER": "5s",
+            "LOG__FILTER": "warn",
+        }
+        options = ["--name", "room", "--calibration", "room", "--profile", "fast", "--every", "1s"]
+        with serving(Fall) as camera:
+            command = ["run", f"http://127.0.0.1:{camera}/", *options]
+            with lookdown(settings, calibrations=calibrations, command=command) as run:
+                yield run
 
     def run_node(self, tests: str, settings: dict[str, str]) -> None:
         """Runs tests that are written in JavaScript."""

@@ -9,3 +9,4 @@ import "./zones.js";
 import "./looks.js";
 import "./counts.js";
 import "./cameras.js";
+import "./floor_alerts.js";

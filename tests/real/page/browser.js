@@ -15,7 +15,7 @@ export const SAMPLES = process.env.LOOKDOWN_SAMPLES;
 /** The folder of screenshots. None are taken if it is unset. */
 const IMAGES = process.env.LOOKDOWN_PAGE_IMAGES;
 /** The screenshots that the documentation shows. */
-const SHOWN = ["cameras-wide", "counts-wide", "views-wide", "zones-wide"];
+const SHOWN = ["cameras-wide", "counts-wide", "floor-alert-wide", "views-wide", "zones-wide"];
 export const WIDE = { width: 1440, height: 900 };
 export const PHONE = { width: 390, height: 844 };
 
