@@ -47,9 +47,10 @@ check: ## check formatting, lints and budgets of lines, and run the unit tests; 
 	cargo clippy --workspace --lib --bins --locked -- -D warnings
 	cargo test --workspace --lib --locked
 
-test: ## set up, then check formatting, lints, tests and documentation; needs only this repository
+test: ## set up, then check formatting, budgets, lints, tests and documentation; needs only this repository
 	@$(PYTHON) packaging/scripts/setup.py toolchain runtime checkers converters
 	cargo fmt --all --check
+	$(PYTHON) packaging/scripts/lines.py --check
 	cargo clippy --workspace --all-targets --locked -- -D warnings
 	@# Workspaces of their own: the lock file of the fuzzers, the bench of the tracker.
 	cargo tree --quiet --locked --manifest-path lab/fuzz/Cargo.toml > /dev/null
