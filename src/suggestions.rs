@@ -86,7 +86,8 @@ impl Suggestions {
             return;
         };
         let size = (report.image_width, report.image_height);
-        let boxes = report.persons.iter().map(|person| person.oriented_box);
+        let standing = report.persons.iter().filter(|person| !person.lies());
+        let boxes = standing.map(|person| person.oriented_box);
         let mut cameras = self.shared.cameras.lock();
         let is_full = !cameras.contains_key(&camera) && cameras.len() >= MAX_CAMERAS;
         if is_full && !make_room(&mut cameras, &camera, &self.own, now) {

@@ -26,7 +26,7 @@ use tokio::{
 };
 
 use self::events::{
-    EventImage, announcements, config_topics, event_topic, events, floor_alert, image_topic,
+    Event, EventImage, announcements, config_topics, event_topic, events, floor_alert,
     request_images,
 };
 use super::{
@@ -95,22 +95,23 @@ impl CountsPublisher {
 
     /// Publishes until the counts end, and then publishes the status "offline".
     pub async fn run(self) {
-        let (wanted, cameras) = mpsc::channel(IMAGES);
+        let (wanted, events) = mpsc::channel(IMAGES);
         let (sender, images) = mpsc::channel(1);
         let (server, every) = (self.server.clone(), self.options.image_every);
+        let topics = self.topics.clone();
         let requesting = async {
             if let Some(every) = every {
-                request_images(server, every, cameras, sender).await;
+                request_images(server, topics, every, events, sender).await;
             }
         };
         tokio::join!(self.publish(wanted, images), requesting);
     }
 
-    /// Publishes in one session after the other. `wanted` receives the cameras of events, and
-    /// `images` has their images.
+    /// Publishes in one session after the other. `wanted` receives the events, and `images` has
+    /// their images.
     async fn publish(
         mut self,
-        wanted: mpsc::Sender<String>,
+        wanted: mpsc::Sender<Event>,
         mut images: mpsc::Receiver<EventImage>,
     ) {
         let mut snapshots = self.snapshots.clone();
@@ -138,7 +139,7 @@ impl CountsPublisher {
         &mut self,
         mut session: Session,
         mut stop: Pin<&mut impl Future<Output = ()>>,
-        wanted: &mpsc::Sender<String>,
+        wanted: &mpsc::Sender<Event>,
         images: &mut mpsc::Receiver<EventImage>,
     ) -> Result<(), SessionError> {
         session.publish([self.status(ONLINE)]).await?;
@@ -162,7 +163,7 @@ impl CountsPublisher {
                 let body = event.body.to_string().into();
                 session.publish([Message::passing(topic, body)]).await?;
                 // Without room, the event has no image.
-                let _ = wanted.try_send(event.camera);
+                let _ = wanted.try_send(event);
             }
             before = snapshot;
             tokio::select! {
@@ -179,9 +180,11 @@ impl CountsPublisher {
                     withdraw_at = None;
                     session.publish(self.withdrawals(&mut unknown, &published)).await?;
                 }
-                Some(EventImage { camera, jpeg }) = images.recv() => {
-                    let topic = image_topic(&self.topics, &camera);
-                    session.publish([Message::passing(topic, jpeg.into())]).await?;
+                Some(EventImage { topics, jpeg }) = images.recv() => {
+                    let jpeg = bytes::Bytes::from(jpeg);
+                    let copies = topics.into_iter();
+                    let copies = copies.map(|topic| Message::passing(topic, jpeg.clone()));
+                    session.publish(copies).await?;
                 }
                 Ok(()) = self.snapshots.changed() => {}
                 () = &mut stop => return session.close(self.status(OFFLINE)).await,

@@ -20,16 +20,19 @@ use lookdown_lens::geometry::{
 };
 
 fn person() -> Person {
+    let oriented_box = OrientedBox {
+        center: Pixel::new(1222.9, 771.304),
+        width: 118.25,
+        height: 241.019,
+        angle: 79.84_f64.to_radians(),
+        up: nalgebra::Vector2::new(0.0, -1.0),
+    };
     Person {
         bbox: BBox::new([1102.4149, 700.0751, 1341.7, 842.600_000_1]).unwrap(),
         score: 0.873_149,
-        oriented_box: OrientedBox {
-            center: Pixel::new(1222.9, 771.304),
-            width: 118.25,
-            height: 241.019,
-            angle: 79.84_f64.to_radians(),
-            up: nalgebra::Vector2::new(0.0, -1.0),
-        },
+        upright_box: oriented_box,
+        oriented_box,
+        foot: Pixel::new(1200.0, 771.0),
         bearing: Some(Bearing {
             azimuth: 349.871_f64.to_radians(),
             off_axis: 41.709_f64.to_radians(),

@@ -186,14 +186,15 @@ pub struct ReportPerson {
     pub bbox: ReportBox,
     /// Confidence, 0 to 1.
     pub score: f64,
-    /// The box rotated so that its height axis is the projected vertical.
+    /// The box rotated so that its height axis is the projected vertical, or the body of a person
+    /// who lies, with `floor`.
     pub oriented_box: ReportOrientedBox,
     /// Direction of the box center; null outside the lens image.
     pub bearing: Option<ReportBearing>,
     /// Position of the person on the floor; null when the height of the camera is unknown.
     pub floor: Option<ReportFloor>,
     /// Height of the person above the floor in meters; absent when the height of the camera is
-    /// unknown, below the camera, and far away.
+    /// unknown, below the camera, far away, and of a person who lies.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub height_m: Option<f64>,

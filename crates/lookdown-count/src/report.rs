@@ -153,8 +153,9 @@ fn observation(
     );
     // The angle does not tell the head from the foot.
     let oriented = OrientedBox::turned(center, reported.width, reported.height, angle)
-        .with_head_toward(&definition.up_at(center));
-    let foot = oriented.foot();
+        .along(&definition.up_at(center));
+    let lies = person.posture == "lying" && person.floor_votes.is_some();
+    let foot = if lies { center } else { oriented.foot() };
     let camera = definition.geometry.as_ref();
     let signs = PostureSigns {
         angles: camera.and_then(|camera| BoxAngles::new(&oriented, &camera.lens, &camera.mount)),
@@ -168,7 +169,7 @@ fn observation(
         azimuth_deg: bearing.azimuth_deg,
         off_axis_deg: bearing.off_axis_deg,
         center_px: [reported.cx, reported.cy],
-        size_px: [reported.width, reported.height],
+        size_px: [oriented.width, oriented.height],
         signs,
         foot_px: [foot.x, foot.y],
         score: person.score,

@@ -40,7 +40,7 @@ impl FoundPerson for Found {
         bounds(&self.oriented)
     }
 
-    fn oriented_box(&self) -> OrientedBox {
+    fn upright_box(&self) -> OrientedBox {
         self.oriented
     }
 

@@ -128,6 +128,7 @@ fn people_in_frames(
         people.extend(
             persons
                 .iter()
+                .filter(|person| !person.lies())
                 .map(|person| person.oriented_box.scaled(scale)),
         );
     }
@@ -223,5 +224,5 @@ fn upright_box(reported: &ReportOrientedBox, scale: f64, camera: &Calibration) -
     );
     let upright = OrientedBox::turned(center, reported.width, reported.height, angle).scaled(scale);
     let vertical = vertical_in_frame(upright.center, camera.lens(), camera.mount());
-    upright.with_head_toward(&vertical)
+    upright.along(&vertical)
 }

@@ -35,6 +35,17 @@ pub(super) struct Event {
     pub(super) body: Value,
 }
 
+impl Event {
+    /// Returns the topics of the image at the event. Those of floor alerts have one of their own,
+    /// which no other event replaces.
+    fn image_topics(&self, topics: &Topics) -> Vec<String> {
+        let is_alert = self.body["event_type"] == FLOOR_ALERT;
+        let images = IMAGES.iter().take(1 + usize::from(is_alert));
+        let topics = images.map(|&(.., folder)| image_topic(topics, folder, &self.camera));
+        topics.collect()
+    }
+}
+
 /// Returns the events between two snapshots. A camera that the first one does not have has none.
 pub(super) fn events(before: &Snapshot, now: &Snapshot) -> Vec<Event> {
     let mut events = Vec::new();
@@ -118,46 +129,56 @@ fn event(camera: &CameraSnapshot, kind: &str, parts: &Value) -> Event {
 
 /// An image of a camera at an event.
 pub(super) struct EventImage {
-    pub(super) camera: String,
+    /// The topics of the image.
+    pub(super) topics: Vec<String>,
     pub(super) jpeg: Vec<u8>,
 }
 
-/// Requests an image for each camera that is received, one at a time and one per camera in `every`,
-/// until the sender or the receiver is gone.
+/// Requests an image for each event that is received, one at a time and one per camera and kind of
+/// image in `every`, until the sender or the receiver is gone.
 pub(super) async fn request_images(
     client: ServerClient,
+    topics: Topics,
     every: Duration,
-    mut cameras: mpsc::Receiver<String>,
+    mut events: mpsc::Receiver<Event>,
     to: mpsc::Sender<EventImage>,
 ) {
-    let mut last = HashMap::<String, Instant>::new();
-    while let Some(camera) = cameras.recv().await {
+    let mut last = HashMap::<Vec<String>, Instant>::new();
+    while let Some(event) = events.recv().await {
+        let topics = event.image_topics(&topics);
         last.retain(|_, at| at.elapsed() < every);
-        if last.contains_key(&camera) {
+        if last.contains_key(&topics) {
             continue;
         }
-        last.insert(camera.clone(), Instant::now());
-        if let Some(jpeg) = latest_image(&client, &camera).await
-            && to.send(EventImage { camera, jpeg }).await.is_err()
+        last.insert(topics.clone(), Instant::now());
+        if let Some(jpeg) = latest_image(&client, &event.camera).await
+            && to.send(EventImage { topics, jpeg }).await.is_err()
         {
             return;
         }
     }
 }
 
-/// The IDs of the entities.
+/// The ID of the entity of events.
 const EVENT_ID: &str = "count_event";
-const IMAGE_ID: &str = "count_event_image";
+/// The entities of images, those of all events first: ID, name, and the level of the topics above
+/// the camera. It is not `cameras`, so that no image comes back to its publisher.
+const IMAGES: [(&str, &str, &str); 2] = [
+    ("count_event_image", "Latest event", "event_images"),
+    (
+        "count_floor_alert_image",
+        "Latest floor alert",
+        "floor_alert_images",
+    ),
+];
+
+fn image_topic(topics: &Topics, folder: &str, camera: &str) -> String {
+    topics.counts(&format!("{folder}/{}", level(camera)))
+}
 
 /// The topic of the events of a camera.
 pub(super) fn event_topic(topics: &Topics, camera: &str) -> String {
     topics.counts(&format!("events/{}", level(camera)))
-}
-
-/// The topic of the images of the events of a camera. It is not below `cameras`, so that no image
-/// comes back to its publisher.
-pub(super) fn image_topic(topics: &Topics, camera: &str) -> String {
-    topics.counts(&format!("event_images/{}", level(camera)))
 }
 
 /// Returns the topics and payloads that announce the events of a camera, and their images.
@@ -172,13 +193,13 @@ pub(super) fn announcements(
         "state_topic": event_topic(topics, camera),
         "event_types": TYPES,
     });
-    let image = json!({
-        "name": "Latest event",
-        "image_topic": image_topic(topics, camera),
-        "content_type": "image/jpeg",
+    let shown = if has_images { &IMAGES[..] } else { &[] };
+    let images = shown.iter().map(|&(id, name, folder)| {
+        let topic = image_topic(topics, folder, camera);
+        let config = json!({ "name": name, "image_topic": topic, "content_type": "image/jpeg" });
+        (IMAGE, id, config)
     });
-    let image = has_images.then_some((IMAGE, IMAGE_ID, image));
-    let entities = [(EVENT, EVENT_ID, event)].into_iter().chain(image);
+    let entities = [(EVENT, EVENT_ID, event)].into_iter().chain(images);
     entities.filter_map(|(component, id, config)| {
         device.announcement(topics, component, id, [topics.counts("status")], config)
     })
@@ -186,8 +207,10 @@ pub(super) fn announcements(
 
 /// Returns the topics of these announcements.
 pub(super) fn config_topics(topics: &Topics, device: &Device<'_>) -> impl Iterator<Item = String> {
-    [(EVENT, EVENT_ID), (IMAGE, IMAGE_ID)]
+    let images = IMAGES.iter().map(|&(id, ..)| (IMAGE, id));
+    [(EVENT, EVENT_ID)]
         .into_iter()
+        .chain(images)
         .filter_map(|(component, id)| topics.config(component, &device.entity_id(id)))
 }
 

@@ -11,6 +11,8 @@ use lookdown_lens::geometry::{
     foot_filter::AreaReach, pixels::to_pixel_center,
 };
 
+use nalgebra::Vector2;
+
 use super::{
     mosaic::Mosaics,
     outline::{crop_outline, view_outline},
@@ -257,6 +259,30 @@ impl CameraRig {
                 bbox.corners().map(|side| letterbox.frame_from_input(side)),
             )),
         }
+    }
+
+    /// Returns vectors across the sides of a box of a view, in the frame and as long as these sides
+    /// are apart; `None` outside the lens image, and for the whole frame.
+    pub(super) fn widths(&self, view: usize, bbox: &BBox<ViewPixels>) -> Option<[Vector2<f64>; 2]> {
+        let [x_min, y_min, x_max, y_max] = bbox.corners();
+        let in_frame = |x: f64, y: f64| match &self.views {
+            Views::Virtual(views) => {
+                let ray = views[view]
+                    .0
+                    .ray_in_camera(&to_pixel_center(Pixel::new(x, y)));
+                self.geometry.lens.project(&ray)
+            }
+            Views::Crops(mosaics) => Some(mosaics.crops[view].0.frame_from_crop(&Pixel::new(x, y))),
+            Views::Direct(_) => None,
+        };
+        let falling = in_frame(x_max, y_max)? - in_frame(x_min, y_min)?;
+        let rising = in_frame(x_max, y_min)? - in_frame(x_min, y_max)?;
+        let (right, down) = ((falling + rising) / 2.0, (falling - rising) / 2.0);
+        let across = |width: Vector2<f64>, side: Vector2<f64>| {
+            let normal = Vector2::new(-side.y, side.x).normalize();
+            normal * width.dot(&normal)
+        };
+        Some([across(right, down), across(down, right)])
     }
 
     /// Returns the crops; empty for a rig without crops.

@@ -389,7 +389,7 @@ impl Placed {
             ..Self::default()
         };
         for person in persons {
-            match filter.place(person.oriented_box.foot(), person.floor) {
+            match filter.place(person.foot, person.floor) {
                 FootPlace::Inside => placed.persons.push(person),
                 FootPlace::Margin => placed.margin.get_or_insert_default().push(person),
                 FootPlace::Outside => placed.outside.push(person),

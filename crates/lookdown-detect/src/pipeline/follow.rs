@@ -167,9 +167,9 @@ impl Followed {
     fn confirm(&mut self, moving: &[bool], found: Vec<Person>, at: Timestamp, rig: &CameraRig) {
         self.at = at;
         let least_score = self.origin.refinement.score_threshold;
-        let place = |found: &Person, score, oriented_box| {
+        let place = |found: &Person, score, upright_box| {
             let votes = found.floor_votes;
-            merge::placed(found.bbox, score, oriented_box, found.views, votes, rig)
+            merge::placed(found.bbox, score, upright_box, found.views, votes, rig)
         };
         self.people
             .confirm(moving, found, seconds(at), least_score, place);
@@ -290,8 +290,8 @@ impl FoundPerson for Person {
         self.bbox.corners()
     }
 
-    fn oriented_box(&self) -> OrientedBox {
-        self.oriented_box
+    fn upright_box(&self) -> OrientedBox {
+        self.upright_box
     }
 
     fn score(&self) -> f64 {

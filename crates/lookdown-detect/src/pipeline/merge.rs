@@ -159,9 +159,7 @@ fn may_count(merged: &MergedDetection, mapped: &[&Mapped], rig: &CameraRig) -> b
     let members = members(merged, mapped);
     let filter = &rig.geometry.areas.foot_filter;
     let person = person(merged.bbox, merged.score, &members, None, rig);
-    person.is_none_or(|person| {
-        filter.is_near(person.oriented_box.foot(), person.floor, TARGET_MARGINS)
-    })
+    person.is_none_or(|person| filter.is_near(person.foot, person.floor, TARGET_MARGINS))
 }
 
 /// Merges the boxes of every view: those of persons, and `with_postures` those of people on the
@@ -223,7 +221,7 @@ fn person(
         (weight.max(f64::MIN_POSITIVE), &*member.footprint.outline)
     });
     let averaged = OrientedBox::averaging(up, outlines)?;
-    let oriented_box = if has_exact {
+    let upright_box = if has_exact {
         averaged.fitted_to(bounds)
     } else {
         averaged
@@ -231,7 +229,16 @@ fn person(
     let mut views: Vec<usize> = members.iter().map(|member| member.candidate.view).collect();
     views.sort_unstable();
     views.dedup();
-    Some(placed(bbox, score, oriented_box, views.len(), votes, rig))
+    let mut person = placed(bbox, score, upright_box, views.len(), votes, rig);
+    if person.lies() {
+        let mut widths = Vec::new();
+        for member in members {
+            let weight = member.candidate.score * member.candidate.coordinate_weight;
+            widths.extend(member.widths.iter().flatten().map(|width| (weight, *width)));
+        }
+        person.oriented_box = person.upright_box.fitted_to_widths(&widths);
+    }
+    Some(person)
 }
 
 /// Returns the mean vote for people on the floor, over the views that show the person; `None` if no
@@ -256,26 +263,33 @@ fn floor_votes(members: &[&Mapped], passes: &[Pass]) -> Option<FloorVotes> {
 pub(super) fn placed(
     bbox: BBox<FramePixels>,
     score: f64,
-    oriented_box: OrientedBox,
+    upright_box: OrientedBox,
     views: usize,
     floor_votes: Option<FloorVotes>,
     rig: &CameraRig,
 ) -> Person {
     let geometry = &rig.geometry;
-    let foot = oriented_box.foot();
-    let floor = floor_position(foot, &geometry.lens, &geometry.mount);
-    Person {
+    let mut person = Person {
         bbox,
         score,
-        oriented_box,
+        upright_box,
+        oriented_box: upright_box,
         bearing: bearing(nalgebra::Point2::from(bbox.center()), &geometry.lens),
-        floor,
+        foot: upright_box.foot(),
+        floor: None,
         views,
-        height: PersonHeight::new(&oriented_box, &geometry.lens, &geometry.mount),
-        posture: posture(&oriented_box, floor_votes, rig),
+        height: PersonHeight::new(&upright_box, &geometry.lens, &geometry.mount),
+        posture: posture(&upright_box, floor_votes, rig),
         floor_votes,
-        zones: Person::zones_of(&geometry.areas.zones, foot, floor),
+        zones: None,
+    };
+    if person.lies() {
+        person.foot = upright_box.center;
+        person.height = None;
     }
+    person.floor = floor_position(person.foot, &geometry.lens, &geometry.mount);
+    person.zones = person.zones_of(&geometry.areas.zones);
+    person
 }
 
 /// Returns the posture that one frame tells, with its probability.

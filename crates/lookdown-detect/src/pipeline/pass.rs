@@ -3,6 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use lookdown_lens::geometry::{BackProjection, Footprint, Posture};
+use nalgebra::Vector2;
 
 use super::camera_rig::CameraRig;
 use crate::{
@@ -77,6 +78,9 @@ impl Pass {
             cut_off,
             is_exact: self.rig.is_exact(),
             posture: found.posture,
+            widths: found
+                .posture
+                .and_then(|_| self.rig.widths(view, &found.bbox)),
         })
     }
 
@@ -101,6 +105,8 @@ pub(super) struct Mapped {
     pub(super) is_exact: bool,
     /// The posture of a person on the floor, if the score is that of such a person.
     pub(super) posture: Option<Posture>,
+    /// The vectors across the box's sides in the frame, if it tells the posture.
+    pub(super) widths: Option<[Vector2<f64>; 2]>,
 }
 
 /// Returns the number of votes of views in which a person with this footprint is wholly visible:

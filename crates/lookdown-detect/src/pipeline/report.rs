@@ -163,7 +163,11 @@ pub struct Person {
     /// Confidence, 0 to 1.
     pub score: f64,
     /// The box turned so that its height axis is the projected vertical.
+    pub upright_box: OrientedBox,
+    /// The same, or the box along the body of a person who lies.
     pub oriented_box: OrientedBox,
+    /// The place of the feet, or of the middle of a person who lies, corner-origin frame pixels.
+    pub foot: Pixel,
     /// The direction of the box center; `None` when it lies outside the lens image.
     pub bearing: Option<Bearing>,
     /// The floor position of the person, when the height of the camera is known.
@@ -181,14 +185,17 @@ pub struct Person {
 }
 
 impl Person {
-    /// Returns the names of the `zones` that contain the foot at pixel `foot` and floor position
-    /// `floor`; `None` when there are no zones.
-    pub(super) fn zones_of(
-        zones: &[Zone],
-        foot: Pixel,
-        floor: Option<FloorPosition>,
-    ) -> Option<Vec<String>> {
-        let holding = zones.iter().filter(|zone| zone.area.holds(foot, floor));
+    /// Returns true if the votes of a network tell that the person lies: a box alone is often
+    /// wrong.
+    pub fn lies(&self) -> bool {
+        self.floor_votes.is_some() && self.posture.0 == Posture::Lying
+    }
+
+    /// Returns the names of the `zones` that contain the foot; `None` when there are no zones.
+    pub(super) fn zones_of(&self, zones: &[Zone]) -> Option<Vec<String>> {
+        let holding = zones
+            .iter()
+            .filter(|zone| zone.area.holds(self.foot, self.floor));
         let names = holding.map(|zone| zone.name.clone());
         (!zones.is_empty()).then(|| names.collect())
     }

@@ -103,8 +103,9 @@ impl BlobDetector {
         let postures = [Some(None), self.posture.map(Some)];
         let postures = postures.into_iter().flatten();
         found.map_or_else(Vec::new, |bbox| {
-            let detection = |posture| ViewDetection {
-                score: if whole(&bbox) { 0.9 } else { 0.2 },
+            let detection = |posture: Option<Posture>| ViewDetection {
+                // Votes for people on the floor are about .5.
+                score: if whole(&bbox) { 0.9 } else { 0.2 } * posture.map_or(1.0, |_| 0.6),
                 bbox,
                 posture,
             };
@@ -157,13 +158,22 @@ pub(super) fn engine(
 
 /// A gray lens image on black, `side` pixels wide, with a white disc.
 pub(super) fn frame_with_disc(side: u32, center: [f64; 2], radius: f64) -> Bytes {
+    frame_with_bar(side, center, [0.0; 2], radius)
+}
+
+/// The same with a white bar, which reaches as far as `half` and back from its middle.
+pub(super) fn frame_with_bar(side: u32, center: [f64; 2], half: [f64; 2], radius: f64) -> Bytes {
+    let length2 = half[0].powi(2) + half[1].powi(2);
     let middle = f64::from(side) / 2.0;
     let mut pixels = Vec::with_capacity(side as usize * side as usize * 3);
     for y in 0..side {
         for x in 0..side {
             let at = [f64::from(x) + 0.5, f64::from(y) + 0.5];
             let within = |c: [f64; 2], r: f64| (at[0] - c[0]).hypot(at[1] - c[1]) <= r;
-            let value = if within(center, radius) {
+            let along = (at[0] - center[0]) * half[0] + (at[1] - center[1]) * half[1];
+            let share = (along / length2.max(f64::MIN_POSITIVE)).clamp(-1.0, 1.0);
+            let nearest = [0, 1].map(|axis| center[axis] + share * half[axis]);
+            let value = if within(nearest, radius) {
                 255
             } else if within([middle, middle], middle - 1.0) {
                 110

@@ -1,13 +1,19 @@
 //! Boxes whose height axis follows the projected vertical: how people stand in a fisheye frame.
+//! That of someone who lies follows the body.
 
-use nalgebra::Vector2;
+use nalgebra::{Matrix2, Matrix3, SymmetricEigen, Vector2, Vector3};
 
 use super::{Lens, Mount, Pixel, pixels::to_pixel_center};
 
 /// Step along the vertical, in units of the ray, for the direction of up in the frame.
 const VERTICAL_STEP: f64 = 1e-4;
+/// The weight of a box's own ellipse beside all widths to which it is fitted. With .1 and .01, the
+/// IoU with the boxes of 99 lying people is .668 and .676 instead of .676.
+const OWN_WEIGHT: f64 = 0.03;
+/// The least ratio of a body's squared extents.
+const MIN_SQUARED_RATIO: f64 = 0.04;
 
-/// A rectangle in the frame, turned so that its height axis is the projected vertical.
+/// A rectangle in the frame, turned so that its height axis is the projected vertical or a body's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OrientedBox {
     /// Center, corner-origin frame pixels.
@@ -35,12 +41,59 @@ impl OrientedBox {
         }
     }
 
-    /// Returns the box with its head at the end of its axis that is nearer to `vertical`, a
-    /// direction in the frame.
-    pub fn with_head_toward(&self, vertical: &Vector2<f64>) -> Self {
-        let is_turned = self.up.dot(vertical) < 0.0;
-        let up = if is_turned { -self.up } else { self.up };
-        Self { up, ..*self }
+    /// Returns the box around the inscribed ellipse with its height axis along `vertical`, a
+    /// direction in the frame of any length.
+    pub fn along(&self, vertical: &Vector2<f64>) -> Self {
+        let up = vertical.try_normalize(f64::EPSILON).unwrap_or(self.up);
+        let axes = [self.up * self.height, across(self.up) * self.width];
+        let extent = |axis: Vector2<f64>| axes[0].dot(&axis).hypot(axes[1].dot(&axis));
+        Self {
+            center: self.center,
+            width: extent(across(up)),
+            height: extent(up),
+            angle: axis_angle(up),
+            up,
+        }
+    }
+
+    /// Returns the box with the same middle around the ellipse that touches the sides of other
+    /// boxes as nearly as possible, with its height axis along the longer axis of the ellipse.
+    ///
+    /// Each of the other boxes has two `widths`: vectors across opposite sides, as long as these
+    /// are apart, in pixels and above 0, with a weight. The half width of an ellipse with the
+    /// matrix `M` in the direction `n` is `√(nᵀ M n)` (Boyd and Vandenberghe, Convex Optimization,
+    /// 2004, section 2.4), so that `M` follows from linear equations. The ellipse of this box
+    /// decides what they leave open, such as one direction of all boxes.
+    pub fn fitted_to_widths(&self, widths: &[(f64, Vector2<f64>)]) -> Self {
+        let halves = [self.up * self.height, across(self.up) * self.width].map(|axis| axis / 2.0);
+        let [own, other] = halves.map(|half| half * half.transpose());
+        let own = own + other;
+        let total: f64 = widths.iter().map(|(weight, _)| weight).sum();
+        let mut normal = Matrix3::identity() * (OWN_WEIGHT * total / own.trace().powi(2));
+        let mut sums = normal * Vector3::new(own.m11, own.m12, own.m22);
+        for (weight, width) in widths {
+            // nᵀ M n ÷ the squared half width is 1.
+            let row = Vector3::new(width.x.powi(2), 2.0 * width.x * width.y, width.y.powi(2));
+            let row = row * (4.0 / width.norm_squared().powi(2));
+            normal += row * row.transpose() * *weight;
+            sums += row * *weight;
+        }
+        let Some(fitted) = normal.cholesky().map(|factors| factors.solve(&sums)) else {
+            return *self;
+        };
+        let ellipse = SymmetricEigen::new(Matrix2::new(fitted.x, fitted.y, fitted.y, fitted.z));
+        let long = ellipse.eigenvalues.imax();
+        let along = ellipse.eigenvalues[long].max(0.0);
+        let aside = ellipse.eigenvalues[1 - long].max(MIN_SQUARED_RATIO * along);
+        let axis = ellipse.eigenvectors.column(long).into_owned();
+        let up = axis * axis.dot(&self.up).signum();
+        Self {
+            center: self.center,
+            width: 2.0 * aside.sqrt(),
+            height: 2.0 * along.sqrt(),
+            angle: axis_angle(up),
+            up,
+        }
     }
 
     /// Returns the box in the same frame `factor` times as large.
@@ -105,7 +158,7 @@ impl OrientedBox {
         up: Vector2<f64>,
         weighted_outlines: impl IntoIterator<Item = (f64, &'a [Pixel])>,
     ) -> Option<Self> {
-        let right = Vector2::new(-up.y, up.x);
+        let right = across(up);
         let mut total = 0.0;
         let mut extents = [0.0; 4];
         for (weight, outline) in weighted_outlines {
@@ -149,6 +202,11 @@ pub fn vertical_in_frame(point: Pixel, lens: &Lens, mount: &Mount) -> Vector2<f6
     (above - below)
         .try_normalize(f64::EPSILON)
         .unwrap_or(image_up)
+}
+
+/// A direction turned clockwise by a quarter.
+fn across(direction: Vector2<f64>) -> Vector2<f64> {
+    Vector2::new(-direction.y, direction.x)
 }
 
 fn extent(outline: &[Pixel], axis: &Vector2<f64>) -> Option<(f64, f64)> {

@@ -67,7 +67,7 @@ impl<P: FoundPerson> Target<P> {
             is_motion_known: before.is_some(),
             at_s,
             trail: bounds,
-            searched: (person.oriented_box(), person.score()),
+            searched: (person.upright_box(), person.score()),
             gain: None,
             person,
         }
@@ -122,8 +122,8 @@ impl<P: FoundPerson> Target<P> {
 
     /// Returns the larger side of the person's box, pixels.
     fn side_px(&self) -> f64 {
-        let oriented = self.person.oriented_box();
-        oriented.width.max(oriented.height)
+        let upright = self.person.upright_box();
+        upright.width.max(upright.height)
     }
 
     /// Returns how much a box at a time is like the person, 0 to 1: the IoU with the expected box,
@@ -176,10 +176,10 @@ impl<P: FoundPerson> Target<P> {
         let gain = logit(score) - logit(found.score());
         let gain = *self.gain.get_or_insert(gain.clamp(-MAX_GAIN, MAX_GAIN));
         let score = from_logit(logit(found.score()) + gain);
-        let oriented_box = OrientedBox {
+        let upright_box = OrientedBox {
             width: searched.width,
             height: searched.height,
-            ..found.oriented_box()
+            ..found.upright_box()
         };
         let bounds = found.bounds();
         self.velocity = self.velocity_to(&bounds, at_s);
@@ -187,7 +187,7 @@ impl<P: FoundPerson> Target<P> {
         self.trail = hull(self.trail, bounds);
         self.at_s = at_s;
         self.is_seen = true;
-        self.person = place(found, score, oriented_box.fitted_to(bounds));
+        self.person = place(found, score, upright_box.fitted_to(bounds));
     }
 }
 
@@ -253,8 +253,8 @@ pub(super) fn same_persons<P: FoundPerson>(
 pub trait FoundPerson: Clone {
     /// The box `[x_min, y_min, x_max, y_max]`, corner-origin frame pixels.
     fn bounds(&self) -> [f64; 4];
-    /// The oriented box in the frame.
-    fn oriented_box(&self) -> OrientedBox;
+    /// The box in the frame along the projected vertical.
+    fn upright_box(&self) -> OrientedBox;
     /// The score, a probability.
     fn score(&self) -> f64;
     /// Returns the person with another score.

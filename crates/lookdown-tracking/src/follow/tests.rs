@@ -13,7 +13,7 @@ impl FoundPerson for Found {
         [self.x, 0.0, self.x + 40.0, 100.0]
     }
 
-    fn oriented_box(&self) -> OrientedBox {
+    fn upright_box(&self) -> OrientedBox {
         OrientedBox {
             center: nalgebra::Point2::new(self.x + 20.0, 50.0),
             width: 40.0,

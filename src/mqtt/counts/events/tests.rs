@@ -75,4 +75,17 @@ fn new_floor_alert_is_an_event() {
     assert_eq!(found[0].body["event_type"], "floor_alert");
     assert_eq!(found[0].body["since"], "1970-01-01T00:00:00.5Z");
     assert!(events(&lying(1..=2), &lying(1..=1)).is_empty());
+    // No other event replaces its image, or uses up the limit of images.
+    let topics = Topics::new("lookdown", None);
+    let base = "lookdown/counts";
+    assert_eq!(
+        found[0].image_topics(&topics),
+        [
+            format!("{base}/event_images/hall"),
+            format!("{base}/floor_alert_images/hall")
+        ]
+    );
+    let entered = events(&snapshot(0, Some(0)), &snapshot(0, Some(1)));
+    let only = [format!("{base}/event_images/hall")];
+    assert_eq!(entered[0].image_topics(&topics), only);
 }

@@ -1,8 +1,12 @@
 use super::*;
-use lookdown_lens::geometry::{FloorVotes, Posture};
+use bytes::Bytes;
+use lookdown_lens::geometry::{FloorVotes, OrientedBox, Posture};
+use nalgebra::{Point2, Vector2};
 
 use crate::inference::{Device, InferenceError};
-use crate::pipeline::test_support::{BlobDetector, calibration, engine, frame_with_disc, job};
+use crate::pipeline::test_support::{
+    BlobDetector, calibration, engine, frame_with_bar, frame_with_disc, job,
+};
 
 fn engine_with_lobby() -> Engine {
     engine(BlobDetector::default(), Some(calibration("")))
@@ -78,9 +82,9 @@ fn engine_with_floor() -> Engine {
     engine
 }
 
-/// Returns the report of a frame with a blob that few views show, by a network for people on the
-/// floor that gives the blob this posture, if any.
-fn report_with_floor(posture: Option<Posture>) -> DetectionReport {
+/// Returns the report of a frame with a blob by a network for people on the floor that gives the
+/// blob this posture, if any.
+fn report_with_floor(posture: Option<Posture>, image: Bytes) -> DetectionReport {
     let engine = engine_with_floor();
     let detector = BlobDetector {
         name: "nanodet_g_floor_416",
@@ -90,7 +94,6 @@ fn report_with_floor(posture: Option<Posture>) -> DetectionReport {
     };
     let model = Model::new(Box::new(detector));
     engine.models.put(Arc::new(model)).unwrap();
-    let image = frame_with_disc(600, [530.0, 300.0], 20.0);
     let named = [
         ("calibration", "lobby"),
         ("profile", "fast"),
@@ -103,7 +106,9 @@ fn report_with_floor(posture: Option<Posture>) -> DetectionReport {
 
 #[test]
 fn the_network_for_the_floor_tells_who_lies() {
-    let reports = [None, Some(Posture::Lying)].map(report_with_floor);
+    // Few views show the blob.
+    let reports = [None, Some(Posture::Lying)]
+        .map(|posture| report_with_floor(posture, frame_with_disc(600, [530.0, 300.0], 20.0)));
     let [upright, lying] = reports.each_ref().map(|report| &report.persons[0]);
     // A crop for the network that knows people on the floor.
     let [without, with] = reports.each_ref().map(|report| report.views.inferred);
@@ -112,6 +117,24 @@ fn the_network_for_the_floor_tells_who_lies() {
     assert!(lying.floor_votes.unwrap().lying > 0.3, "{lying:?}");
     assert_ne!(lying.posture, upright.posture);
     assert_ne!(upright.posture.0, Posture::Lying);
+}
+
+#[test]
+fn the_box_of_who_lies_follows_the_body() {
+    let body = Vector2::new(10.0, 43.0);
+    let image = || frame_with_bar(600, [400.0, 330.0], body.into(), 10.0);
+    let reports = [None, Some(Posture::Lying)].map(|posture| report_with_floor(posture, image()));
+    let [upright, lying] = reports.each_ref().map(|report| &report.persons[0]);
+    let along = |person: &Person| person.oriented_box.up.dot(&body.normalize()).abs();
+    assert!(along(upright) < 0.95 && along(lying) > 0.99, "{lying:?}");
+    let OrientedBox { width, height, .. } = lying.oriented_box;
+    assert!((95.0..125.0).contains(&height) && width < 50.0, "{lying:?}");
+    // The middle is on the floor, and there is no height.
+    assert!(
+        (lying.foot - Point2::new(400.0, 330.0)).norm() < 5.0,
+        "{lying:?}"
+    );
+    assert!(upright.height.is_some() && lying.height.is_none());
 }
 
 #[test]

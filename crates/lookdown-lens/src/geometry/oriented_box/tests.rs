@@ -65,6 +65,43 @@ fn inscribed_bounds(oriented: &OrientedBox) -> [f64; 4] {
 
 proptest! {
     #[test]
+    fn widths_in_two_pairs_of_directions_tell_the_axis_of_a_body(
+        height in 100.0..200.0_f64,
+        thinness in 0.2..0.6_f64,
+        angle in -1.5..1.5_f64,
+        turned_by in 0.35..1.2_f64,
+    ) {
+        let center = Pixel::new(300.0, 200.0);
+        let body = OrientedBox::turned(center, thinness * height, height, angle);
+        let mut widths = Vec::new();
+        for direction in [0.0, FRAC_PI_2, turned_by, turned_by + FRAC_PI_2] {
+            let normal = Vector2::new(direction.sin(), -direction.cos());
+            widths.push((0.5, normal * body.along(&normal).height));
+        }
+        let upright = body.along(&Vector2::new(0.0, -1.0));
+        let found = upright.fitted_to_widths(&widths);
+        prop_assert_eq!(found.center, center);
+        prop_assert!(found.up.dot(&body.up).abs() > 0.98, "{found:?}");
+        prop_assert!((found.height / body.height - 1.0).abs() < 0.1, "{found:?}");
+        prop_assert!((found.width - body.width).abs() < 0.1 * body.height, "{found:?}");
+        prop_assert_eq!(upright.fitted_to_widths(&[]), upright);
+    }
+
+    #[test]
+    fn the_box_along_another_axis_has_the_extents_of_the_ellipse(
+        width in 5.0..80.0_f64,
+        height in 5.0..80.0_f64,
+        angle in -1.5..1.5_f64,
+    ) {
+        let oriented = OrientedBox::turned(Pixel::new(300.0, 200.0), width, height, angle);
+        let along = oriented.along(&Vector2::new(0.0, -3.0));
+        let [x_min, y_min, x_max, y_max] = inscribed_bounds(&oriented);
+        prop_assert!((along.width - (x_max - x_min)).abs() < 1e-9);
+        prop_assert!((along.height - (y_max - y_min)).abs() < 1e-9);
+        prop_assert!((along.along(&along.up).height - along.height).abs() < 1e-9);
+    }
+
+    #[test]
     fn a_box_fitted_to_its_own_bounds_stays_as_it_is(
         angle in -1.5..1.5_f64, width in 5.0..100.0_f64, height in 5.0..200.0_f64,
     ) {
@@ -105,7 +142,7 @@ proptest! {
 fn head_is_at_the_upper_end_in_frames_of_all_sizes() {
     let person = OrientedBox::turned(Pixel::new(100.0, 60.0), 20.0, 40.0, 0.0);
     assert_eq!(person.foot(), Pixel::new(100.0, 80.0));
-    let turned = person.with_head_toward(&Vector2::new(0.3, 0.9)).scaled(2.0);
+    let turned = person.along(&Vector2::new(0.0, 0.9)).scaled(2.0);
     assert_eq!(turned.foot(), Pixel::new(200.0, 80.0));
     assert_eq!(turned.corners(), person.scaled(2.0).corners());
 }
