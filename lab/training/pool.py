@@ -54,14 +54,13 @@ def draw(o, number):
     images, source = np.load(o.out / "images.npy", mmap_mode="r+"), source_of(o)
     rng, drawn = np.random.default_rng([o.seed, number]), []
     for k in range(number * CHUNK, min(o.count, (number + 1) * CHUNK)):
-        image, boxes, ignore, posture = source.sample(rng, o.size, o.crops, o.aimed, o.floor, o.fill)
+        image, boxes, ignore, posture = source.sample(rng, o.size, o.crops, o.aimed, o.floor)
         images[k] = image = varied(image, rng)
         scores = np.zeros(len(boxes), np.float32) if teachers else np.ones(len(boxes), np.float32)
         for teacher in teachers if len(boxes) else ():
-            side = teacher.get_inputs()[0].shape[2]
-            given = cv2.resize(image, (side, side)).transpose(2, 0, 1)[None].astype(np.float32)
+            given = image.transpose(2, 0, 1)[None].astype(np.float32)
             found, certain = teacher.run(["boxes", "scores"], {"images": given})
-            scores = np.maximum(scores, teacher_scores(boxes, found[0] * o.size / side, certain[0].reshape(-1)))
+            scores = np.maximum(scores, teacher_scores(boxes, found[0], certain[0].reshape(-1)))
         drawn.append((boxes, ignore, scores, posture))
     return number, drawn
 
@@ -72,8 +71,7 @@ def main():
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--count", type=int, default=20_000)
     parser.add_argument("--size", type=int, default=416)
-    parser.add_argument("--crops", type=float, default=0.0, help="share of crops around a person")
-    parser.add_argument("--fill", type=float, nargs=2, default=(0.22, 0.75), help="share of a crop that a person fills")
+    parser.add_argument("--crops", type=float, default=0.0, help="share of narrow views around a person")
     parser.add_argument("--aimed", type=float, default=0.0, help="share of wide views that look toward a person")
     parser.add_argument("--floor", action="store_true", help="look at people on the floor most of the time")
     parser.add_argument("--empty", type=Path, help="a folder of frames without people: hard negatives")

@@ -1,4 +1,4 @@
-"""Training samples out of composed frames: upright perspective views, and crops around a person. Numpy and OpenCV only."""
+"""Training samples out of composed frames: upright perspective views, and narrow ones around a person. Numpy and OpenCV only."""
 
 import json
 import math
@@ -16,14 +16,10 @@ VIEW_MARGIN = 0.5
 """Persons are followed this far beyond each border of a view, in its width, to know how much of them it cuts off."""
 OUTSIDE = -1e4
 """A column and row outside of every frame."""
-NEAR_NADIR_DEG = 12
-"""Angle from straight down within which a person has no upright direction."""
-MOST_LEAN_DEG = 62
-"""A person of a crop who leans more is ignored: another quarter turn has that one upright."""
-MAX_SCALE = 3.0
-"""The greatest enlargement of a crop, as in the service."""
-ASIDE = 0.12
-"""How far a crop's person is from its middle, in its side: one standard deviation."""
+NEAR_NADIR = 0.25
+"""Angle from straight down, radians, within which a crop has no upright direction."""
+FILL = (0.22, 0.75)
+"""The share of a crop's side that its person fills."""
 STANDING_SHARE = 0.2
 """How often a person who is not on the floor is a place to look at, where those on the floor are learned."""
 FAR_DEG = 68
@@ -115,32 +111,10 @@ class Frames:
 
     def view(self, k, size, theta, phi, field_of_view, roll=0.0):
         """An upright perspective view of frame `k`: image (size × size × 3), boxes, ignore flags, postures. Angles in radians."""
-        native = self.calibration(k)
-        rays = view_rays(native["mount"]["world_up"], theta, phi, field_of_view, roll, size, round(VIEW_MARGIN * size))
-        return self.shown(k, size, *frame_maps(rays, native["lens"]))
-
-    def crop(self, k, size, box, fill, rng):
-        """An upright crop of frame `k` in which `box` fills the share `fill` of its side: a sample as of `view`."""
-        native, (x, y, width, height) = self.calibration(k), box
-        middle = np.array([x + width / 2, y + height / 2])
-        ray = ray_at(native["lens"], *middle)
-        columns, rows = frame_maps(
-            np.array([[ray, ray + 0.01 * np.array(native["mount"]["world_up"])]]), native["lens"]
-        )
-        quarter = round(math.degrees(math.atan2(np.diff(columns)[0, 0], -np.diff(rows)[0, 0])) / 90) % 4
-        scale = min(MAX_SCALE, fill * size / max(width, height))
-        middle += rng.normal(size=2) * ASIDE * size / scale
+        about, native = self.images[k], self.calibration(k)
         margin = round(VIEW_MARGIN * size)
-        at = ((np.arange(-margin, size + margin) + 0.5 - size / 2) / scale).astype(np.float32)
-        right, below = np.meshgrid(at, at)
-        for _ in range(quarter):
-            right, below = -below, right
-        return self.shown(k, size, right + middle[0], below + middle[1], 90 * quarter)
-
-    def shown(self, k, size, columns, rows, upright_deg=None):
-        """The sample of frame `k` at these columns and rows, which reach beyond its borders. Who leans far from `upright_deg` is ignored."""
-        about, margin = self.images[k], (len(rows) - size) // 2
-        columns, rows = columns.astype(np.float32), rows.astype(np.float32)
+        rays = view_rays(native["mount"]["world_up"], theta, phi, field_of_view, roll, size, margin)
+        columns, rows = frame_maps(rays, native["lens"])
         mask = cv2.imread(str(self.folder / about["id_mask"]), cv2.IMREAD_UNCHANGED)
         ids = cv2.remap(mask, columns, rows, cv2.INTER_NEAREST)
         inner = slice(margin, margin + size)
@@ -150,10 +124,7 @@ class Frames:
         found = [(box, a) for box, a in found if box]
         boxes = np.array([box for box, _ in found], float).reshape(-1, 4)
         boxes[:, 2:] += boxes[:, :2]
-        leans = lambda a: abs((a["upright_deg"] - upright_deg + 180) % 360 - 180) > MOST_LEAN_DEG
-        aside = lambda a: upright_deg is not None and a["nadir_deg"] > NEAR_NADIR_DEG and leans(a)
-        ignored = [a["ignore"] or aside(a) for _, a in found]
-        boxes, ignore, keep = kept(boxes - margin, np.array(ignored, bool), size)
+        boxes, ignore, keep = kept(boxes - margin, np.array([a["ignore"] for _, a in found], bool), size)
         postures = np.array([POSTURES.get(a["pose"], 0) for _, a in found], np.int8)[keep]
         return cv2.cvtColor(image, cv2.COLOR_BGR2RGB), boxes, ignore, postures
 
@@ -164,11 +135,10 @@ class Frames:
         wanted = lambda a: not floor or is_near(a)
         return [a["bbox"] for a in seen if wanted(a)]
 
-    def sample(self, rng, size, crops, aimed=0.0, floor=False, fill=(0.22, 0.75)):
+    def sample(self, rng, size, crops, aimed=0.0, floor=False):
         """One random sample: image (size × size × 3), boxes, ignore flags, postures.
 
-        A share of `crops` lies around a place, which fills a share of `fill` of their side. The share `aimed` has it in a
-        view as the profiles have them.
+        A share of `crops` lies closely around a place, and the share `aimed` has it in a view as the profiles have them.
         With `floor`, most places are people on the floor.
         """
         k, which, roll = int(rng.integers(len(self.images))), rng.random(), rng.normal() * 0.04
@@ -178,17 +148,22 @@ class Frames:
             theta, phi = theta + rng.normal() * 0.1, rng.uniform(0, 2 * math.pi)
             field_of_view = math.radians(field_of_view * rng.uniform(0.85, 1.15))
             return self.view(k, size, theta, phi, field_of_view, roll)
-        box = places[int(rng.integers(len(places)))]
-        if which < crops:
-            return self.crop(k, size, box, math.exp(rng.uniform(*np.log(fill))), rng)
-        native, (x, y, width, height) = self.calibration(k), box
+        x, y, width, height = places[int(rng.integers(len(places)))]
+        native = self.calibration(k)
         ray = ray_at(native["lens"], x + width / 2, y + height / 2)
         down, across, along = ring_axes(native["mount"]["world_up"])
         at, phi = math.acos(np.clip(ray @ down, -1, 1)), math.atan2(ray @ along, ray @ across)
-        theta, field_of_view, _ = min(RINGS, key=lambda ring: abs(ring[0] - at) + rng.uniform(0, 0.5))
-        field_of_view = math.radians(field_of_view * rng.uniform(0.85, 1.15))
-        theta += rng.normal() * 0.1
-        phi += rng.normal() * 0.35 * field_of_view / max(0.3, math.sin(at))
+        if which < crops:
+            corners = [ray_at(native["lens"], x, y), ray_at(native["lens"], x + width, y + height)]
+            fill = math.exp(rng.uniform(*np.log(FILL)))
+            field_of_view = float(np.clip(math.acos(np.clip(corners[0] @ corners[1], -1, 1)) / fill, 0.12, 1.5))
+            theta, aside = at + rng.normal() * 0.12 * field_of_view, 0.12
+            roll = rng.uniform(0, 2 * math.pi) if at < NEAR_NADIR else 2 * roll
+        else:
+            theta, field_of_view, _ = min(RINGS, key=lambda ring: abs(ring[0] - at) + rng.uniform(0, 0.5))
+            theta, aside = theta + rng.normal() * 0.1, 0.35
+            field_of_view = math.radians(field_of_view * rng.uniform(0.85, 1.15))
+        phi += rng.normal() * aside * field_of_view / max(0.3, math.sin(at))
         return self.view(k, size, theta, phi, field_of_view, roll)
 
 

@@ -52,24 +52,6 @@ def options_of():
     return parser.parse_args()
 
 
-SIDE = 416
-"""The sides of the network's input, pixels. Smaller samples share one, row by row."""
-FREE = 0.1
-"""Share of the tiles that show nothing, as where a frame has too few crops."""
-
-
-def tiled(batch, per_side, rng):
-    """A batch of tiles as one of images that each show a square of them."""
-    images, boxes, kind, trust = batch
-    size, n = images.shape[1], len(images) // per_side**2
-    is_free = rng.random(len(images)) < FREE
-    images[is_free], kind[is_free] = 0, ABSENT
-    rows, columns = np.divmod(np.arange(len(images)) % per_side**2, per_side)
-    boxes += size * np.stack([columns, rows] * 2, -1)[:, None] * (kind != ABSENT)[..., None]
-    images = images.reshape(n, per_side, per_side, size, size, 3).swapaxes(2, 3).reshape(n, SIDE, SIDE, 3)
-    return images, boxes.reshape(n, -1, 4), kind.reshape(n, -1), trust.reshape(n, -1)
-
-
 class Pool:
     """The samples of pool.py."""
 
@@ -102,9 +84,7 @@ def feeder(o):
         turn = 0
         while True:
             pool = pools[turn % len(pools)]
-            per_side = SIDE // pool.images.shape[1]
-            batch = pool.samples(np.sort(rng.integers(len(pool.images), size=o.batch * per_side**2)), o)
-            batches.put(tiled(batch, per_side, rng) if per_side > 1 else batch)
+            batches.put(pool.samples(np.sort(rng.integers(len(pool.images), size=o.batch)), o))
             turn += 1
 
     threading.Thread(target=fill, daemon=True).start()

@@ -95,7 +95,6 @@ class Samples(unittest.TestCase):
             "id_value": 1,
             "pose": "on_back",
             "nadir_deg": 40,
-            "upright_deg": 0,
         }
         with tempfile.TemporaryDirectory() as folder:
             write_frame(Path(folder), people=[person])
