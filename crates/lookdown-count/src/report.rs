@@ -6,7 +6,9 @@ use lookdown_common::{
     report::{Report, ReportCalibration, ReportImage, ReportPerson},
     text::is_camera_name,
 };
-use lookdown_lens::geometry::{BoxAngles, FloorVotes, OrientedBox, Pixel, PostureSigns};
+use lookdown_lens::geometry::{
+    BoxAngles, FloorVotes, OrientedBox, Pixel, PostureSigns, floor::floor_position,
+};
 use lookdown_tracking::Observation;
 use serde::{Deserialize, Serialize};
 
@@ -154,9 +156,13 @@ fn observation(
     // The angle does not tell the head from the foot.
     let oriented = OrientedBox::turned(center, reported.width, reported.height, angle)
         .along(&definition.up_at(center));
-    let lies = person.posture == "lying" && person.floor_votes.is_some();
-    let foot = if lies { center } else { oriented.foot() };
+    let foot = oriented.foot();
     let camera = definition.geometry.as_ref();
+    // A report has the middle of who lies. Here, a change of posture alone is not motion.
+    let lies = person.posture == "lying" && person.floor_votes.is_some();
+    let of_foot = camera.filter(|_| lies);
+    let of_foot = of_foot.and_then(|it| floor_position(foot, &it.lens, &it.mount));
+    let floor = person.floor.map(|floor| [floor.x_m, floor.y_m]);
     let signs = PostureSigns {
         angles: camera.and_then(|camera| BoxAngles::new(&oriented, &camera.lens, &camera.mount)),
         votes: person.floor_votes.map(|votes| FloorVotes {
@@ -165,7 +171,7 @@ fn observation(
         }),
     };
     Some(Observation {
-        floor_m: person.floor.map(|floor| [floor.x_m, floor.y_m]),
+        floor_m: of_foot.map_or(floor, |floor| Some([floor.x_m, floor.y_m])),
         azimuth_deg: bearing.azimuth_deg,
         off_axis_deg: bearing.off_axis_deg,
         center_px: [reported.cx, reported.cy],
@@ -191,6 +197,10 @@ pub(crate) mod other_fields;
 
 #[cfg(test)]
 mod tests {
+    use lookdown_calibration::{Areas, CameraGeometry};
+    use lookdown_lens::geometry::{Lens, Mount};
+    use nalgebra::Vector3;
+
     use super::{
         other_fields::{OF_PERSON, OF_REPORT},
         *,
@@ -245,6 +255,32 @@ mod tests {
         assert!(!change(
             |report| report.calibration.revision = "1".repeat(129)
         ));
+    }
+
+    #[test]
+    fn a_change_of_posture_is_not_motion() {
+        let definition = CameraDefinition {
+            geometry: Some(CameraGeometry {
+                lens: Lens::equidistant_circle(99.5, 99.5, 100.0, 1.57).unwrap(),
+                mount: Mount::new(-Vector3::z_axis(), Some(3.0)),
+                areas: Areas::default(),
+            }),
+            ..CameraDefinition::unknown()
+        };
+        // The report of someone who lies has the middle.
+        let [seated, lying] = [("seated", 3.62), ("lying", 4.0)].map(|(posture, x_m)| {
+            let person = format!(
+                r#"{{{OF_PERSON}, "score": 0.8, "floor": {{"x_m": {x_m}, "y_m": 0}},
+                    "bearing": {{"azimuth_deg": 0, "off_axis_deg": 40}}, "posture": "{posture}",
+                    "floor_votes": {{"lying": 0.5, "low": 0.2}},
+                    "oriented_box": {{"cx": 163, "cy": 100, "width": 12, "height": 14,
+                                      "angle_deg": 90}}}}"#
+            );
+            report("null", &person).observations(&definition)[0]
+                .floor_m
+                .unwrap()
+        });
+        assert!((seated[0] - lying[0]).abs() < 0.01, "{seated:?} {lying:?}");
     }
 
     #[test]

@@ -236,7 +236,7 @@ fn person(
             let weight = member.candidate.score * member.candidate.coordinate_weight;
             widths.extend(member.widths.iter().flatten().map(|width| (weight, *width)));
         }
-        person.oriented_box = person.upright_box.fitted_to_widths(&widths);
+        person.oriented_box = person.upright_box.tilted_to_widths(&widths);
     }
     Some(person)
 }

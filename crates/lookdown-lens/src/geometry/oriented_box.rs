@@ -1,17 +1,15 @@
 //! Boxes whose height axis follows the projected vertical: how people stand in a fisheye frame.
 //! That of someone who lies follows the body.
 
-use nalgebra::{Matrix2, Matrix3, SymmetricEigen, Vector2, Vector3};
+use nalgebra::{Matrix2, SymmetricEigen, Vector2};
 
 use super::{Lens, Mount, Pixel, pixels::to_pixel_center};
 
 /// Step along the vertical, in units of the ray, for the direction of up in the frame.
 const VERTICAL_STEP: f64 = 1e-4;
-/// The weight of a box's own ellipse beside all widths to which it is fitted. With .1 and .01, the
-/// IoU with the boxes of 99 lying people is .668 and .676 instead of .676.
-const OWN_WEIGHT: f64 = 0.03;
-/// The least ratio of a body's squared extents.
-const MIN_SQUARED_RATIO: f64 = 0.04;
+/// The most correlation of the extents along and across a box of who lies: a body is thicker than a
+/// line.
+const MOST_TILT: f64 = 0.9;
 
 /// A rectangle in the frame, turned so that its height axis is the projected vertical or a body's.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,41 +54,41 @@ impl OrientedBox {
         }
     }
 
-    /// Returns the box with the same middle around the ellipse that touches the sides of other
-    /// boxes as nearly as possible, with its height axis along the longer axis of the ellipse.
+    /// Returns the box along the longer axis of an ellipse that touches the sides of this box, and
+    /// those of other boxes as nearly as possible.
     ///
     /// Each of the other boxes has two `widths`: vectors across opposite sides, as long as these
     /// are apart, in pixels and above 0, with a weight. The half width of an ellipse with the
     /// matrix `M` in the direction `n` is `√(nᵀ M n)` (Boyd and Vandenberghe, Convex Optimization,
-    /// 2004, section 2.4), so that `M` follows from linear equations. The ellipse of this box
-    /// decides what they leave open, such as one direction of all boxes.
-    pub fn fitted_to_widths(&self, widths: &[(f64, Vector2<f64>)]) -> Self {
-        let halves = [self.up * self.height, across(self.up) * self.width].map(|axis| axis / 2.0);
-        let [own, other] = halves.map(|half| half * half.transpose());
-        let own = own + other;
-        let total: f64 = widths.iter().map(|(weight, _)| weight).sum();
-        let mut normal = Matrix3::identity() * (OWN_WEIGHT * total / own.trace().powi(2));
-        let mut sums = normal * Vector3::new(own.m11, own.m12, own.m22);
+    /// 2004, section 3.2.3, support functions). In the axes of this box, its own sides give the
+    /// diagonal of `M`, and the widths give the rest by linear least squares.
+    pub fn tilted_to_widths(&self, widths: &[(f64, Vector2<f64>)]) -> Self {
+        let axes = Matrix2::from_columns(&[self.up, across(self.up)]);
+        let [along2, across2] = [self.height, self.width].map(|extent| extent * extent / 4.0);
+        let (mut sum, mut squares) = (0.0, 0.0);
         for (weight, width) in widths {
-            // nᵀ M n ÷ the squared half width is 1.
-            let row = Vector3::new(width.x.powi(2), 2.0 * width.x * width.y, width.y.powi(2));
-            let row = row * (4.0 / width.norm_squared().powi(2));
-            normal += row * row.transpose() * *weight;
-            sums += row * *weight;
+            // The share of each term of nᵀ M n in the squared half width.
+            let normal = axes.tr_mul(width) * (2.0 / width.norm_squared());
+            let tilt = 2.0 * normal.x * normal.y;
+            let rest = normal.x.powi(2) * along2 + normal.y.powi(2) * across2;
+            sum += weight * tilt * (1.0 - rest);
+            squares += weight * tilt.powi(2);
         }
-        let Some(fitted) = normal.cholesky().map(|factors| factors.solve(&sums)) else {
-            return *self;
+        let most = MOST_TILT * (along2 * across2).sqrt();
+        let tilt = if squares > 0.0 {
+            (sum / squares).clamp(-most, most)
+        } else {
+            0.0
         };
-        let ellipse = SymmetricEigen::new(Matrix2::new(fitted.x, fitted.y, fitted.y, fitted.z));
+        let ellipse = SymmetricEigen::new(Matrix2::new(along2, tilt, tilt, across2));
         let long = ellipse.eigenvalues.imax();
-        let along = ellipse.eigenvalues[long].max(0.0);
-        let aside = ellipse.eigenvalues[1 - long].max(MIN_SQUARED_RATIO * along);
-        let axis = ellipse.eigenvectors.column(long).into_owned();
-        let up = axis * axis.dot(&self.up).signum();
+        let extent = |axis: usize| 2.0 * ellipse.eigenvalues[axis].max(0.0).sqrt();
+        let up = axes * ellipse.eigenvectors.column(long);
+        let up = up * up.dot(&self.up).signum();
         Self {
             center: self.center,
-            width: 2.0 * aside.sqrt(),
-            height: 2.0 * along.sqrt(),
+            width: extent(1 - long),
+            height: extent(long),
             angle: axis_angle(up),
             up,
         }

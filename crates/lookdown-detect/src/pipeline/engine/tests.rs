@@ -126,7 +126,7 @@ fn the_box_of_who_lies_follows_the_body() {
     let reports = [None, Some(Posture::Lying)].map(|posture| report_with_floor(posture, image()));
     let [upright, lying] = reports.each_ref().map(|report| &report.persons[0]);
     let along = |person: &Person| person.oriented_box.up.dot(&body.normalize()).abs();
-    assert!(along(upright) < 0.95 && along(lying) > 0.99, "{lying:?}");
+    assert!(along(upright) < 0.6 && along(lying) > 0.97, "{lying:?}");
     let OrientedBox { width, height, .. } = lying.oriented_box;
     assert!((95.0..125.0).contains(&height) && width < 50.0, "{lying:?}");
     // The middle is on the floor, and there is no height.
