@@ -19,7 +19,9 @@ from pathlib import Path
 
 from cameras import Handler, serving
 from harness.processes import Server, free_ports
+from mosquitto import Broker
 from rendered_room import rendered_room
+from state import PATIENCE_SECONDS
 from support.exchange import ask
 from support.lookdown import lookdown
 from support.places import FIXTURES, ROOT, SAMPLES
@@ -34,6 +36,8 @@ ROOM = rendered_room()
 WALKS = HERE.parent / "walks"
 FALL = HERE.parent / "fall"
 """Composed by the generator of lab/training, of a room and clothes that training never had."""
+JPEG = b"\xff\xd8"
+"""How a JPEG file begins."""
 STILL_SECONDS = 2.0
 """Interval of the frames in which everyone stands still."""
 ZONE = {"name": "middle", "floor_m": [[-2, -1], [2, -1], [2, 3], [-2, 3]]}
@@ -187,7 +191,13 @@ class Page(unittest.TestCase):
 
     @contextlib.contextmanager
     def with_a_fall(self, folder: Path) -> Iterator[Server]:
-        """A `lookdown run` whose camera shows a fall, with an alert after 5 s."""
+        """A `lookdown run` whose camera shows a fall, with an alert after 5 s and its image over MQTT."""
+        broker = Broker(folder)
+        broker.start()
+        self.addCleanup(broker.stop)
+        topic = ["-t", "lookdown/counts/floor_alert_images/room", "-C", "1"]
+        images = subprocess.Popen(["mosquitto_sub", *broker.login(), *topic], stdout=subprocess.PIPE)
+        self.addCleanup(images.kill)
         calibrations, frames = folder / "fall", folder / "fall_frames"
         frames.mkdir()
         calibrations.mkdir()
@@ -199,6 +209,8 @@ class Page(unittest.TestCase):
             "STATE__PATH": folder / "fall_state",
             "COUNTS__PATH": folder / "fall.sqlite",
             "RESULTS__IMAGES": "room",
+            "MQTT__URL": broker.url,
+            "MQTT__IMAGE_EVERY_SECONDS": "1",
             "COUNTS__FLOOR_ALERT": "true",
             "COUNTS__FLOOR_ALERT_AFTER": "5s",
             "LOG__FILTER": "warn",
@@ -208,6 +220,8 @@ class Page(unittest.TestCase):
             command = ["run", f"http://127.0.0.1:{camera}/", *options]
             with lookdown(settings, calibrations=calibrations, command=command) as run:
                 yield run
+                image, _ = images.communicate(timeout=PATIENCE_SECONDS)
+                self.assertTrue(image.startswith(JPEG), "the image of the alert")
 
     def run_node(self, tests: str, settings: dict[str, str]) -> None:
         """Runs tests that are written in JavaScript."""

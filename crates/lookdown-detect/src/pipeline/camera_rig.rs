@@ -279,8 +279,8 @@ impl CameraRig {
         let rising = in_frame(x_max, y_min)? - in_frame(x_min, y_max)?;
         let (right, down) = ((falling + rising) / 2.0, (falling - rising) / 2.0);
         let across = |width: Vector2<f64>, side: Vector2<f64>| {
-            let normal = Vector2::new(-side.y, side.x).normalize();
-            normal * width.dot(&normal)
+            let normal = Vector2::new(-side.y, side.x).try_normalize(f64::EPSILON);
+            normal.map_or_else(Vector2::zeros, |normal| normal * width.dot(&normal))
         };
         Some([across(right, down), across(down, right)])
     }

@@ -58,7 +58,7 @@ impl OrientedBox {
     /// those of other boxes as nearly as possible.
     ///
     /// Each of the other boxes has two `widths`: vectors across opposite sides, as long as these
-    /// are apart, in pixels and above 0, with a weight. The half width of an ellipse with the
+    /// are apart, in pixels, with a weight. The half width of an ellipse with the
     /// matrix `M` in the direction `n` is `√(nᵀ M n)` (Boyd and Vandenberghe, Convex Optimization,
     /// 2004, section 3.2.3, support functions). In the axes of this box, its own sides give the
     /// diagonal of `M`, and the widths give the rest by linear least squares.
@@ -68,7 +68,7 @@ impl OrientedBox {
         let (mut sum, mut squares) = (0.0, 0.0);
         for (weight, width) in widths {
             // The share of each term of nᵀ M n in the squared half width.
-            let normal = axes.tr_mul(width) * (2.0 / width.norm_squared());
+            let normal = axes.tr_mul(width) * (2.0 / width.norm_squared().max(1.0));
             let tilt = 2.0 * normal.x * normal.y;
             let rest = normal.x.powi(2) * along2 + normal.y.powi(2) * across2;
             sum += weight * tilt * (1.0 - rest);

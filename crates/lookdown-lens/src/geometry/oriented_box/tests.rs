@@ -79,6 +79,8 @@ proptest! {
             widths.push((0.5, normal * body.along(&normal).height));
         }
         let upright = body.along(&Vector2::new(0.0, -1.0));
+        // A box without extents says nothing.
+        widths.extend([Vector2::zeros(), Vector2::new(1e-180, 0.0)].map(|width| (0.5, width)));
         let found = upright.tilted_to_widths(&widths);
         prop_assert_eq!(found.center, center);
         prop_assert!(found.up.dot(&body.up).abs() > 0.99, "{found:?}");
