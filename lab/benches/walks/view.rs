@@ -63,22 +63,15 @@ impl View {
         let one = OrientedBox::turned(center, *width, *height, angle.to_radians());
         let other = OrientedBox::turned(center, *height, *width, (angle + 90.0).to_radians());
         let is_one = one.up.dot(&vertical).abs() >= other.up.dot(&vertical).abs();
-        if is_one { one } else { other }.with_head_toward(&vertical)
+        let mut along = if is_one { one } else { other };
+        along.up *= along.up.dot(&vertical).signum();
+        along
     }
 
     /// The box turned to the vertical, with the extents of its inscribed ellipse there.
     fn upright(&self, rectangle: &Rectangle) -> OrientedBox {
         let nearer = self.nearer_axis(rectangle);
-        let up = vertical_in_frame(nearer.center, &self.lens, &self.mount).normalize();
-        let cos = nearer.up.dot(&up).clamp(-1.0, 1.0);
-        let sin = (1.0 - cos * cos).sqrt();
-        OrientedBox {
-            width: (nearer.width * cos).hypot(nearer.height * sin),
-            height: (nearer.height * cos).hypot(nearer.width * sin),
-            angle: up.x.atan2(-up.y),
-            up,
-            ..nearer
-        }
+        nearer.along(&vertical_in_frame(nearer.center, &self.lens, &self.mount))
     }
 
     /// The foot point of a box, pixels.
