@@ -220,6 +220,14 @@ pub struct ReportPerson {
     pub zones: Option<Vec<String>>,
 }
 
+impl ReportPerson {
+    /// Returns true if the votes of a network tell that the person lies: the oriented box is along
+    /// the body then.
+    pub fn lies(&self) -> bool {
+        self.floor_votes.is_some() && self.posture == "lying"
+    }
+}
+
 /// The posture in reports of earlier versions.
 fn unknown() -> Cow<'static, str> {
     Cow::Borrowed("unknown")

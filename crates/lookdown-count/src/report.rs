@@ -149,18 +149,21 @@ fn observation(
 ) -> Option<Observation> {
     let bearing = person.bearing?;
     let reported = &person.oriented_box;
-    let (center, angle) = (
-        Pixel::new(reported.cx, reported.cy),
-        reported.angle_deg.to_radians(),
-    );
+    let center = Pixel::new(reported.cx, reported.cy);
+    let angle = reported.angle_deg.to_radians();
     // The angle does not tell the head from the foot.
-    let oriented = OrientedBox::turned(center, reported.width, reported.height, angle)
-        .along(&definition.up_at(center));
+    let up = definition.up_at(center);
+    let turned = OrientedBox::turned(center, reported.width, reported.height, angle);
+    let along_axis = turned.with_head_toward(&up);
+    let oriented = if person.lies() {
+        along_axis.along(&up)
+    } else {
+        along_axis
+    };
     let foot = oriented.foot();
     let camera = definition.geometry.as_ref();
     // A report has the middle of who lies. Here, a change of posture alone is not motion.
-    let lies = person.posture == "lying" && person.floor_votes.is_some();
-    let of_foot = camera.filter(|_| lies);
+    let of_foot = camera.filter(|_| person.lies());
     let of_foot = of_foot.and_then(|it| floor_position(foot, &it.lens, &it.mount));
     let floor = person.floor.map(|floor| [floor.x_m, floor.y_m]);
     let signs = PostureSigns {

@@ -63,9 +63,7 @@ impl View {
         let one = OrientedBox::turned(center, *width, *height, angle.to_radians());
         let other = OrientedBox::turned(center, *height, *width, (angle + 90.0).to_radians());
         let is_one = one.up.dot(&vertical).abs() >= other.up.dot(&vertical).abs();
-        let mut along = if is_one { one } else { other };
-        along.up *= along.up.dot(&vertical).signum();
-        along
+        if is_one { one } else { other }.with_head_toward(&vertical)
     }
 
     /// The box turned to the vertical, with the extents of its inscribed ellipse there.

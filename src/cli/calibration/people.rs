@@ -159,7 +159,7 @@ pub(super) fn people_in_reports(
         let scale = f64::from(camera.image_size().0) / f64::from(report.image.width);
         let threshold = parameters.refinement.score_threshold;
         let persons = report.persons.iter();
-        let persons = persons.filter(|person| person.score >= threshold);
+        let persons = persons.filter(|person| person.score >= threshold && !person.lies());
         people.extend(persons.map(|person| upright_box(&person.oriented_box, scale, camera)));
     }
     Ok(people)
@@ -224,5 +224,5 @@ fn upright_box(reported: &ReportOrientedBox, scale: f64, camera: &Calibration) -
     );
     let upright = OrientedBox::turned(center, reported.width, reported.height, angle).scaled(scale);
     let vertical = vertical_in_frame(upright.center, camera.lens(), camera.mount());
-    upright.along(&vertical)
+    upright.with_head_toward(&vertical)
 }

@@ -39,6 +39,14 @@ impl OrientedBox {
         }
     }
 
+    /// Returns the box with its head at the end of its axis that is nearer to `vertical`, a
+    /// direction in the frame.
+    pub fn with_head_toward(&self, vertical: &Vector2<f64>) -> Self {
+        let is_turned = self.up.dot(vertical) < 0.0;
+        let up = if is_turned { -self.up } else { self.up };
+        Self { up, ..*self }
+    }
+
     /// Returns the box around the inscribed ellipse with its height axis along `vertical`, a
     /// direction in the frame of any length.
     pub fn along(&self, vertical: &Vector2<f64>) -> Self {
@@ -75,16 +83,11 @@ impl OrientedBox {
             squares += weight * tilt.powi(2);
         }
         let most = MOST_TILT * (along2 * across2).sqrt();
-        let tilt = if squares > 0.0 {
-            (sum / squares).clamp(-most, most)
-        } else {
-            0.0
-        };
+        let tilt = (sum / squares.max(f64::MIN_POSITIVE)).clamp(-most, most);
         let ellipse = SymmetricEigen::new(Matrix2::new(along2, tilt, tilt, across2));
         let long = ellipse.eigenvalues.imax();
         let extent = |axis: usize| 2.0 * ellipse.eigenvalues[axis].max(0.0).sqrt();
         let up = axes * ellipse.eigenvectors.column(long);
-        let up = up * up.dot(&self.up).signum();
         Self {
             center: self.center,
             width: extent(1 - long),
@@ -92,6 +95,7 @@ impl OrientedBox {
             angle: axis_angle(up),
             up,
         }
+        .with_head_toward(&self.up)
     }
 
     /// Returns the box in the same frame `factor` times as large.

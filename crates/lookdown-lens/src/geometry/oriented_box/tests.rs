@@ -146,7 +146,7 @@ proptest! {
 fn head_is_at_the_upper_end_in_frames_of_all_sizes() {
     let person = OrientedBox::turned(Pixel::new(100.0, 60.0), 20.0, 40.0, 0.0);
     assert_eq!(person.foot(), Pixel::new(100.0, 80.0));
-    let turned = person.along(&Vector2::new(0.0, 0.9)).scaled(2.0);
+    let turned = person.with_head_toward(&Vector2::new(0.3, 0.9)).scaled(2.0);
     assert_eq!(turned.foot(), Pixel::new(200.0, 80.0));
     assert_eq!(turned.corners(), person.scaled(2.0).corners());
 }
