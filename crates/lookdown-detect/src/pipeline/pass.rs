@@ -49,11 +49,12 @@ impl Pass {
     /// of the profile.
     pub(super) fn mapped(&self, back_projection: BackProjection) -> &[Mapped] {
         self.mapped.get_or_init(|| {
-            let views = self.per_view.iter().enumerate();
-            let found = views.flat_map(|(view, found)| found.iter().map(move |one| (view, one)));
-            found
-                .filter_map(|(view, found)| self.map(view, found, back_projection))
-                .collect()
+            let mut mapped = Vec::with_capacity(self.per_view.iter().map(Vec::len).sum());
+            for (view, found) in self.per_view.iter().enumerate() {
+                let of_view = found.iter();
+                mapped.extend(of_view.filter_map(|one| self.map(view, one, back_projection)));
+            }
+            mapped
         })
     }
 
