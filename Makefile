@@ -52,9 +52,8 @@ test: ## set up, then check formatting, budgets, lints, tests and documentation;
 	cargo fmt --all --check
 	$(PYTHON) packaging/scripts/lines.py --check
 	cargo clippy --workspace --all-targets --locked -- -D warnings
-	@# Workspaces of their own: the lock file of the fuzzers, the bench of the tracker.
+	@# A workspace of their own: the lock file of the fuzzers.
 	cargo tree --quiet --locked --manifest-path lab/fuzz/Cargo.toml > /dev/null
-	cargo clippy --locked --manifest-path lab/benches/walks/Cargo.toml --target-dir target -- -D warnings
 	$(CARGO_DENY) bans licenses sources
 	PATH="$(CURDIR)/$(CHECKERS):$$PATH" cargo shear --deny-warnings
 	$(CHECKERS)/ruff check

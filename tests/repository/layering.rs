@@ -59,6 +59,7 @@ const MAY_USE_CRATE: [(&str, &[&str]); 24] = [
             "server",
             "simulate",
             "views",
+            "walks",
             "webhooks",
         ],
     ),

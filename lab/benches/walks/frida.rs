@@ -46,9 +46,9 @@ impl Site {
     }
 
     /// Follows the people of all cameras in one tracker.
-    pub fn follow(&self, segment: &Segment, settings: TrackerSettings) -> Result<Row> {
+    pub fn follow(&self, segment: &Segment, settings: &TrackerSettings) -> Result<Row> {
         let frames_per_s = segment.cameras[0].circle.frames_per_s;
-        let mut tracker = Tracker::new(&self.poses, settings)?;
+        let mut tracker = Tracker::new(&self.poses, *settings)?;
         let (mut steps, mut number) = (Vec::new(), Number::default());
         for (at_s, frames) in moments(segment) {
             let mut people = BTreeSet::new();
@@ -74,7 +74,7 @@ impl Site {
     }
 
     /// Prints what the walks of each two cameras tell about their places, and its errors.
-    pub fn print_places(&self, segments: &[Segment], settings: TrackerSettings) -> Result<()> {
+    pub fn print_places(&self, segments: &[Segment], settings: &TrackerSettings) -> Result<()> {
         for segment in segments {
             let walks = (0..self.views.len()).map(|camera| self.walks(segment, camera, settings));
             let walks = walks.collect::<Result<Vec<_>>>()?;
@@ -114,11 +114,11 @@ impl Site {
         &self,
         segment: &Segment,
         camera: usize,
-        settings: TrackerSettings,
+        settings: &TrackerSettings,
     ) -> Result<Vec<Walk>> {
         let view = &self.views[camera];
         let sequence = &segment.cameras[camera];
-        let mut tracker = Tracker::new(&[CameraPose::alone(Some(view.height_m))], settings)?;
+        let mut tracker = Tracker::new(&[CameraPose::alone(Some(view.height_m))], *settings)?;
         let mut walks: BTreeMap<_, Walk> = BTreeMap::new();
         for frame in &sequence.frames {
             let at_s = f64::from(frame.number) / sequence.circle.frames_per_s;

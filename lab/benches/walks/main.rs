@@ -39,6 +39,7 @@ use view::{View, overlap};
 /// Rates beside the own one, frames per second.
 const RATES: [f64; 3] = [5.0, 2.0, 1.0];
 
+#[expect(clippy::struct_excessive_bools, reason = "flags of the command line")]
 struct Options {
     data: PathBuf,
     is_json: bool,
@@ -144,7 +145,7 @@ pub fn persons(view: &View, frame: &Frame) -> (Vec<usize>, Vec<Observation>) {
 }
 
 /// The tracks that a camera's frame continued, with the numbers of their boxes.
-pub fn continued(
+pub(crate) fn continued(
     tracker: &Tracker,
     camera: usize,
     at_s: f64,
@@ -167,7 +168,7 @@ fn follow(
     set: &'static str,
     sequence: &Sequence,
     rate: Option<f64>,
-    settings: TrackerSettings,
+    settings: &TrackerSettings,
 ) -> Result<Row> {
     let circle = &sequence.circle;
     let view = View::new(circle, sequence.frames.iter())?;
@@ -179,27 +180,27 @@ fn follow(
     let step = rate.map_or(1, |rate| (circle.frames_per_s / rate).round() as usize);
     let frames_per_s = circle.frames_per_s / quotient(step, 1);
     let pose = CameraPose::alone(Some(view.height_m));
-    let mut tracker = Tracker::new(&[pose], settings)?;
+    let mut tracker = Tracker::new(&[pose], *settings)?;
     let crossings = Crossings::new(sequence, &view);
     let mut counter = LineCounter::new(crossings.lines.clone(), LineState::default());
     let annotated = |frame: &Frame| !frame.truth.is_empty();
     let first = sequence.frames.iter().position(annotated).unwrap_or(0);
     let last = sequence.frames.iter().rposition(annotated).unwrap_or(0);
     let (mut steps, mut number) = (Vec::new(), Number::default());
-    let mut counted: Vec<Event> = Vec::new();
+    let mut passed: Vec<Event> = Vec::new();
     for (at, frame) in sequence.frames.iter().enumerate().step_by(step) {
         let at_s = f64::from(frame.number) / circle.frames_per_s;
         let (boxes, persons) = persons(&view, frame);
         tracker.update(f64::INFINITY, 0, at_s, &persons)?;
         let crossed = counter.update(tracker.tracks()).into_iter();
-        counted.extend(crossed.map(|one| (one.line, lines::sign(one.direction), one.at_s)));
+        passed.extend(crossed.map(|one| (one.line, lines::sign(one.direction), one.at_s)));
         let tracks = continued(&tracker, 0, at_s, &boxes)?;
         steps.push(step_of(frame, &tracks));
         if (first..=last).contains(&at) {
             number.add(frame.truth.len(), counting(&tracker));
         }
     }
-    let right = crossings.matched(&counted, frames_per_s);
+    let right = crossings.matched(&passed, frames_per_s);
     let frames = quotient(sequence.frames.len(), 1);
     let middle_s = frames / (2.0 * circle.frames_per_s);
     Ok(Row {
@@ -209,8 +210,8 @@ fn follow(
         sums: Sums::new(&steps),
         number,
         frames_per_s,
-        crossings: [crossings.truth.len(), counted.len(), right],
-        halves: crossings.halves(&counted, middle_s),
+        crossings: [crossings.truth.len(), passed.len(), right],
+        halves: crossings.halves(&passed, middle_s),
     })
 }
 
@@ -363,7 +364,7 @@ fn main() -> Result<()> {
     }
     segments.retain(|segment| is_named(&segment.name));
     if options.places {
-        return site.print_places(&segments, options.settings);
+        return site.print_places(&segments, &options.settings);
     }
     let sets = ["cepdof", "wepdtof"].map(|set| (set, data::sequences(&options.data, set)));
     let mut jobs: Vec<Box<dyn Fn() -> Result<Row> + Sync + '_>> = Vec::new();
@@ -372,19 +373,19 @@ fn main() -> Result<()> {
             .as_ref()
             .map_err(|error| anyhow::anyhow!("{error:#}"))?;
         for sequence in sequences.iter().filter(|sequence| is_named(&sequence.name)) {
-            jobs.push(Box::new(|| follow(set, sequence, None, options.settings)));
+            jobs.push(Box::new(|| follow(set, sequence, None, &options.settings)));
             let slower = RATES
                 .into_iter()
                 .filter(|rate| *rate <= sequence.circle.frames_per_s / 1.5);
             for rate in slower.filter(|_| !options.own_rate) {
                 jobs.push(Box::new(move || {
-                    follow(set, sequence, Some(rate), options.settings)
+                    follow(set, sequence, Some(rate), &options.settings)
                 }));
             }
         }
     }
     for segment in &segments {
-        jobs.push(Box::new(|| site.follow(segment, options.settings)));
+        jobs.push(Box::new(|| site.follow(segment, &options.settings)));
     }
     let mut rows = all(&jobs)?;
     if options.is_json {

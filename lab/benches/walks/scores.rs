@@ -250,9 +250,8 @@ impl Sums {
             .iter()
             .map(|((a, b), count)| count * count / (truth[*a] + tracks[*b] - count))
             .sum();
-        let matched = published.matched.max(1.0);
         let detection = published.matched / (self.truth + self.tracks - published.matched).max(1.0);
-        published.hota = (detection * association / matched).sqrt();
+        published.hota = (detection * association / published.matched.max(1.0)).sqrt();
         self.published = published;
     }
 

@@ -7,7 +7,7 @@ use std::{
 };
 
 /// The crates of the workspace with the folders of their sources.
-pub const CRATES: [(&str, &str); 15] = [
+pub const CRATES: [(&str, &str); 16] = [
     ("lookdown-common", "crates/lookdown-common/src"),
     ("lookdown-lens", "crates/lookdown-lens/src"),
     ("lookdown-calibration", "crates/lookdown-calibration/src"),
@@ -23,6 +23,7 @@ pub const CRATES: [(&str, &str); 15] = [
     ("lookdown-load", "lab/benches/load"),
     ("lookdown-paper", "lab/benches/paper"),
     ("simulate", "lab/benches/simulate"),
+    ("walks", "lab/benches/walks"),
 ];
 
 /// Every source file of a crate with its module path, such as `api::http::csrf`.
