@@ -66,6 +66,7 @@ impl Pass {
     ) -> Option<Mapped> {
         let footprint = self.rig.footprint(view, &found.bbox, back_projection)?;
         let cut_off = self.rig.cuts_off(view, &found.bbox, &self.model.input);
+        let posture = found.posture;
         let candidate = Candidate {
             bbox: BBox::new(footprint.bounds()).ok()?,
             score: found.score,
@@ -78,10 +79,8 @@ impl Pass {
             footprint,
             cut_off,
             is_exact: self.rig.is_exact(),
-            posture: found.posture,
-            widths: found
-                .posture
-                .and_then(|_| self.rig.widths(view, &found.bbox)),
+            posture,
+            widths: posture.and_then(|_| self.rig.widths(view, &found.bbox)),
         })
     }
 
