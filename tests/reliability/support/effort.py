@@ -29,7 +29,7 @@ class Effort:
 
 SHORT = Effort(
     name="short",
-    examples=25,
+    examples=12,
     deterministic=True,
     kills=30,
     stops=3,
