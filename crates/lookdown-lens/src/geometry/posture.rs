@@ -276,11 +276,15 @@ impl FloorVotes {
         self.lying + self.low
     }
 
-    /// Returns the likelihood of each posture, from a bivariate normal distribution.
+    /// Returns the likelihood of each posture, from a bivariate normal distribution. Beyond a
+    /// standard deviation above the mean for its own posture, a vote tells no less for it.
     fn likelihoods(self) -> [f64; POSTURES] {
+        let [.., (of_low, _), (of_lying, _)] = VOTES;
+        let capped = |vote: f64, (mean, sd): (f64, f64)| vote.min(mean + sd);
+        let (lying_vote, low_vote) = (capped(self.lying, of_lying[0]), capped(self.low, of_low[1]));
         VOTES.map(|([lying, low], correlation)| {
             let standard = |vote: f64, (mean, sd): (f64, f64)| (vote - mean) / sd;
-            let (x, y) = (standard(self.lying, lying), standard(self.low, low));
+            let (x, y) = (standard(lying_vote, lying), standard(low_vote, low));
             let unique = 1.0 - correlation * correlation;
             let square = (x * x - 2.0 * correlation * x * y + y * y) / unique;
             let density = (-square / 2.0).exp() / (TAU * lying.1 * low.1 * unique.sqrt());

@@ -388,6 +388,21 @@ fn votes_of_networks_decide_where_the_box_fits_two_postures() {
 }
 
 #[test]
+fn surest_votes_tell_of_their_posture() {
+    for (lying, low, posture) in [(1.0, 0.1, Posture::Lying), (0.2, 1.0, Posture::Low)] {
+        let mut belief = PostureBelief::new(true);
+        let signs = PostureSigns {
+            angles: None,
+            votes: Some(FloorVotes { lying, low }),
+        };
+        for _ in 0..5 {
+            belief.add(&signs, Some(3.0), f64::INFINITY);
+        }
+        assert_eq!(belief.posture().0, posture);
+    }
+}
+
+#[test]
 fn unknown_height_of_the_camera_is_learned() {
     let mut chance = Chance(3);
     let camera = Camera::any(&mut chance);
