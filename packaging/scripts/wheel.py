@@ -1,9 +1,8 @@
 """Builds the Python wheel: `wheel.py [PROFILE]`, after the step `wheel` of the set-up.
 
-`PROFILE` is one of Cargo.toml, by default `release`, into target/wheels. That wheel is linked for glibc 2.28 with zig, so
-that it runs on every distribution since 2018. Any other one is for tests on this machine, and uses what is compiled
-already; its wheel goes into target/PROFILE/wheels. The wheel has the default models inside and takes ONNX Runtime from
-its own package.
+`PROFILE` is one of Cargo.toml, by default `release`, into target/wheels. Any other one is for tests, and its wheel goes
+into target/PROFILE/wheels. The wheel has the default models inside and takes ONNX Runtime from its own package. It is
+linked for glibc 2.28 with zig, so that it runs on every distribution since 2018.
 """
 
 import os
@@ -21,32 +20,23 @@ PLATFORM = "manylinux_2_28"
 
 def main(profile: str = "release") -> int:
     """Collects the models, builds the wheel, and checks its platform."""
-    is_release = profile == "release"
-    wheels = ROOT / "target" / ("wheels" if is_release else f"{profile}/wheels")
+    wheels = ROOT / "target" / ("wheels" if profile == "release" else f"{profile}/wheels")
     collect_models(CRATE / "python" / "lookdown")
     for text in ("LICENSE", "NOTICE"):
         shutil.copyfile(ROOT / text, CRATE / text)
     shutil.rmtree(wheels, ignore_errors=True)
     environment = os.environ | {"PATH": f"{TOOLS}:{os.environ['PATH']}"}
-    linking = ["--zig", "--compatibility", PLATFORM] if is_release else ["--compatibility", "linux"]
-    flags = ["--profile", profile, "--locked", *linking, "--out", wheels]
+    flags = ["--profile", profile, "--locked", "--zig", "--compatibility", PLATFORM, "--out", wheels]
     built = subprocess.run([TOOLS / "maturin", "build", *flags], cwd=CRATE, env=environment, check=False)
     if built.returncode != 0:
         return built.returncode
     (wheel,) = wheels.glob("*.whl")
-    if is_release and not is_fit(wheel):
+    shown = subprocess.run([TOOLS / "auditwheel", "show", wheel], stdout=subprocess.PIPE, text=True, check=True).stdout
+    if f'"{PLATFORM}_x86_64"' not in shown.replace("\n", " "):
+        print(f"{wheel.name}: auditwheel does not find it fit for {PLATFORM}:\n{shown}", file=sys.stderr)
         return 1
     print(f"{wheel.relative_to(ROOT)}: {wheel.stat().st_size / 1e6:.1f} MB")
     return 0
-
-
-def is_fit(wheel: Path) -> bool:
-    """Returns true if a wheel runs on all distributions of the platform; tells otherwise."""
-    shown = subprocess.run([TOOLS / "auditwheel", "show", wheel], stdout=subprocess.PIPE, text=True, check=True).stdout
-    fits = f'"{PLATFORM}_x86_64"' in shown.replace("\n", " ")
-    if not fits:
-        print(f"{wheel.name}: auditwheel does not find it fit for {PLATFORM}:\n{shown}", file=sys.stderr)
-    return fits
 
 
 def collect_models(package: Path) -> None:

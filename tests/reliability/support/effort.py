@@ -29,7 +29,7 @@ class Effort:
 
 SHORT = Effort(
     name="short",
-    examples=12,
+    examples=25,
     deterministic=True,
     kills=30,
     stops=3,
