@@ -14,7 +14,7 @@ def int8_nodes(graph: OnnxGraph) -> list[NodeProto]:
     """The nodes behind the first convolution and its activation whose results lead to a further convolution.
 
     The last convolutions, whose results are decoded, and the decoding stay in floating point by that. The first one
-    stays, too: in integers it and the pool behind it take as long (lab/benches/NOTES.md).
+    stays, too: with VNNI, it and the pool behind it take as long in integers (lab/benches/NOTES.md).
     """
     leading = _tensors_that_lead_to_convolutions(graph)
     second = [index for index, node in enumerate(graph.nodes) if node.op_type == "Conv"][1]
