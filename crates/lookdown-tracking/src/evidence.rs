@@ -21,6 +21,8 @@ use serde::{Deserialize, Serialize};
 pub struct EvidenceSettings {
     /// Added to the log odds of the first person: most persons without a track are false.
     pub start: f64,
+    /// The time between reports for which that holds, seconds.
+    pub start_interval_s: f64,
     /// Added to the log odds of each further person: it is where the track expects it.
     pub hit: f64,
     /// Added for a report without a person.
@@ -45,6 +47,7 @@ impl Default for EvidenceSettings {
     fn default() -> Self {
         Self {
             start: -0.9,
+            start_interval_s: 0.2,
             hit: 1.0,
             miss: -1.2,
             confirm: 3.6,
@@ -61,6 +64,9 @@ impl Default for EvidenceSettings {
 /// Least and greatest log odds of one person: scores of .02 and .98.
 const SCORE_LIMIT: f64 = 3.9;
 
+/// A time in which nobody looked counts no longer than this many times `start_interval_s`.
+const MOST_ARRIVALS: f64 = 10.0;
+
 /// The evidence of a track.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Evidence {
@@ -75,10 +81,12 @@ pub(super) struct Evidence {
 }
 
 impl Evidence {
-    /// Returns the evidence of a track's first person.
-    pub fn first(score: f64, settings: &EvidenceSettings) -> Self {
+    /// Returns the evidence of a track's first person, seen `unwatched_s` after the last report: the
+    /// number of people who arrive grows with that time, that of false boxes does not.
+    pub fn first(score: f64, unwatched_s: f64, settings: &EvidenceSettings) -> Self {
+        let arrivals = (unwatched_s / settings.start_interval_s).clamp(1.0, MOST_ARRIVALS);
         Self {
-            before: log_odds(score) + settings.start,
+            before: log_odds(score) + settings.start + arrivals.ln(),
             mean: 0.0,
             reports: 0.0,
             missed: 0.0,
@@ -162,7 +170,7 @@ mod tests {
 
     fn after(hits: u32, misses: u32, interval_s: f64) -> Evidence {
         let settings = EvidenceSettings::default();
-        let mut evidence = Evidence::first(0.9, &settings);
+        let mut evidence = Evidence::first(0.9, interval_s, &settings);
         for _ in 0..hits {
             evidence.add_hit(0.9, interval_s, &settings);
         }
@@ -177,6 +185,14 @@ mod tests {
         let settings = EvidenceSettings::default();
         assert!(!after(0, 0, 1.0).confirms(&settings));
         assert!(after(1, 0, 1.0).confirms(&settings));
+    }
+
+    #[test]
+    fn who_appears_after_a_pause_is_likelier_a_person() {
+        let settings = EvidenceSettings::default();
+        let confirms = |pause_s| Evidence::first(0.97, pause_s, &settings).confirms(&settings);
+        assert!(!confirms(0.2));
+        assert!(confirms(1.5) && confirms(60.0));
     }
 
     #[test]
@@ -199,7 +215,7 @@ mod tests {
     fn from_score(score: f64) -> [Evidence; 2] {
         let settings = EvidenceSettings::default();
         [false, true].map(|walks| {
-            let mut evidence = Evidence::first(score, &settings);
+            let mut evidence = Evidence::first(score, 0.2, &settings);
             for _ in 0..100 {
                 evidence.add_hit(score, 1.0, &settings);
                 if walks {

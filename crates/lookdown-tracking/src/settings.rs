@@ -119,7 +119,7 @@ impl Default for TrackerSettings {
             least_score_in_line: 0.47,
             new_track_score_in_line: 0.85,
             max_unseen_s: 2.0,
-            max_missed: 3,
+            max_missed: 2,
             max_silent_s: 10.0,
             max_absent_s: 120.0,
             absent_drift: 0.02,

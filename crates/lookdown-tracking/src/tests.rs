@@ -89,6 +89,21 @@ fn a_single_detection_confirms_no_track() {
 }
 
 #[test]
+fn slow_reports_show_who_comes_and_goes_at_once() {
+    let mut tracker = floor_tracker();
+    let mut shown = Vec::new();
+    for report in 0..7 {
+        let is_there = (2..4).contains(&report);
+        let person = [with_score(1.0, 1.0, 0.97)];
+        let persons = if is_there { &person[..] } else { &[] };
+        let at_s = f64::from(report) * 1.5;
+        tracker.update(f64::INFINITY, 0, at_s, persons).unwrap();
+        shown.push(tracker.tracks().count());
+    }
+    assert_eq!(shown, [0, 0, 1, 1, 1, 0, 0]);
+}
+
+#[test]
 fn low_scores_continue_tracks_but_start_none() {
     let mut tracker = floor_tracker();
     let low = |at_s: f64| with_score(at_s - 3.0, 1.0, 0.2);

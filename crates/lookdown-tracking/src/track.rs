@@ -82,6 +82,8 @@ pub(super) struct Sighting<'a> {
     pub at_s: f64,
     /// Time since the camera's last report, seconds.
     pub interval_s: f64,
+    /// Time since the last report of any camera, seconds.
+    pub unwatched_s: f64,
     pub source: PersonOfReport,
     pub person: &'a Observation,
     pub measured: &'a Measurement,
@@ -101,7 +103,7 @@ impl Track {
             motion,
             first_seen_s: seen.at_s,
             seen_s: seen.at_s,
-            evidence: Evidence::first(seen.measured.score, &settings.evidence),
+            evidence: Evidence::first(seen.measured.score, seen.unwatched_s, &settings.evidence),
             missed: 0,
             confirmed: false,
             last_person: seen.source,
@@ -113,6 +115,7 @@ impl Track {
             seen_by: BTreeMap::new(),
             tail: VecDeque::new(),
         };
+        track.confirmed = track.evidence.confirms(&settings.evidence);
         track.record(seen);
         track
     }

@@ -145,6 +145,7 @@ impl Tracker {
             camera,
             at_s,
             interval_s: self.interval_s(camera, at_s),
+            unwatched_s: at_s - self.newest_report_s.unwrap_or(at_s),
             camera_m: pose.height_m,
         };
         let observed_s = report.interval_s.min(elapsed_s);
@@ -156,12 +157,14 @@ impl Tracker {
             unknown,
         } = separate(candidates, &shown);
         let possible = self.tracks.iter().filter(|track| !track.is_confirmed());
-        let possible: Vec<TrackId> = possible.map(|track| track.id).collect();
+        let mut possible: Vec<TrackId> = possible.map(|track| track.id).collect();
+        let first_new = self.next_id;
         let used = self.associate(&report, &candidates);
+        self.start_tracks(&report, (&candidates, &furniture), &used);
+        possible.extend((first_new..self.next_id).map(TrackId));
         for id in possible {
             continue_lost(&mut self.tracks, &mut self.lost, id, &self.settings);
         }
-        self.start_tracks(&report, (&candidates, &furniture), &used);
         self.start_things(&report, persons, &unknown);
         self.count_misses(&report);
         self.cameras[camera].last_report_s = Some(at_s);
@@ -341,6 +344,8 @@ struct CurrentReport {
     camera: usize,
     at_s: f64,
     interval_s: f64,
+    /// Time since the last report of any camera; 0 for the first one.
+    unwatched_s: f64,
     camera_m: Option<f64>,
 }
 
@@ -354,6 +359,7 @@ impl CurrentReport {
         Sighting {
             at_s: self.at_s,
             interval_s: self.interval_s,
+            unwatched_s: self.unwatched_s,
             source: PersonOfReport {
                 camera: self.camera,
                 person: candidate.index,
