@@ -64,7 +64,8 @@ impl Default for EvidenceSettings {
 /// Least and greatest log odds of one person: scores of .02 and .98.
 const SCORE_LIMIT: f64 = 3.9;
 
-/// A time in which nobody looked counts no longer than this many times `start_interval_s`.
+/// Most times `start_interval_s` that a pause between reports counts. Like that interval a guess,
+/// checked on the walks of `docs/lab/real-walks.md`.
 const MOST_ARRIVALS: f64 = 10.0;
 
 /// The evidence of a track.
@@ -81,8 +82,8 @@ pub(super) struct Evidence {
 }
 
 impl Evidence {
-    /// Returns the evidence of a track's first person, seen `unwatched_s` after the last report: the
-    /// number of people who arrive grows with that time, that of false boxes does not.
+    /// Returns the evidence of a track's first person, seen `unwatched_s` after the last report.
+    /// The number of people who arrive grows with that time, that of false boxes does not.
     pub fn first(score: f64, unwatched_s: f64, settings: &EvidenceSettings) -> Self {
         let arrivals = (unwatched_s / settings.start_interval_s).clamp(1.0, MOST_ARRIVALS);
         Self {
