@@ -7,8 +7,8 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Observation, Plane, TrackerSettings, evidence::Evidence, furniture::START_AFTER_S,
-    measurement::Measurement, motion::Motion,
+    Plane, TrackerSettings, candidates::Candidate, evidence::Evidence, furniture::START_AFTER_S,
+    motion::Motion,
 };
 
 /// Most places that a track keeps.
@@ -77,53 +77,76 @@ impl TailPoint {
     }
 }
 
-/// A measured person of the current report.
-pub(super) struct Sighting<'a> {
+/// The report that updates the tracks.
+pub(super) struct CurrentReport {
+    pub camera: usize,
     pub at_s: f64,
-    /// Time since the camera's last report, seconds.
+    /// Time since the camera's last report, seconds; infinite for its first one.
     pub interval_s: f64,
-    /// Time since the last report of any camera, seconds.
+    /// Time since the last report of any camera, seconds; 0 for the first one.
     pub unwatched_s: f64,
-    pub source: PersonOfReport,
-    pub person: &'a Observation,
-    pub measured: &'a Measurement,
     /// Height of the camera above the floor, meters.
     pub camera_m: Option<f64>,
 }
 
+impl CurrentReport {
+    /// Returns true when a person of this report continued or started the track.
+    pub(super) fn shows(&self, track: &Track) -> bool {
+        track.seen_by.get(&self.camera) == Some(&self.at_s)
+    }
+
+    fn person(&self, seen: &Candidate) -> PersonOfReport {
+        PersonOfReport {
+            camera: self.camera,
+            person: seen.index,
+        }
+    }
+}
+
 impl Track {
     /// Returns a new track, not confirmed yet.
-    pub(super) fn new(id: TrackId, seen: &Sighting, settings: &TrackerSettings) -> Self {
+    pub(super) fn new(
+        id: TrackId,
+        report: &CurrentReport,
+        seen: &Candidate,
+        settings: &TrackerSettings,
+    ) -> Self {
         let plane = settings.plane_of(&seen.measured.place);
-        let motion = Motion::new(seen.measured, seen.at_s, plane);
+        let motion = Motion::new(&seen.measured, report.at_s, plane);
+        let settings = &settings.evidence;
         let mut track = Self {
             id,
             evidence_place: motion.place().into(),
             has_moved: false,
             motion,
-            first_seen_s: seen.at_s,
-            seen_s: seen.at_s,
-            evidence: Evidence::first(seen.measured.score, seen.unwatched_s, &settings.evidence),
+            first_seen_s: report.at_s,
+            seen_s: report.at_s,
+            evidence: Evidence::first(seen.measured.score, report.unwatched_s, settings),
             missed: 0,
             confirmed: false,
-            last_person: seen.source,
+            last_person: report.person(seen),
             foot_px: seen.person.foot_px,
             center_px: seen.person.center_px,
             length_px: 0.0,
             in_margin: seen.person.is_in_margin,
-            posture: PostureBelief::new(seen.camera_m.is_some()),
+            posture: PostureBelief::new(report.camera_m.is_some()),
             seen_by: BTreeMap::new(),
             tail: VecDeque::new(),
         };
-        track.confirmed = track.evidence.confirms(&settings.evidence);
-        track.record(seen);
+        track.confirmed = track.evidence.confirms(settings);
+        track.record(report, seen);
         track
     }
 
     /// Updates the track with a person.
-    pub(super) fn update(&mut self, seen: &Sighting, settings: &TrackerSettings) {
+    pub(super) fn update(
+        &mut self,
+        report: &CurrentReport,
+        seen: &Candidate,
+        settings: &TrackerSettings,
+    ) {
         let plane = settings.plane_of(&seen.measured.place);
-        self.motion.update(seen.measured, seen.at_s, plane);
+        self.motion.update(&seen.measured, report.at_s, plane);
         let settings = &settings.evidence;
         let here = self.motion.place();
         if (here - Vector3::from(self.evidence_place)).norm() >= plane.independent_distance {
@@ -132,9 +155,9 @@ impl Track {
             self.evidence.move_on(settings);
         }
         self.evidence
-            .add_hit(seen.measured.score, seen.interval_s, settings);
+            .add_hit(seen.measured.score, report.interval_s, settings);
         self.confirmed |= self.evidence.confirms(settings);
-        self.record(seen);
+        self.record(report, seen);
     }
 
     /// Continues a track that was last seen before this one began: takes its identifier, and comes
@@ -151,24 +174,24 @@ impl Track {
         }
     }
 
-    fn record(&mut self, seen: &Sighting) {
+    fn record(&mut self, report: &CurrentReport, seen: &Candidate) {
         self.missed = 0;
-        let signs = &seen.person.signs;
-        if *signs != PostureSigns::default() {
+        let person = seen.person;
+        if person.signs != PostureSigns::default() {
             if !self.seen_by.is_empty() {
-                self.posture.pass(seen.at_s - self.seen_s);
+                self.posture.pass(report.at_s - self.seen_s);
             }
-            let before = self.seen_by.get(&seen.source.camera);
-            let since_s = before.map_or(f64::INFINITY, |before| seen.at_s - before);
-            self.posture.add(signs, seen.camera_m, since_s);
+            let before = self.seen_by.get(&report.camera);
+            let since_s = before.map_or(f64::INFINITY, |before| report.at_s - before);
+            self.posture.add(&person.signs, report.camera_m, since_s);
         }
-        self.seen_s = self.seen_s.max(seen.at_s);
-        self.last_person = seen.source;
-        self.foot_px = seen.person.foot_px;
-        self.center_px = seen.person.center_px;
-        self.length_px = seen.person.size_px[0].max(seen.person.size_px[1]);
-        self.in_margin = seen.person.is_in_margin;
-        self.seen_by.insert(seen.source.camera, seen.at_s);
+        self.seen_s = self.seen_s.max(report.at_s);
+        self.last_person = report.person(seen);
+        self.foot_px = person.foot_px;
+        self.center_px = person.center_px;
+        self.length_px = person.size_px[0].max(person.size_px[1]);
+        self.in_margin = person.is_in_margin;
+        self.seen_by.insert(report.camera, report.at_s);
         if self.tail.len() == MAX_TAIL_POINTS {
             self.tail.pop_front();
         }

@@ -15,7 +15,7 @@ use crate::{
     kalman::Innovation,
     measurement::Measurement,
     reappearance::{continue_lost, keep_lost},
-    track::{PersonOfReport, Sighting},
+    track::CurrentReport,
 };
 
 /// Most cameras of a tracker.
@@ -139,12 +139,16 @@ impl Tracker {
         persons: &[Observation],
     ) -> Result<Vec<Track>, RefusedReport> {
         self.check(camera, at_s)?;
-        let pose = &self.cameras[camera].pose;
+        let Camera {
+            pose,
+            last_report_s,
+            ..
+        } = &self.cameras[camera];
         let candidates = candidates(persons, (camera, pose, self.on_floor), &self.settings);
         let report = CurrentReport {
             camera,
             at_s,
-            interval_s: self.interval_s(camera, at_s),
+            interval_s: last_report_s.map_or(f64::INFINITY, |last| at_s - last),
             unwatched_s: at_s - self.newest_report_s.unwrap_or(at_s),
             camera_m: pose.height_m,
         };
@@ -201,12 +205,6 @@ impl Tracker {
         Ok(())
     }
 
-    /// The time since the camera's last report; long where there was none.
-    fn interval_s(&self, camera: usize, at_s: f64) -> f64 {
-        let last = self.cameras[camera].last_report_s;
-        last.map_or(f64::INFINITY, |last| at_s - last)
-    }
-
     /// Continues tracks with persons in the three steps of `ByteTrack`: high scores, low scores,
     /// then tracks without confirmation. Returns true for each candidate that continued a track.
     fn associate(&mut self, report: &CurrentReport, candidates: &[Candidate]) -> Vec<bool> {
@@ -244,8 +242,8 @@ impl Tracker {
                 self.gain(track, &innovation, measured)
             });
             for (row, column) in pairs {
-                let seen = report.sighting(&candidates[columns[column]]);
-                self.tracks[rows[row]].update(&seen, &self.settings);
+                let seen = &candidates[columns[column]];
+                self.tracks[rows[row]].update(report, seen, &self.settings);
                 used[columns[column]] = true;
             }
         }
@@ -298,8 +296,8 @@ impl Tracker {
             if candidate.measured.score >= least && self.tracks.len() < self.settings.max_tracks {
                 let id = TrackId(self.next_id);
                 self.next_id += 1;
-                let seen = report.sighting(candidate);
-                self.tracks.push(Track::new(id, &seen, &self.settings));
+                let track = Track::new(id, report, candidate, &self.settings);
+                self.tracks.push(track);
             }
         }
     }
@@ -336,38 +334,6 @@ impl Tracker {
             is_missed || is_refuted || is_revoked || unseen_s > settings.max_silent_s
         };
         self.tracks.extract_if(.., is_over).collect()
-    }
-}
-
-/// The camera and the time of the current report.
-struct CurrentReport {
-    camera: usize,
-    at_s: f64,
-    interval_s: f64,
-    /// Time since the last report of any camera; 0 for the first one.
-    unwatched_s: f64,
-    camera_m: Option<f64>,
-}
-
-impl CurrentReport {
-    /// Returns true when a person of this report continued or started the track.
-    fn shows(&self, track: &Track) -> bool {
-        track.seen_by.get(&self.camera) == Some(&self.at_s)
-    }
-
-    fn sighting<'a>(&self, candidate: &'a Candidate) -> Sighting<'a> {
-        Sighting {
-            at_s: self.at_s,
-            interval_s: self.interval_s,
-            unwatched_s: self.unwatched_s,
-            source: PersonOfReport {
-                camera: self.camera,
-                person: candidate.index,
-            },
-            person: candidate.person,
-            measured: &candidate.measured,
-            camera_m: self.camera_m,
-        }
     }
 }
 
