@@ -264,7 +264,11 @@ impl App {
     /// Returns the connection of parts of this process to the server.
     pub fn in_process(&self) -> InProcess {
         let router = api::in_process_router(self.state.clone());
-        api::in_process(router, self.companions().own_cameras())
+        let settings = &self.state.options.settings;
+        // A few cameras at a time fit into the half that one client has.
+        let share = settings.limits.max_upload_bytes / 8;
+        let most = settings.server.max_body_bytes.min(share);
+        api::in_process(router, self.companions().own_cameras(), most)
     }
 
     /// The readiness of the app. Clones share its state.

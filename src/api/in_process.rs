@@ -16,8 +16,8 @@ use tower::ServiceExt;
 use super::http::context::OwnRequest;
 
 /// Returns the connection of parts of this process to the server with these routes.
-pub fn in_process(router: Router, own_cameras: OwnCameras) -> InProcess {
-    InProcess::new(own_cameras, move |request| {
+pub fn in_process(router: Router, own_cameras: OwnCameras, max_frame_bytes: usize) -> InProcess {
+    InProcess::new(own_cameras, max_frame_bytes, move |request| {
         let mut request = request.map(Body::new);
         request.extensions_mut().insert(OwnRequest);
         let answered = router.clone().oneshot(request);

@@ -209,7 +209,8 @@ impl LiveCamera {
         }
         let concealed = concealment.map(|concealment| (concealment, marks_to_conceal(detected)));
         let captured_at = report.captured_at.unwrap_or(report.received_at);
-        self.show(copied(image), captured_at, (scene, persons), concealed);
+        let image = kept(image, &detected.frame);
+        self.show(image, captured_at, (scene, persons), concealed);
     }
 
     /// Shows a frame of the camera without a report of its own. Before the first report nothing is
@@ -434,11 +435,14 @@ fn keep<K, V>(kept: &mut Vec<(K, Arc<V>)>, key: K, value: &Arc<V>) {
     kept.push((key, Arc::clone(value)));
 }
 
-/// Returns a copy of a file, so that the rest of its request body can be freed.
-fn copied(image: &JobImage) -> JobImage {
+/// Returns the smaller one of a file and its pixels. A file is copied, so that the rest of its
+/// request body can be freed.
+fn kept(image: &JobImage, pixels: &Arc<Frame>) -> JobImage {
     match image {
-        JobImage::Encoded(file) => JobImage::Encoded(Bytes::copy_from_slice(file)),
-        JobImage::Decoded(frame) => JobImage::Decoded(Arc::clone(frame)),
+        JobImage::Encoded(file) if file.len() < pixels.pixels().len() => {
+            JobImage::Encoded(Bytes::copy_from_slice(file))
+        }
+        _ => JobImage::Decoded(Arc::clone(pixels)),
     }
 }
 

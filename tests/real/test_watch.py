@@ -11,6 +11,7 @@ import subprocess
 import tempfile
 import time
 import unittest
+import urllib.parse
 import urllib.request
 from collections.abc import Iterator
 from datetime import datetime
@@ -77,18 +78,19 @@ class Watch:
         folder = Path("/proc") / str(self.process.pid)
         status = (folder / "status").read_text(encoding="utf-8")
         memory = next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmRSS:"))
-        return len(list((folder / "fd").iterdir())), memory, len(self.children())
-
-    def children(self) -> list[int]:
-        """The child processes."""
-        tasks = (Path("/proc") / str(self.process.pid) / "task").iterdir()
-        return [int(child) for task in tasks for child in (task / "children").read_text().split()]
+        return len(list((folder / "fd").iterdir())), memory, len(children(self.process.pid))
 
     def stop(self, number: int = signal.SIGTERM) -> int:
         """Stops it, and returns its exit status."""
         with contextlib.suppress(ProcessLookupError):
             os.kill(self.process.pid, number)
         return self.process.wait(timeout=20)
+
+
+def children(pid: int) -> list[int]:
+    """The child processes of a process."""
+    tasks = (Path("/proc") / str(pid) / "task").iterdir()
+    return [int(child) for task in tasks for child in (task / "children").read_text().split()]
 
 
 class Cameras(unittest.TestCase):
@@ -220,7 +222,7 @@ class Cameras(unittest.TestCase):
         flags = ("--name", "gate", "--every", "200ms", "--user", USER, "--password-file", self.password)
         with self.watching(source, *flags) as watch:
             watch.wait_for("gate", 2)
-            (child,) = watch.children()
+            (child,) = children(watch.process.pid)
             for pid in (watch.process.pid, child):
                 for about in ("cmdline", "environ"):
                     self.assertNotIn(b"s@cret", (Path("/proc") / str(pid) / about).read_bytes())
@@ -274,6 +276,23 @@ class Cameras(unittest.TestCase):
             self.assertEqual(json.loads(data.removeprefix(b"data:"))["camera"], "hall")
             server.process.send_signal(signal.SIGINT)
             self.assertEqual(server.process.wait(timeout=20), 0)
+
+    def test_a_video_is_read_as_pixels_where_they_fit(self):
+        rtsp = self.enterContext(rtsp_camera(self.frames_folder, RATE, USER, PASSWORD))
+        command = [
+            "run",
+            f"rtsp://{USER}:{urllib.parse.quote(PASSWORD, safe='')}@127.0.0.1:{rtsp}/stream",
+            "--name",
+            "hall",
+        ]
+        for most_bytes, encoder in ((3 * SIDE**2 + 100, "ppm"), (3 * SIDE**2, "mjpeg")):
+            settings = {"COUNTS__PATH": self.folder / encoder, "SERVER__MAX_BODY_BYTES": most_bytes}
+            with lookdown(TINY | settings | {"RESULTS__IMAGES": "hall"}, command=command) as server:
+                wait_until(lambda server=server: json.loads(server.get("/results")), "there is a result", 30)
+                (decoder,) = children(server.process.pid)
+                arguments = (Path("/proc") / str(decoder) / "cmdline").read_text(encoding="utf-8")
+                self.assertIn(f"\0-c:v\0{encoder}\0", arguments)
+                self.assertTrue(server.get("/results/hall/latest.jpg").startswith(b"\xff\xd8"))
 
     def clip(self) -> Path:
         """A video of the frames, one per second."""

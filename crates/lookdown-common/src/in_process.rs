@@ -15,12 +15,15 @@ pub struct InProcess {
     pub(crate) answer: Arc<dyn Fn(Request<Body>) -> Answer + Send + Sync>,
     /// The cameras of the process.
     pub own_cameras: OwnCameras,
+    /// Most bytes of a frame of a camera that it accepts.
+    pub max_frame_bytes: usize,
 }
 
 impl InProcess {
     /// Creates a connection to the server that answers with this function.
     pub fn new<A>(
         own_cameras: OwnCameras,
+        max_frame_bytes: usize,
         answer: impl Fn(Request<Body>) -> A + Send + Sync + 'static,
     ) -> Self
     where
@@ -29,6 +32,7 @@ impl InProcess {
         Self {
             answer: Arc::new(move |request| Box::pin(answer(request))),
             own_cameras,
+            max_frame_bytes,
         }
     }
 }

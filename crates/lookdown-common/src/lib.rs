@@ -22,6 +22,7 @@ mod log_once;
 pub mod metrics;
 mod own_cameras;
 pub mod plain_name;
+mod ppm;
 #[cfg(feature = "companion")]
 mod reload;
 mod replacement;
@@ -37,6 +38,7 @@ pub mod text;
 pub use jpeg::{JPEG_END, JPEG_START, jpeg_length};
 pub use log_once::LogOnce;
 pub use own_cameras::{Claim, OwnCameras, Place, makes_room};
+pub use ppm::{MAX_PPM_HEADER_BYTES, PPM_START, ppm_length};
 pub use replacement::{Replacement, UNFINISHED, replace_file, sync_folder};
 pub use stored_file::StoredFile;
 

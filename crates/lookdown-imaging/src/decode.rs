@@ -9,11 +9,11 @@ use std::{borrow::Cow, io::Cursor};
 
 use image::{
     ColorType, DynamicImage, ImageDecoder, ImageError, ImageFormat, Limits, RgbImage,
-    codecs::{jpeg::JpegDecoder, png::PngDecoder, webp::WebPDecoder},
+    codecs::{jpeg::JpegDecoder, png::PngDecoder, pnm::PnmDecoder, webp::WebPDecoder},
     error::{LimitError, LimitErrorKind},
     metadata::Orientation,
 };
-use lookdown_common::{JPEG_END, jpeg_length};
+use lookdown_common::{JPEG_END, PPM_START, jpeg_length};
 
 use crate::{buffer_pool, frame::Frame};
 
@@ -89,7 +89,7 @@ pub struct DecodedFrame {
     pub orientation_applied: bool,
 }
 
-/// Decodes a JPEG, PNG or WebP image to RGB.
+/// Decodes a JPEG, PNG, WebP or binary PPM image to RGB.
 ///
 /// The EXIF orientation is applied. Transparent pixels are blended over black, like the surround of
 /// a lens. 16-bit samples are rounded to 8 bits. Of an animation, the first frame is used. A
@@ -105,6 +105,7 @@ pub fn decode(bytes: &[u8], limits: &DecodeLimits) -> Result<DecodedFrame, Decod
         Ok(ImageFormat::Jpeg) => decode_jpeg(bytes, limits),
         Ok(ImageFormat::Png) => decode_png(bytes, limits),
         Ok(ImageFormat::WebP) => decode_webp(bytes, limits),
+        Ok(ImageFormat::Pnm) if bytes.starts_with(PPM_START) => decode_ppm(bytes, limits),
         Ok(other) => {
             let name = other.extensions_str().first().copied().unwrap_or("unknown");
             Err(unsupported(format!(
@@ -124,6 +125,7 @@ pub fn declared_size(bytes: &[u8]) -> Option<(u32, u32)> {
         ImageFormat::Jpeg => Some(JpegDecoder::new(Cursor::new(bytes)).ok()?.dimensions()),
         ImageFormat::Png => container::png_size(bytes),
         ImageFormat::WebP => Some(WebPDecoder::new(Cursor::new(bytes)).ok()?.dimensions()),
+        ImageFormat::Pnm => Some(PnmDecoder::new(bytes).ok()?.dimensions()),
         _ => None,
     }
 }
@@ -169,6 +171,14 @@ fn decode_webp(bytes: &[u8], limits: &DecodeLimits) -> Result<DecodedFrame, Deco
         container::webp_frames_fit(bytes, size),
         "a frame is larger than the image",
     )?;
+    task.read(decoder)
+}
+
+/// Decodes pixels that `ffmpeg` wrote.
+fn decode_ppm(bytes: &[u8], limits: &DecodeLimits) -> Result<DecodedFrame, DecodeError> {
+    let task = Task::new("PPM", limits);
+    let decoder = PnmDecoder::new(bytes).map_err(|e| task.refusal(e))?;
+    limits.check(decoder.dimensions())?;
     task.read(decoder)
 }
 
@@ -349,7 +359,7 @@ pub enum DecodeError {
     /// The bytes start like an image but cannot be decoded to the end.
     #[error("the {format} image is damaged or cut off ({reason}): send the whole file again")]
     Corrupt {
-        /// `JPEG`, `PNG` or `WebP`.
+        /// `JPEG`, `PNG`, `WebP` or `PPM`.
         format: &'static str,
         /// Reason of the failure.
         reason: String,

@@ -28,6 +28,10 @@ const NICE: i32 = 5;
 /// The prefix of variables with settings of the server and of a camera, which may be secret.
 const SECRET_VARIABLES: &str = "LOOKDOWN_";
 
+/// The setting with which this process returns the memory of frames to the system. A decoder keeps
+/// a few buffers for its whole life.
+const ALLOCATOR_SETTING: &str = "MALLOC_MMAP_THRESHOLD_";
+
 /// The task of a child process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Task {
@@ -40,7 +44,7 @@ pub(crate) enum Task {
 /// Returns a command whose process ends with its handle and has no settings of the server.
 pub(crate) fn command(program: impl AsRef<OsStr>) -> Command {
     let mut command = Command::new(program);
-    command.kill_on_drop(true);
+    command.kill_on_drop(true).env_remove(ALLOCATOR_SETTING);
     for (name, _) in std::env::vars_os() {
         if name.to_string_lossy().starts_with(SECRET_VARIABLES) {
             command.env_remove(name);

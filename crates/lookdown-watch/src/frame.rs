@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use bytes::Bytes;
 use jiff::Timestamp;
-use lookdown_common::{JPEG_END, JPEG_START, jpeg_length};
+use lookdown_common::{JPEG_END, JPEG_START, PPM_START, jpeg_length, ppm_length};
 
 use crate::memory_budget::Reservation;
 
@@ -25,6 +25,8 @@ pub enum ImageFormat {
     Png,
     /// WebP.
     WebP,
+    /// Binary PPM: the pixels of a video.
+    Ppm,
 }
 
 impl ImageFormat {
@@ -34,6 +36,7 @@ impl ImageFormat {
             Self::Jpeg => "image/jpeg",
             Self::Png => "image/png",
             Self::WebP => "image/webp",
+            Self::Ppm => "image/x-portable-pixmap",
         }
     }
 }
@@ -104,6 +107,9 @@ fn format_of(image: &[u8]) -> Result<ImageFormat, FrameError> {
         let size = image.get(4..8).and_then(|size| size.try_into().ok());
         let size = size.map_or(0, u32::from_le_bytes) as usize;
         whole(ImageFormat::WebP, image.len() >= size + 8)
+    } else if image.starts_with(PPM_START) {
+        let is_whole = ppm_length(image).is_some_and(|length| image.len() >= length);
+        whole(ImageFormat::Ppm, is_whole)
     } else {
         Err(FrameError::NotAnImage)
     }
@@ -129,6 +135,7 @@ mod tests {
             check(b"\x89PNG\r\n\x1a\n..IEND\xaeB`\x82"),
             Ok(ImageFormat::Png)
         );
+        assert_eq!(check(b"P6\n1 2\n255\nrgbrgb"), Ok(ImageFormat::Ppm));
         assert_eq!(check(webp), Ok(ImageFormat::WebP));
     }
 
@@ -138,6 +145,8 @@ mod tests {
             b"\xff\xd8\xff\xe0..".as_slice(),
             b"\x89PNG\r\n\x1a\n..",
             b"RIFF\x05\0\0\0WEBP",
+            b"P6\n1 2\n255\nrgbrg",
+            b"P6\n1 2",
         ] {
             assert_eq!(check(image), Err(FrameError::Incomplete));
         }

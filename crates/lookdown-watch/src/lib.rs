@@ -10,7 +10,7 @@ mod config;
 mod credentials;
 mod ffmpeg;
 mod frame;
-mod jpeg_splitter;
+mod image_splitter;
 mod location;
 mod memory_budget;
 mod metrics;

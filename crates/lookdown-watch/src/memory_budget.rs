@@ -13,6 +13,12 @@ const MAX_BYTES: usize = 512 << 20;
 /// Most bytes that a reservation may have however much the others hold.
 const SMALL_BYTES: usize = 1 << 20;
 
+/// Returns the most bytes of a frame with which all of so many cameras fit into the budget: one
+/// frame that is received, one that waits, one that is sent, and one more.
+pub(crate) const fn frame_bytes(cameras: usize) -> usize {
+    MAX_BYTES / (4 * cameras)
+}
+
 static BUDGET: MemoryBudget = MemoryBudget::new(MAX_BYTES);
 
 /// The sum of all reservations.

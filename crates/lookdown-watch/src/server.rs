@@ -9,7 +9,7 @@ use lookdown_common::{ClientError, ServerClient, ServerOptions, read_body, retry
 use reqwest::{Method, Response, StatusCode, Url, header::CONTENT_TYPE};
 use serde::Deserialize;
 
-use crate::{Camera, Frame, operating_point::FinishedSearch};
+use crate::{Camera, Frame, memory_budget::frame_bytes, operating_point::FinishedSearch};
 
 /// Longest time for a report.
 const REPORT_TIMEOUT: Duration = Duration::from_secs(35);
@@ -20,6 +20,8 @@ const MAX_ANSWER_BYTES: usize = 32 << 20;
 pub(crate) struct Server {
     client: ServerClient,
     detect: Url,
+    /// Most bytes of a frame that it accepts as pixels: 0 unless it is in this process.
+    most_pixel_bytes: usize,
 }
 
 /// The answer to a frame.
@@ -61,7 +63,17 @@ impl Server {
     pub(crate) fn new(options: &ServerOptions) -> Result<Self, ClientError> {
         let client = ServerClient::new(options)?;
         let detect = client.route(["detect"]);
-        Ok(Self { client, detect })
+        let in_process = options.in_process.as_ref();
+        Ok(Self {
+            client,
+            detect,
+            most_pixel_bytes: in_process.map_or(0, |server| server.max_frame_bytes),
+        })
+    }
+
+    /// Returns the most bytes of a frame of one of so many cameras that is sent as pixels.
+    pub(crate) fn most_pixel_bytes(&self, cameras: usize) -> usize {
+        self.most_pixel_bytes.min(frame_bytes(cameras))
     }
 
     /// Sends a frame, and waits for its report. `profile` replaces that of the server.

@@ -10,7 +10,7 @@ mod video;
 use sink::Sink;
 pub use standard_input::ImageReader;
 
-use std::{convert::Infallible, time::Duration};
+use std::{convert::Infallible, sync::atomic::AtomicUsize, time::Duration};
 
 use parking_lot::Mutex;
 use tokio::time::sleep;
@@ -26,12 +26,12 @@ const PAUSES: (Duration, Duration) = (Duration::from_millis(500), Duration::from
 /// First and longest pause after wrong credentials: cameras lock accounts after a few attempts.
 const LOGIN_PAUSES: (Duration, Duration) = (Duration::from_secs(10), Duration::from_mins(5));
 
-/// Fills the slot with the frames of a camera. Ends with the frames of a finite source, otherwise
-/// never.
+/// Fills the slot with the frames of a camera, those of a video as pixels if they are not larger
+/// than `most_pixel_bytes`. Ends with the frames of a finite source, otherwise never.
 pub(crate) async fn supervise(
     camera: &Camera,
     client: &HttpClient,
-    slot: &Slot<Frame>,
+    (slot, most_pixel_bytes): (&Slot<Frame>, usize),
     metrics: &CameraMetrics,
 ) {
     let (first, longest) = PAUSES;
@@ -39,10 +39,11 @@ pub(crate) async fn supervise(
     let (first, longest) = LOGIN_PAUSES;
     let mut login_backoff = Backoff::new(first, longest);
     let log = Mutex::new(LogOnce::default());
+    let most_pixel_bytes = AtomicUsize::new(most_pixel_bytes);
     let mut login = Login::new(camera.credentials.clone());
     loop {
         login.restart();
-        let sink = Sink::new(slot, metrics, &log);
+        let sink = Sink::new(slot, metrics, &log, &most_pixel_bytes);
         let outcome = tokio::select! {
             outcome = run(camera, client, &mut login, &sink) => outcome,
             error = stalled(camera, &sink) => Err(error),
@@ -82,7 +83,8 @@ pub async fn first_frame(camera: &Camera, limit: Duration) -> Result<Frame, Sour
     let metrics = all.add(&camera.name, camera.location.to_string());
     let (slot, log) = (Slot::default(), Mutex::new(LogOnce::default()));
     let mut login = Login::new(camera.credentials.clone());
-    let sink = Sink::new(&slot, &metrics, &log);
+    let no_pixels = AtomicUsize::new(0);
+    let sink = Sink::new(&slot, &metrics, &log, &no_pixels);
     tokio::select! {
         biased;
         frame = slot.take() => frame.ok_or(SourceError::Closed),

@@ -43,7 +43,7 @@ impl VideoFrames {
         let filter = format!("fps=fps=1000/{}", every.as_millis().max(1));
         arguments.extend(["-vf", &filter].map(OsString::from));
         Ok(Self {
-            ffmpeg: Ffmpeg::start(options, &arguments, Input::File).await?,
+            ffmpeg: Ffmpeg::start(options, &arguments, Input::File, 0).await?,
             every,
             count: 0,
         })

@@ -104,12 +104,14 @@ impl Watcher {
         let span = tracing::info_span!("camera", camera = camera.name);
         let follow = camera.parameter("follow");
         span.in_scope(|| tracing::info!(follow, "watching {}", camera.location));
+        let most_pixel_bytes = self.server.most_pixel_bytes(self.options.cameras.len());
         let (name, camera) = (camera.name.clone(), Arc::new(camera));
         let source = tokio::spawn({
             let (camera, client) = (Arc::clone(&camera), self.client.clone());
             let (slot, metrics) = (Arc::clone(&slot), Arc::clone(&metrics));
             async move {
-                let run = || source::supervise(&camera, &client, &slot, &metrics);
+                let run =
+                    || source::supervise(&camera, &client, (&slot, most_pixel_bytes), &metrics);
                 run_again(camera.location.is_finite(), run).await;
                 slot.close();
             }

@@ -17,7 +17,7 @@ fn refused(bytes: &[u8]) -> DecodeError {
     decode(bytes, &DecodeLimits::default()).unwrap_err()
 }
 
-const IMAGES: [&str; 21] = [
+const IMAGES: [&str; 22] = [
     "alpha.png",
     "alpha.webp",
     "alpha_lossy.webp",
@@ -37,6 +37,7 @@ const IMAGES: [&str; 21] = [
     "palette_alpha.png",
     "progressive.jpg",
     "rgb.png",
+    "rgb.ppm",
     "rgb_16_bit.png",
     "thumbnail.jpg",
 ];
@@ -69,6 +70,7 @@ fn assert_shows_the_quarters(name: &str, image: &DecodedFrame, tolerance: u8) {
 fn every_color_format_decodes_to_the_same_image() {
     for name in [
         "rgb.png",
+        "rgb.ppm",
         "rgb_16_bit.png",
         "palette.png",
         "lossless.webp",
@@ -277,7 +279,13 @@ fn each_limit_holds_on_its_own_for_every_container() {
             ExceededLimit::Memory { max_bytes: 10_000 },
         ),
     ];
-    for name in ["rgb.png", "progressive.jpg", "lossy.webp", "alpha.webp"] {
+    for name in [
+        "rgb.png",
+        "rgb.ppm",
+        "progressive.jpg",
+        "lossy.webp",
+        "alpha.webp",
+    ] {
         for (limits, limit) in cases {
             let expected = DecodeError::TooLarge {
                 width: 64,
@@ -311,6 +319,7 @@ fn the_format_is_detected_from_content_and_others_are_named() {
         found(b"BM\x4e\0\0\0\0\0\0\0\x36\0\0\0"),
         "in the format BMP"
     );
+    assert_eq!(found(b"P5\n1 1\n255\n\0"), "in the format PBM");
     assert_eq!(
         found(b"\0\0\0\x18ftypheic\0\0\0\0mif1"),
         "in the format HEIF"

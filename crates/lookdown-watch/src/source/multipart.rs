@@ -9,7 +9,7 @@ use bytes::{Bytes, BytesMut};
 use lookdown_common::{JPEG_END, JPEG_START};
 use memchr::memmem;
 
-use crate::{SourceError, jpeg_splitter::JpegSplitter};
+use crate::{SourceError, image_splitter::ImageSplitter};
 
 /// Most bytes of the headers of a part.
 const MAX_HEADER_BYTES: usize = 8 << 10;
@@ -26,7 +26,7 @@ pub(crate) struct PartReader {
     /// Number of bytes that do not contain what is searched for.
     searched: usize,
     /// Reads the stream instead, if it has no usable boundary.
-    splitter: Option<JpegSplitter>,
+    splitter: Option<ImageSplitter>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -57,7 +57,7 @@ impl PartReader {
             searched: 0,
             splitter: boundary
                 .is_none()
-                .then(|| JpegSplitter::new(max_part_bytes)),
+                .then(|| ImageSplitter::new(max_part_bytes)),
         }
     }
 
@@ -72,12 +72,12 @@ impl PartReader {
     /// The number of bytes in the buffer.
     pub(crate) fn buffered(&self) -> usize {
         let splitter = self.splitter.as_ref();
-        splitter.map_or(self.buffer.len(), JpegSplitter::buffered)
+        splitter.map_or(self.buffer.len(), ImageSplitter::buffered)
     }
 
     /// Splits the rest of the stream by its JPEG files.
     fn split(&mut self) -> Option<Bytes> {
-        let mut splitter = JpegSplitter::new(self.max_part_bytes);
+        let mut splitter = ImageSplitter::new(self.max_part_bytes);
         splitter.buffer().extend_from_slice(&self.buffer.split());
         self.splitter.insert(splitter).next_file()
     }

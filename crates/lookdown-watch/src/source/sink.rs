@@ -1,6 +1,9 @@
 //! The receiver of a camera's frames.
 
-use std::time::{Duration, Instant};
+use std::{
+    sync::atomic::{AtomicUsize, Ordering},
+    time::{Duration, Instant},
+};
 
 use bytes::Bytes;
 use jiff::Timestamp;
@@ -28,6 +31,8 @@ pub(super) struct Sink<'a> {
     /// The time of the last sign that the camera works.
     alive: Mutex<Option<Instant>>,
     is_failing: &'a Mutex<LogOnce>,
+    /// The most bytes of a frame of a video that is accepted as pixels; 0 for JPEG files.
+    most_pixel_bytes: &'a AtomicUsize,
 }
 
 impl<'a> Sink<'a> {
@@ -36,6 +41,7 @@ impl<'a> Sink<'a> {
         slot: &'a Slot<Frame>,
         metrics: &'a CameraMetrics,
         is_failing: &'a Mutex<LogOnce>,
+        most_pixel_bytes: &'a AtomicUsize,
     ) -> Self {
         Self {
             slot,
@@ -43,7 +49,19 @@ impl<'a> Sink<'a> {
             started: Instant::now(),
             alive: Mutex::default(),
             is_failing,
+            most_pixel_bytes,
         }
+    }
+
+    /// Returns the most bytes of a frame of a video that is accepted as pixels; 0 for JPEG files.
+    pub(super) fn most_pixel_bytes(&self) -> usize {
+        self.most_pixel_bytes.load(Ordering::Relaxed)
+    }
+
+    /// Accepts JPEG files from now on, as a frame was too large for pixels. Returns false if it was
+    /// a JPEG file already.
+    pub(super) fn falls_back_to_files(&self) -> bool {
+        self.most_pixel_bytes.swap(0, Ordering::Relaxed) > 0
     }
 
     /// Accepts an image file that was captured now.

@@ -5,12 +5,12 @@ use lookdown_common::{JPEG_START, jpeg_length};
 use tokio::io::{AsyncRead, AsyncReadExt};
 
 use super::sink::Sink;
-use crate::{MAX_FRAME_BYTES, SourceError, jpeg_splitter::JpegSplitter};
+use crate::{MAX_FRAME_BYTES, SourceError, image_splitter::ImageSplitter};
 
 /// Reads images from a stream.
 pub struct ImageReader<R> {
     input: R,
-    splitter: JpegSplitter,
+    splitter: ImageSplitter,
     /// True for a stream of JPEG files. `None` until its first bytes arrive.
     is_jpeg: Option<bool>,
 }
@@ -20,7 +20,7 @@ impl<R: AsyncRead + Unpin> ImageReader<R> {
     pub fn new(input: R) -> Self {
         Self {
             input,
-            splitter: JpegSplitter::new(MAX_FRAME_BYTES),
+            splitter: ImageSplitter::new(MAX_FRAME_BYTES),
             is_jpeg: None,
         }
     }

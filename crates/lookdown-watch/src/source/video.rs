@@ -37,7 +37,10 @@ pub(super) async fn run_stream(
         let has_viewers = sink.metrics.has_viewers();
         let every = (!has_viewers).then(|| camera.every());
         tokio::select! {
-            ended = read_stream(camera, url, every, login, sink) => return ended,
+            ended = read_stream(camera, url, every, login, sink) => match ended {
+                Err(SourceError::TooLarge) if sink.falls_back_to_files() => login.restart(),
+                ended => return ended,
+            },
             () = sink.metrics.viewers_changed(has_viewers) => login.restart(),
         }
     }
@@ -86,7 +89,7 @@ async fn read_stream(
         relay: relay.url().to_owned(),
         camera: camera.location.to_string(),
     };
-    let mut ffmpeg = Ffmpeg::start(video, &arguments, input).await?;
+    let mut ffmpeg = Ffmpeg::start(video, &arguments, input, sink.most_pixel_bytes()).await?;
     let frames = async {
         loop {
             match ffmpeg.next_frame().await {
@@ -110,6 +113,15 @@ pub(super) async fn run_file(
     path: &Path,
     sink: &Sink<'_>,
 ) -> Result<(), SourceError> {
+    match read_file(camera, path, sink).await {
+        Err(SourceError::TooLarge) if sink.falls_back_to_files() => {
+            read_file(camera, path, sink).await
+        }
+        ended => ended,
+    }
+}
+
+async fn read_file(camera: &Camera, path: &Path, sink: &Sink<'_>) -> Result<(), SourceError> {
     let mut arguments = decoding(&camera.video);
     arguments.push("-re".into());
     arguments.extend(file_input(path));
@@ -118,7 +130,9 @@ pub(super) async fn run_file(
         arguments.extend(["-vf", &first_of_each(camera.every())].map(OsString::from));
     }
     arguments.extend(["-fps_mode", "passthrough"].map(OsString::from));
-    let mut ffmpeg = Ffmpeg::start(&camera.video, &arguments, Input::File).await?;
+    let most_pixel_bytes = sink.most_pixel_bytes();
+    let mut ffmpeg =
+        Ffmpeg::start(&camera.video, &arguments, Input::File, most_pixel_bytes).await?;
     while let Some(frame) = ffmpeg.next_frame().await? {
         sink.accept(frame)?;
     }
