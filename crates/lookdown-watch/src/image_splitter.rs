@@ -256,6 +256,29 @@ mod tests {
     }
 
     #[test]
+    fn pixels_get_the_memory_of_those_that_are_in_use_no_longer() {
+        let mut splitter = ImageSplitter::new(1 << 20);
+        let file = [&b"P6\n300 300\n255\n"[..], &[7; 3 * 300 * 300]].concat();
+        let mut next = || {
+            let mut found = None;
+            for part in file.chunks(CHUNK_BYTES) {
+                splitter.buffer().extend_from_slice(part);
+                found = splitter.next_file();
+            }
+            // Reads on before the file is used.
+            splitter.buffer();
+            found.unwrap()
+        };
+        let first = next();
+        let kept = first.as_ptr();
+        drop(first);
+        let second = next();
+        assert_eq!((second.as_ptr(), &second[..]), (kept, &file[..]));
+        // While it is in use, the next one has memory of its own.
+        assert_ne!(next().as_ptr(), kept);
+    }
+
+    #[test]
     fn pixels_beyond_the_limit_are_skipped_and_told() {
         for (header, is_told) in [("P6\n20 20\n255\n", true), ("P6\nx 20\n255\n", false)] {
             let mut splitter = ImageSplitter::new(1000);
