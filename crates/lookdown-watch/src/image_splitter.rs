@@ -258,7 +258,7 @@ mod tests {
     #[test]
     fn pixels_get_the_memory_of_those_that_are_in_use_no_longer() {
         let mut splitter = ImageSplitter::new(1 << 20);
-        let file = [&b"P6\n300 300\n255\n"[..], &[7; 3 * 300 * 300]].concat();
+        let file = [&b"P6\n300 300\n255\n"[..], &vec![7; 3 * 300 * 300]].concat();
         let mut next = || {
             let mut found = None;
             for part in file.chunks(CHUNK_BYTES) {
