@@ -264,11 +264,18 @@ impl App {
     /// Returns the connection of parts of this process to the server.
     pub fn in_process(&self) -> InProcess {
         let router = api::in_process_router(self.state.clone());
-        let settings = &self.state.options.settings;
-        // A few cameras at a time fit into the half that one client has.
-        let share = settings.limits.max_upload_bytes / 8;
-        let most = settings.server.max_body_bytes.min(share);
-        api::in_process(router, self.companions().own_cameras(), most)
+        let state = self.state.clone();
+        let most_pixel_bytes = move |camera: &str| {
+            let settings = &state.options.settings;
+            // A file is kept as it is; pixels would be encoded again.
+            if settings.results.conceal_images.is_none() && state.keeps_image(camera) {
+                return 0;
+            }
+            // A few cameras at a time fit into the half that one client has.
+            let share = settings.limits.max_upload_bytes / 8;
+            settings.server.max_body_bytes.min(share)
+        };
+        api::in_process(router, self.companions().own_cameras(), most_pixel_bytes)
     }
 
     /// The readiness of the app. Clones share its state.

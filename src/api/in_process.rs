@@ -16,8 +16,12 @@ use tower::ServiceExt;
 use super::http::context::OwnRequest;
 
 /// Returns the connection of parts of this process to the server with these routes.
-pub fn in_process(router: Router, own_cameras: OwnCameras, max_frame_bytes: usize) -> InProcess {
-    InProcess::new(own_cameras, max_frame_bytes, move |request| {
+pub fn in_process(
+    router: Router,
+    own_cameras: OwnCameras,
+    most_pixel_bytes: impl Fn(&str) -> usize + Send + Sync + 'static,
+) -> InProcess {
+    InProcess::new(own_cameras, most_pixel_bytes, move |request| {
         let mut request = request.map(Body::new);
         request.extensions_mut().insert(OwnRequest);
         let answered = router.clone().oneshot(request);

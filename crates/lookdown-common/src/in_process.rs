@@ -15,15 +15,16 @@ pub struct InProcess {
     pub(crate) answer: Arc<dyn Fn(Request<Body>) -> Answer + Send + Sync>,
     /// The cameras of the process.
     pub own_cameras: OwnCameras,
-    /// Most bytes of a frame of a camera that it accepts.
-    pub max_frame_bytes: usize,
+    /// Returns the most bytes of a frame that this camera of the process should send as pixels; 0
+    /// for a camera whose image files the server keeps.
+    pub most_pixel_bytes: Arc<dyn Fn(&str) -> usize + Send + Sync>,
 }
 
 impl InProcess {
     /// Creates a connection to the server that answers with this function.
     pub fn new<A>(
         own_cameras: OwnCameras,
-        max_frame_bytes: usize,
+        most_pixel_bytes: impl Fn(&str) -> usize + Send + Sync + 'static,
         answer: impl Fn(Request<Body>) -> A + Send + Sync + 'static,
     ) -> Self
     where
@@ -32,7 +33,7 @@ impl InProcess {
         Self {
             answer: Arc::new(move |request| Box::pin(answer(request))),
             own_cameras,
-            max_frame_bytes,
+            most_pixel_bytes: Arc::new(most_pixel_bytes),
         }
     }
 }

@@ -5,7 +5,9 @@ use std::{
     time::{Duration, Instant},
 };
 
-use lookdown_common::{ClientError, ServerClient, ServerOptions, read_body, retry_after};
+use lookdown_common::{
+    ClientError, InProcess, ServerClient, ServerOptions, read_body, retry_after,
+};
 use reqwest::{Method, Response, StatusCode, Url, header::CONTENT_TYPE};
 use serde::Deserialize;
 
@@ -20,8 +22,7 @@ const MAX_ANSWER_BYTES: usize = 32 << 20;
 pub(crate) struct Server {
     client: ServerClient,
     detect: Url,
-    /// Most bytes of a frame that it accepts as pixels: 0 unless it is in this process.
-    most_pixel_bytes: usize,
+    in_process: Option<InProcess>,
 }
 
 /// The answer to a frame.
@@ -63,17 +64,18 @@ impl Server {
     pub(crate) fn new(options: &ServerOptions) -> Result<Self, ClientError> {
         let client = ServerClient::new(options)?;
         let detect = client.route(["detect"]);
-        let in_process = options.in_process.as_ref();
         Ok(Self {
             client,
             detect,
-            most_pixel_bytes: in_process.map_or(0, |server| server.max_frame_bytes),
+            in_process: options.in_process.clone(),
         })
     }
 
-    /// Returns the most bytes of a frame of one of so many cameras that is sent as pixels.
-    pub(crate) fn most_pixel_bytes(&self, cameras: usize) -> usize {
-        self.most_pixel_bytes.min(frame_bytes(cameras))
+    /// Returns the most bytes of a frame that a camera, one of so many, sends as pixels.
+    pub(crate) fn most_pixel_bytes(&self, camera: &str, cameras: usize) -> usize {
+        let server = self.in_process.as_ref();
+        let most = server.map_or(0, |server| (server.most_pixel_bytes)(camera));
+        most.min(frame_bytes(cameras))
     }
 
     /// Sends a frame, and waits for its report. `profile` replaces that of the server.

@@ -104,7 +104,8 @@ impl Watcher {
         let span = tracing::info_span!("camera", camera = camera.name);
         let follow = camera.parameter("follow");
         span.in_scope(|| tracing::info!(follow, "watching {}", camera.location));
-        let most_pixel_bytes = self.server.most_pixel_bytes(self.options.cameras.len());
+        let count = self.options.cameras.len();
+        let most_pixel_bytes = self.server.most_pixel_bytes(&camera.name, count);
         let (name, camera) = (camera.name.clone(), Arc::new(camera));
         let source = tokio::spawn({
             let (camera, client) = (Arc::clone(&camera), self.client.clone());

@@ -221,7 +221,7 @@ mod tests {
             url: Url::parse("http://counts.example/prefix/").unwrap(),
             api_key: None,
             authorities: None,
-            in_process: Some(in_process(routes, OwnCameras::default(), 0)),
+            in_process: Some(in_process(routes, OwnCameras::default(), |_| 0)),
         })
         .unwrap()
     }
