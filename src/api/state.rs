@@ -146,7 +146,7 @@ impl ApiState {
     }
 
     /// Returns true if the latest image of the camera is kept.
-    pub fn keeps_image(&self, camera: &str) -> bool {
+    pub(crate) fn keeps_image(&self, camera: &str) -> bool {
         let of_settings = self.options.settings.results.images_of.include(camera);
         let cameras = self.options.companions.cameras();
         of_settings || cameras.is_some_and(|cameras| cameras.keeps_image(camera))

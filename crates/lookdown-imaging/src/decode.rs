@@ -125,7 +125,9 @@ pub fn declared_size(bytes: &[u8]) -> Option<(u32, u32)> {
         ImageFormat::Jpeg => Some(JpegDecoder::new(Cursor::new(bytes)).ok()?.dimensions()),
         ImageFormat::Png => container::png_size(bytes),
         ImageFormat::WebP => Some(WebPDecoder::new(Cursor::new(bytes)).ok()?.dimensions()),
-        ImageFormat::Pnm => Some(PnmDecoder::new(bytes).ok()?.dimensions()),
+        ImageFormat::Pnm if bytes.starts_with(PPM_START) => {
+            Some(PnmDecoder::new(bytes).ok()?.dimensions())
+        }
         _ => None,
     }
 }

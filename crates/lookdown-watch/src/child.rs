@@ -25,12 +25,10 @@ const ENCODER_MEMORY: u64 = 2 << 30;
 const MAX_FILES: u64 = 64;
 /// The priority below that of this process and of the server.
 const NICE: i32 = 5;
-/// The prefix of variables with settings of the server and of a camera, which may be secret.
-const SECRET_VARIABLES: &str = "LOOKDOWN_";
-
-/// The setting with which this process returns the memory of frames to the system. A decoder keeps
-/// a few buffers for its whole life.
-const ALLOCATOR_SETTING: &str = "MALLOC_MMAP_THRESHOLD_";
+/// The prefixes of variables that are of this process alone: settings of the server and of a
+/// camera, which may be secret, and those of the allocator, which would return each buffer of a
+/// decoder to the system.
+const OWN_VARIABLES: [&str; 2] = ["LOOKDOWN_", "MALLOC_"];
 
 /// The task of a child process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,9 +42,10 @@ pub(crate) enum Task {
 /// Returns a command whose process ends with its handle and has no settings of the server.
 pub(crate) fn command(program: impl AsRef<OsStr>) -> Command {
     let mut command = Command::new(program);
-    command.kill_on_drop(true).env_remove(ALLOCATOR_SETTING);
+    command.kill_on_drop(true);
     for (name, _) in std::env::vars_os() {
-        if name.to_string_lossy().starts_with(SECRET_VARIABLES) {
+        let text = name.to_string_lossy();
+        if OWN_VARIABLES.iter().any(|prefix| text.starts_with(prefix)) {
             command.env_remove(name);
         }
     }

@@ -86,9 +86,9 @@ impl Ffmpeg {
         input: Input<'_>,
         most_pixel_bytes: usize,
     ) -> Result<Self, SourceError> {
-        let (encoder, max_bytes) = match most_pixel_bytes {
-            0 => (JPEG_ENCODER, MAX_FRAME_BYTES),
-            most => (PPM_ENCODER, most),
+        let (encoder, splitter) = match most_pixel_bytes {
+            0 => (JPEG_ENCODER, ImageSplitter::new(MAX_FRAME_BYTES)),
+            most => (PPM_ENCODER, ImageSplitter::for_pixels(most)),
         };
         let no_ffmpeg = |problem: String| SourceError::NoFfmpeg {
             program: options.ffmpeg.display().to_string(),
@@ -132,7 +132,7 @@ impl Ffmpeg {
             child,
             output,
             errors: LastLine::new(errors),
-            splitter: ImageSplitter::new(max_bytes),
+            splitter,
             memory: Reservation::default(),
             usage,
             checks: interval(USAGE_INTERVAL),

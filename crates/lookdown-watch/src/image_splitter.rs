@@ -1,10 +1,10 @@
-//! Splits a stream of concatenated JPEG or PPM files into files.
+//! Splits a stream of concatenated JPEG files, or of PPM files, into files.
 //!
 //! The segments of a JPEG are followed, so a thumbnail within a file does not end it. Damaged bytes
 //! are skipped up to the start of the next JPEG.
 
 use bytes::{Bytes, BytesMut};
-use lookdown_common::{JPEG_START, MAX_PPM_HEADER_BYTES, PPM_START, jpeg_length, ppm_length};
+use lookdown_common::{JPEG_START, MAX_PPM_HEADER_BYTES, jpeg_length, ppm_length};
 
 /// Bytes that are read at once.
 const CHUNK_BYTES: usize = 64 << 10;
@@ -14,6 +14,8 @@ const CHUNK_BYTES: usize = 64 << 10;
 pub(crate) struct ImageSplitter {
     buffer: BytesMut,
     max_bytes: usize,
+    /// The state before a file: only `ffmpeg` sends pixels, which no camera may.
+    start: State,
     state: State,
     /// Number of bytes of the buffer that were parsed; in a PPM, the length of the file.
     parsed: usize,
@@ -26,12 +28,14 @@ pub(crate) struct ImageSplitter {
 
 #[derive(Debug, Clone, Copy)]
 enum State {
-    /// Before the start of a file.
+    /// Before the start of a JPEG.
     Start,
     /// At a marker.
     Marker,
     /// In the compressed data of a scan.
     Scan,
+    /// Before the end of the header of a PPM.
+    PpmHeader,
     /// In a PPM.
     Pixels,
 }
@@ -44,12 +48,22 @@ enum Step {
 }
 
 impl ImageSplitter {
-    /// Creates a splitter of files with at most this many bytes.
+    /// Creates a splitter of JPEG files with at most this many bytes.
     pub(crate) fn new(max_bytes: usize) -> Self {
+        Self::from_state(State::Start, max_bytes)
+    }
+
+    /// Creates a splitter of PPM files with at most this many bytes.
+    pub(crate) fn for_pixels(max_bytes: usize) -> Self {
+        Self::from_state(State::PpmHeader, max_bytes)
+    }
+
+    fn from_state(start: State, max_bytes: usize) -> Self {
         Self {
             buffer: BytesMut::new(),
             max_bytes,
-            state: State::Start,
+            start,
+            state: start,
             parsed: 0,
             has_skipped_pixels: false,
             last_pixels: Bytes::new(),
@@ -95,7 +109,7 @@ impl ImageSplitter {
     }
 
     fn restart(&mut self) {
-        self.state = State::Start;
+        self.state = self.start;
         self.parsed = 0;
     }
 
@@ -107,8 +121,8 @@ impl ImageSplitter {
 
     fn step(&mut self) -> Step {
         match self.state {
-            State::Start if self.buffer.starts_with(PPM_START) => self.read_ppm_header(),
             State::Start => self.find_start(),
+            State::PpmHeader => self.read_ppm_header(),
             State::Marker => self.read_marker(),
             State::Scan => self.read_scan(),
             State::Pixels if self.buffer.len() >= self.parsed => Step::Whole,
@@ -130,7 +144,8 @@ impl ImageSplitter {
             None if self.buffer.len() < MAX_PPM_HEADER_BYTES => return Step::NeedsMore,
             too_long => {
                 self.has_skipped_pixels |= too_long.is_some();
-                self.skip(PPM_START.len());
+                self.skip(self.buffer.len());
+                return Step::NeedsMore;
             }
         }
         Step::Continue
@@ -227,7 +242,10 @@ mod tests {
     const SMALL: &[u8] = b"\xff\xd8\xff\xda\x00\x02xyz\xff\xd9";
 
     fn files(stream: &[u8], chunk: usize) -> Vec<Bytes> {
-        let mut splitter = ImageSplitter::new(1000);
+        split(ImageSplitter::new(1000), stream, chunk)
+    }
+
+    fn split(mut splitter: ImageSplitter, stream: &[u8], chunk: usize) -> Vec<Bytes> {
         let mut files = Vec::new();
         for bytes in stream.chunks(chunk) {
             splitter.buffer().extend_from_slice(bytes);
@@ -249,15 +267,17 @@ mod tests {
     #[test]
     fn pixels_are_split_at_any_chunk_size() {
         let ppm = b"P6\n2 1\n255\nP6\n\xff\xd8\xff";
-        let stream = [ppm, ppm, SMALL, ppm].concat();
         for chunk in [1, 2, 7, 1000] {
-            assert_eq!(files(&stream, chunk), [ppm, ppm, SMALL, ppm], "{chunk}");
+            let found = split(ImageSplitter::for_pixels(1000), &ppm.repeat(3), chunk);
+            assert_eq!(found, [&ppm[..]; 3], "{chunk}");
         }
+        // A camera sends none.
+        assert_eq!(files(&[&ppm[..11], SMALL].concat(), 1000), [SMALL]);
     }
 
     #[test]
     fn pixels_get_the_memory_of_those_that_are_in_use_no_longer() {
-        let mut splitter = ImageSplitter::new(1 << 20);
+        let mut splitter = ImageSplitter::for_pixels(1 << 20);
         let file = [&b"P6\n300 300\n255\n"[..], &vec![7; 3 * 300 * 300]].concat();
         let mut next = || {
             let mut found = None;
@@ -281,15 +301,14 @@ mod tests {
     #[test]
     fn pixels_beyond_the_limit_are_skipped_and_told() {
         for (header, is_told) in [("P6\n20 20\n255\n", true), ("P6\nx 20\n255\n", false)] {
-            let mut splitter = ImageSplitter::new(1000);
+            let mut splitter = ImageSplitter::for_pixels(1000);
             splitter.buffer().extend_from_slice(header.as_bytes());
             splitter
                 .buffer()
                 .extend_from_slice(&[0; MAX_PPM_HEADER_BYTES]);
             assert_eq!(splitter.next_file(), None);
             assert_eq!(splitter.has_skipped_pixels, is_told, "{header}");
-            splitter.buffer().extend_from_slice(SMALL);
-            assert_eq!(splitter.next_file().as_deref(), Some(SMALL));
+            assert_eq!(splitter.buffered(), 0);
         }
     }
 

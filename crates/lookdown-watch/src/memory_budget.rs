@@ -14,7 +14,7 @@ const MAX_BYTES: usize = 512 << 20;
 const SMALL_BYTES: usize = 1 << 20;
 
 /// Returns the most bytes of a frame with which all of so many cameras fit into the budget: one
-/// frame that is received, one that waits, one that is sent, and one more.
+/// frame that is received, one that waits, one that is sent, and one whose memory is used again.
 pub(crate) const fn frame_bytes(cameras: usize) -> usize {
     MAX_BYTES / (4 * cameras)
 }
